@@ -1,0 +1,52 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""ament_python package for ROS 2 and, at the same time, a plain pip package (no ROS needed for offline work)."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = "lugre_steering"
+VERSION = "0.1.0"
+
+setup(
+    name=PACKAGE,
+    version=VERSION,
+    description="Steering-torque estimator for rubber-tracked vehicles that finds the physics its model leaves out",
+    long_description=open("README.md", encoding="utf-8").read(),
+    long_description_content_type="text/markdown",
+    author="The lugre_steering contributors",
+    maintainer="The lugre_steering contributors",
+    maintainer_email="lugre-steering@example.org",
+    license="Apache-2.0",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if not path.endswith("__pycache__"))),
+        (f"share/{PACKAGE}/launch", sorted(glob("launch/*.launch.py"))),
+    ],
+    zip_safe=False,
+    python_requires=">=3.10",
+    install_requires=[
+        "numpy>=1.26",
+        "scipy>=1.11",
+        "numba>=0.58",
+        "pyyaml>=6.0",
+        "rosbags>=0.10",
+        "typer>=0.9",
+        "rich>=13.0",
+    ],
+    extras_require={
+        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        "report": ["matplotlib>=3.6", "plotly>=5.18"],
+        "test": ["pytest>=7.4", "hypothesis>=6.80", "jsonschema>=4.17", "mcap>=1.1", "ruff>=0.6", "mypy>=1.10", "types-PyYAML"],
+    },
+    entry_points={
+        "console_scripts": [
+            "lugre-steering = lugre_steering.cli:main",
+            "estimator = lugre_steering.node:main",
+        ],
+    },
+)
