@@ -19,8 +19,10 @@ setup(
     maintainer="The lugre_steering contributors",
     maintainer_email="lugre-steering@example.org",
     license="Apache-2.0",
-    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed"]},
+    # config/ is installed inside the package too, so that pavements are found by name after a plain pip install.
+    packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
+    package_dir={f"{PACKAGE}.config": "config"},
+    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.config": ["*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
