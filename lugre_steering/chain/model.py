@@ -1,0 +1,98 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From the vehicle description to the flat parameter record of each side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from lugre_steering.chain.layout import EFFECT_FIELDS
+from lugre_steering.chain.loads import load_moment, vertical_load
+from lugre_steering.chain.rubber import ratio_table
+from lugre_steering.chain.step import Records, new_parameters
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the compiled chain needs of a vehicle: one parameter record per side (alike, mirror images) and the rubber table."""
+
+    parameters: tuple[Records, ...]
+    rubber: Array
+
+
+def build_model(vehicle: Vehicle) -> Model:
+    """Parameter records with the vehicle's chain effects in place."""
+    record = new_parameters()
+    values = baseline_parameters(vehicle)
+    contact = vehicle.friction or vehicle.contact
+    assert contact is not None
+    rubber, values["table_low"], values["table_step"] = ratio_table(
+        vehicle.rubber, contact.reference_temperature_degC, contact.temperature_law
+    )
+    for effect in vehicle.effects:
+        for name, value in effect.parameters.items():
+            field = f"{effect.id}_{name}"
+            if field in EFFECT_FIELDS:
+                values[field] = value
+    for field, value in values.items():
+        record[field] = value
+    return Model(tuple(record.copy() for _ in vehicle.sides), rubber)
+
+
+def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:
+    """Baseline fields of the parameter record, one track, SI (PHYSICS: loads, radii, friction torques, damping, heat)."""
+    values = {"sides": float(len(vehicle.sides)), **_thermal(vehicle)}
+    if vehicle.contact is not None:
+        joint = vehicle.contact
+        sigma_0 = math.degrees(joint.stiffness_Nm_per_deg)
+        values |= {
+            "static_torque": joint.static_torque_Nm,
+            "coulomb_torque": joint.coulomb_torque_Nm,
+            "sigma_0": sigma_0,
+            "damping_factor": joint.presliding_damping_Nms / math.sqrt(sigma_0),
+            "stribeck_speed": math.radians(joint.stribeck_speed_deg_s),
+            "stribeck_exponent": joint.stribeck_exponent,
+        }
+    else:
+        axle, track, friction = vehicle.axle, vehicle.track, vehicle.friction
+        assert axle is not None
+        assert track is not None
+        assert friction is not None
+        assert friction.static is not None
+        assert friction.coulomb is not None
+        moment = load_moment(axle, track)
+        values |= {
+            "static_torque": friction.static * moment,
+            "coulomb_torque": friction.coulomb * moment,
+            "sigma_0": math.degrees(friction.stiffness_Nm_per_deg),
+            "damping_factor": 2.0 * track.damping_ratio * math.sqrt(track.yaw_inertia_kgm2),
+            "stribeck_speed": math.radians(friction.stribeck_speed_deg_s),
+            "stribeck_exponent": friction.stribeck_exponent,
+            "aligning_torque": vertical_load(axle, track)
+            * axle.kingpin_lever_arm_m
+            * math.sin(math.radians(axle.kingpin_inclination_deg)),
+        }
+    if vehicle.gravity is not None:
+        values["gravity_cos"] = vehicle.gravity.cos_Nm
+        values["aligning_torque"] = values.get("aligning_torque", 0.0) + vehicle.gravity.sin_Nm
+    sensors = vehicle.sensors
+    values["angle_noise"] = math.radians(math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0)))
+    return values
+
+
+def _thermal(vehicle: Vehicle) -> dict[str, float]:
+    """Heat capacity rho c A h [J/K], cooling lambda A [W/K] and temperatures; without rubber nothing ever warms."""
+    rubber, initial = vehicle.rubber, vehicle.initial
+    if rubber is None:
+        return {"heat_capacity": math.inf}
+    assert initial is not None
+    area = rubber.contact_area_m2
+    return {
+        "heat_capacity": rubber.density_kg_m3 * rubber.specific_heat_J_kgK * area * rubber.tread_thickness_m,
+        "cooling": rubber.heat_transfer_W_m2K * area,
+        "air_temperature": initial.air_temperature_degC,
+        "rubber_temperature": initial.rubber_temperature_degC,
+    }
