@@ -1,0 +1,114 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A whole bag in memory, cleaned: what may be used of it, and a count of what may not, per topic and reason."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lugre_steering.bag.reader import Bag, Block
+from lugre_steering.errors import BagError
+from lugre_steering.recording import Array, Channel, Finding, IntArray, Kind, Recording, Signal
+
+LIMITS = {
+    Kind.ANGLE: (-np.pi, np.pi),
+    Kind.PRESSURE: (-1e9, 1e9),
+    Kind.AIR_TEMPERATURE: (-100.0, 300.0),
+    Kind.TORQUE: (-1e9, 1e9),
+}
+RATE_LIMIT = 100.0  # rad/s, far beyond any steering
+LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
+STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
+
+
+def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
+    """Read, check and sort all wanted channels; see ``Recording.rejected`` for what was left out and why."""
+    with Bag(path) as bag:
+        topics = bag.match(channels)
+        blocks = list(bag.blocks(channels))
+        name, malformed = bag.name, bag.malformed
+        findings = list(bag.findings)
+        found = ", ".join(sorted(bag.topics)) or "none"
+    rejected: dict[str, Counter[str]] = {topic: Counter(malformed=count) for topic, count in malformed.items()}
+    clean: dict[Channel, tuple[IntArray, Array, Array]] = {}
+    for i, channel in enumerate(channels):
+        if channel in topics:
+            stamp, log, value, rate = _of_channel(blocks, i)
+            use, reasons, reordered = _usable(channel, stamp, log, value)
+            rejected.setdefault(topics[channel], Counter()).update(reasons)
+            if reordered:
+                statement = f"{reordered} messages were recorded out of order and put back in order"
+                findings.append(Finding("out_of_order", topics[channel], statement))
+            if len(use):
+                clean[channel] = stamp[use], value[use], rate[use]
+    if not clean:
+        wanted = ", ".join(sorted({channel.topic for channel in channels}))
+        raise BagError(f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}")
+    start_ns = min(int(stamp[0]) for stamp, _, _ in clean.values())
+    signals: dict[Kind, dict[str, Signal]] = {kind: {} for kind in Kind}
+    rates: dict[str, Signal] = {}
+    for channel, (stamp, value, rate) in clean.items():
+        time_s = ((stamp - start_ns) * 1e-9).astype(np.float64)
+        signals[channel.kind][channel.name] = Signal(time_s, value)
+        given = np.abs(rate) < RATE_LIMIT  # False for NaN
+        if given.any():
+            rates[channel.name] = Signal(time_s[given], rate[given])
+    return Recording(
+        name,
+        start_ns,
+        signals[Kind.ANGLE],
+        signals[Kind.PRESSURE],
+        rates,
+        next(iter(signals[Kind.AIR_TEMPERATURE].values()), None),
+        next(iter(signals[Kind.TORQUE].values()), None),
+        {topic: dict(sorted(reasons.items())) for topic, reasons in rejected.items() if reasons},
+        tuple(findings),
+    )
+
+
+def _of_channel(blocks: Sequence[Block], i: int) -> tuple[IntArray, IntArray, Array, Array]:
+    """(stamp, log time, value, rate) of one channel."""
+    rows = [block.channel == i for block in blocks]
+    empty = np.empty(0, np.int64)
+    return (
+        np.concatenate([empty, *(b.stamp_ns[r] for b, r in zip(blocks, rows, strict=True))]),
+        np.concatenate([empty, *(b.log_ns[r] for b, r in zip(blocks, rows, strict=True))]),
+        np.concatenate([empty.astype(float), *(b.value[r] for b, r in zip(blocks, rows, strict=True))]),
+        np.concatenate([empty.astype(float), *(b.rate[r] for b, r in zip(blocks, rows, strict=True))]),
+    )
+
+
+def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> tuple[IntArray, Counter[str], int]:
+    """Indices of usable messages by increasing stamp, the count of each reason for the others, how many were late."""
+    reasons: Counter[str] = Counter()
+    use: IntArray = np.arange(len(stamp))
+
+    def reject(reason: str, bad: NDArray[np.bool_]) -> None:
+        nonlocal use
+        if bad.any():
+            reasons[reason] += int(bad.sum())
+            use = use[~bad]
+
+    low, high = LIMITS[channel.kind]
+    reject("zero_stamp", stamp[use] == 0)
+    reject("not_finite", ~np.isfinite(value[use]))
+    reject("absurd_value", (value[use] < low) | (value[use] > high))
+    if len(use):
+        offset = stamp[use] - log[use]
+        reject("absurd_stamp", np.abs(offset - np.median(offset)) > STRAY_NS)
+    if len(use):
+        # A stamp counts as reached once the next message confirms it, so that one wild stamp cannot outdate the rest.
+        following = np.append(stamp[use][1:], stamp[use][-1])
+        reached = np.maximum.accumulate(np.minimum(stamp[use], following))
+        ahead = stamp[use] > following + LATE_NS
+        behind = stamp[use] < reached - LATE_NS
+        reject("backward_stamp", ahead | behind)
+    reordered = int((stamp[use] < np.maximum.accumulate(stamp[use])).sum()) if len(use) else 0
+    use = use[np.argsort(stamp[use], kind="stable")]
+    reject("duplicate_stamp", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
+    return use, reasons, reordered

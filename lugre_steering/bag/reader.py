@@ -1,0 +1,299 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded bag, in any of the forms rosbag2 leaves it in, as blocks of columns."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from lugre_steering.bag import cdr, mcap, sqlite
+from lugre_steering.bag.compression import ZSTD_MAGIC, expand_file
+from lugre_steering.bag.messages import Connection, Messages, inflated, merged, windows
+from lugre_steering.errors import BagError
+from lugre_steering.recording import Array, Channel, Finding, IntArray, Kind
+
+MESSAGE_TYPE = {
+    Kind.ANGLE: cdr.JOINT_STATE,
+    Kind.PRESSURE: cdr.FLUID_PRESSURE,
+    Kind.AIR_TEMPERATURE: cdr.TEMPERATURE,
+    Kind.TORQUE: cdr.WRENCH_STAMPED,
+}
+_SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
+_PEEK = 500_000  # messages looked at to find which topic carries a joint
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive messages of a bag in recorded (log time) order; one row per message and wanted channel it carries."""
+
+    channel: NDArray[np.int32]  # index into the channels given to the reader
+    stamp_ns: IntArray  # header stamp
+    log_ns: IntArray
+    value: Array  # position, pressure, temperature or torque.z in SI units; NaN where the message gives none
+    rate: Array  # velocity of that joint; NaN where there is none
+    messages: Messages  # the serialised messages of this block: the wanted ones, or all
+
+
+class Bag:
+    """A rosbag2 folder (with or without metadata.yaml) or a single .mcap or .db3 file, compressed or not.
+
+    Damage is no error: what is readable is read, and ``findings`` says what was lost. Findings about the inside of a
+    file come while it is read. Use as a context manager.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.name = self.path.name if self.path.is_dir() else self.path.name.split(".")[0]
+        self.findings: list[Finding] = []
+        self.connections: list[Connection] = []
+        self.malformed: Counter[str] = Counter()  # messages per topic that do not decode as their type
+        self.message_count: int | None = None  # as the metadata say; None where there are none
+        self._files: list[mcap.McapFile | sqlite.SqliteFile] = []
+        self._stack = ExitStack()
+        try:
+            for file in self._locate():
+                self._open(file)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Bag:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all files and remove temporary ones."""
+        self._stack.close()
+
+    @property
+    def topics(self) -> Mapping[str, str]:
+        """Topic -> message type, as recorded."""
+        return {c.topic: c.msgtype for c in self.connections}
+
+    def _say(self, finding: str, statement: str, topic: str = "") -> None:
+        self.findings.append(Finding(finding, topic, statement))
+
+    # ---------------------------------------------------------------- files
+
+    def _locate(self) -> list[Path]:
+        """The storage files of the bag."""
+        if not self.path.exists():
+            raise BagError(f"{self.path}: no such file or folder")
+        if not self.path.is_dir():
+            return [self.path]
+        found = sorted(f for f in self.path.iterdir() if f.is_file() and f.name.endswith(_SUFFIXES))
+        listed: list[Path] = []
+        metadata = self.path / "metadata.yaml"
+        if metadata.is_file():
+            try:
+                content: Any = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+                listed = [self.path / Path(str(name)).name for name in content["relative_file_paths"]]
+                self.message_count = int(content["message_count"])
+            except (yaml.YAMLError, KeyError, TypeError, ValueError, OSError) as error:
+                summary = str(error).partition("\n")[0]
+                self._say(
+                    "damaged_metadata", f"metadata.yaml is not readable ({summary}); the files themselves were read"
+                )
+        else:
+            self._say("no_metadata", "the folder has no metadata.yaml (interrupted recording?); its files were read")
+        for missing in (f for f in listed if not f.exists()):
+            self._say("missing_file", f"{missing.name}, listed in metadata.yaml, is missing: its messages are lost")
+        files = [f for f in listed if f.exists()] or found
+        if not files:
+            raise BagError(f"{self.path}: holds no .mcap or .db3 file, so it is not a rosbag2 folder")
+        return files
+
+    def _open(self, path: Path) -> None:
+        """Open one file by its content, not by its name."""
+        try:
+            with path.open("rb") as file:
+                head = file.read(16)
+            if head.startswith(ZSTD_MAGIC):
+                folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="lugre_steering_")))
+                plain = folder / path.name.removesuffix(path.suffix)
+                if reason := expand_file(path, plain):
+                    self._say("truncated_bag", f"{path.name}: {reason}; what came before was read")
+                path = plain
+                with path.open("rb") as file:
+                    head = file.read(16)
+            if not head:
+                raise BagError(f"{path}: the file is empty")
+            if head.startswith(mcap.MAGIC):
+                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self.connections, self.findings)
+            elif head.startswith(sqlite.MAGIC):
+                opened = sqlite.SqliteFile(path, self.connections, self.findings)
+            else:
+                raise BagError(f"{path}: not a recording (neither MCAP nor sqlite3 by its first bytes)")
+            self._stack.callback(opened.close)
+            self._files.append(opened)
+        except OSError as error:
+            raise BagError(f"{path}: cannot be read ({error.strerror or error})") from error
+        except BagError as error:
+            if not self.path.is_dir():
+                raise
+            self._say("lost_file", f"{error}; its messages are lost")
+
+    # ------------------------------------------------------------- messages
+
+    def messages(self, wanted: set[int] | None = None, messages_per_block: int = 50_000) -> Iterator[Messages]:
+        """Serialised messages in log order; ``wanted`` limits them to some of ``connections``."""
+        count = 0
+        try:
+            runs = [run for file in self._files for run in file.runs(wanted)]
+            for block in merged(runs, messages_per_block):
+                messages, lost = inflated(block)
+                count += len(block)
+                if lost:
+                    self._say("damaged_bag", f"{lost} compressed messages are damaged and left out")
+                yield messages
+        except OSError as error:
+            raise BagError(f"{self.path}: reading stopped ({error.strerror or error})") from error
+        if wanted is None and self.message_count is not None and count != self.message_count:
+            self._say("message_count", f"metadata.yaml promises {self.message_count} messages, {count} could be read")
+
+    def blocks(
+        self, channels: Sequence[Channel], messages_per_block: int = 50_000, *, all_messages: bool = False
+    ) -> Iterator[Block]:
+        """Decode the wanted channels. With ``all_messages`` each block also holds every other message, to be copied."""
+        topics = self.match(channels)
+        readers: dict[int, list[int]] = {}  # connection -> the channels it carries
+        for i, channel in enumerate(channels):
+            for k, connection in enumerate(self.connections):
+                if connection.topic == topics.get(channel):
+                    readers.setdefault(k, []).append(i)
+        seen: Counter[int] = Counter()
+        for messages in self.messages(None if all_messages else set(readers), messages_per_block):
+            block = self._decode(messages, channels, readers)
+            seen.update(dict(enumerate(np.bincount(block.channel, minlength=len(channels)).tolist())))
+            yield block
+        for topic, count in self.malformed.items():
+            self._say("malformed_messages", f"{count} messages are not valid CDR of their type; left out", topic)
+        for i, channel in enumerate(channels):
+            if channel in topics and not seen[i] and channel.joint:
+                self._say("no_data", f"no message speaks of joint {channel.joint!r}", topics[channel])
+
+    def _decode(self, messages: Messages, channels: Sequence[Channel], readers: Mapping[int, Sequence[int]]) -> Block:
+        rows: list[tuple[IntArray, NDArray[np.int32], IntArray, Array, Array]] = []
+        for k, wanted in readers.items():
+            msgtype = MESSAGE_TYPE[channels[wanted[0]].kind]
+            joints = [channels[i].joint for i in wanted]
+            of_topic = np.flatnonzero(messages.connection == k)
+            length = messages.length[of_topic]
+            for size in np.unique(length):
+                alike = of_topic[length == size]
+                decoded = cdr.decode(windows(messages.data, messages.start[alike], int(size)), msgtype, joints)
+                if bad := int((~decoded.valid).sum()):
+                    self.malformed[self.connections[k].topic] += bad
+                for j, i in enumerate(wanted):
+                    use = decoded.valid & decoded.carried[j]
+                    rows.append(
+                        (
+                            alike[use],
+                            np.full(int(use.sum()), i, np.int32),
+                            decoded.stamp_ns[use],
+                            decoded.value[j, use],
+                            decoded.rate[j, use],
+                        )
+                    )
+        if not rows:
+            none = np.empty(0, np.int64)
+            return Block(none.astype(np.int32), none, none, none.astype(np.float64), none.astype(np.float64), messages)
+        message, channel, stamp, value, rate = (np.concatenate(column) for column in zip(*rows, strict=True))
+        order = np.lexsort((channel, message))
+        return Block(channel[order], stamp[order], messages.log_ns[message[order]], value[order], rate[order], messages)
+
+    # --------------------------------------------------------------- topics
+
+    def match(self, channels: Sequence[Channel]) -> dict[Channel, str]:
+        """The recorded topic of each wanted channel; channels that the bag lacks are left out.
+
+        A relative name also matches with one namespace before it. A joint whose own topic is missing is looked for in
+        the other JointState topics (a shared ``/joint_states``).
+        """
+        result: dict[Channel, str] = {}
+        for channel in channels:
+            topic = self._topic(channel.topic)
+            if topic is not None:
+                self._check_type(topic, MESSAGE_TYPE[channel.kind])
+                result[channel] = topic
+        missing = [c for c in channels if c.kind is Kind.ANGLE and c.joint and c not in result]
+        for channel, topic in self._shared_topics(missing).items():
+            statement = f"topic {channel.topic!r} is missing; joint {channel.joint!r} is read from {topic!r} instead"
+            if all(f.statement != statement for f in self.findings):
+                self._say("shared_topic", statement, topic)
+            result[channel] = topic
+        return result
+
+    def _topic(self, name: str) -> str | None:
+        relative = name.lstrip("/")
+        topics = list(self.topics)
+        candidates = [t for t in topics if t.lstrip("/") == relative] or [
+            t for t in topics if t.endswith("/" + relative)
+        ]
+        if len(candidates) > 1:
+            raise BagError(f"{self.path}: topic {name!r} fits {', '.join(candidates)}; expected exactly one of them")
+        return candidates[0] if candidates else None
+
+    def _check_type(self, topic: str, expected: str) -> None:
+        for connection in self.connections:
+            if connection.topic != topic:
+                continue
+            if _full_name(connection.msgtype) != expected:
+                raise BagError(f"{self.path}: topic {topic!r} has type {connection.msgtype!r}, expected {expected!r}")
+            if connection.encoding != "cdr":
+                raise BagError(f"{self.path}: topic {topic!r} is encoded as {connection.encoding!r}, expected 'cdr'")
+
+    def _shared_topics(self, missing: Sequence[Channel]) -> dict[Channel, str]:
+        """Topics that carry joints whose own topic is missing, found by looking into the messages."""
+        states = {
+            k: c.topic
+            for k, c in enumerate(self.connections)
+            if _full_name(c.msgtype) == cdr.JOINT_STATE and c.encoding == "cdr"
+        }
+        if not missing or not states:
+            return {}
+        carriers: dict[str, set[str]] = {}
+        looked = 0
+        for messages in self.messages(set(states)):
+            for k, topic in states.items():
+                # A few of each length: publishers that share a topic differ in their joint names, hence in length.
+                for size in np.unique(messages.length[messages.connection == k]):
+                    alike = np.flatnonzero((messages.connection == k) & (messages.length == size))
+                    for i in alike[:10]:
+                        for joint in cdr.joint_names(messages.bytes_of(int(i))):
+                            carriers.setdefault(joint, set()).add(topic)
+            looked += len(messages)
+            if looked > _PEEK:
+                break
+        result = {}
+        for channel in missing:
+            topics = sorted(carriers.get(channel.joint, ()))
+            if len(topics) > 1:
+                raise BagError(
+                    f"{self.path}: topic {channel.topic!r} is missing and joint {channel.joint!r} is in "
+                    f"{', '.join(topics)}; expected exactly one topic with it"
+                )
+            if topics:
+                result[channel] = topics[0]
+        return result
+
+
+def _full_name(msgtype: str) -> str:
+    """``pkg/Type`` and ``pkg/msg/Type`` name the same type."""
+    package, _, name = msgtype.partition("/")
+    return msgtype if name.startswith("msg/") else f"{package}/msg/{name}"
