@@ -1,14 +1,35 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Compiled arithmetic shared by the stages: an exponential that LLVM can inline and vectorise."""
+"""Compiled arithmetic shared by the stages, and where compiled code is kept between runs."""
 
 from __future__ import annotations
 
+import hashlib
+import os
+from pathlib import Path
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+
+
+
+def _keep_compiled_code() -> None:
+    """Give Numba a cache folder that changes with any source of the compiled chain.
+
+    Numba looks at the file of the cached function only and would run stale code after an edit of a stage it calls.
+    """
+    package = Path(__file__).resolve().parent.parent
+    sources = [*sorted((package / "chain").glob("*.py")), package / "estimator.py"]
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    numba.config.CACHE_DIR = str(base / "lugre_steering" / digest)
+
+
+if not os.environ.get("NUMBA_CACHE_DIR"):
+    _keep_compiled_code()
 
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01

@@ -155,7 +155,7 @@ def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):  # type: ignor
     out.z = z_next
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _run(p, s, rubber, time, theta, omega, alpha, out):  # type: ignore[no-untyped-def]
     previous = time[0]
     for i in range(time.size):
@@ -163,7 +163,7 @@ def _run(p, s, rubber, time, theta, omega, alpha, out):  # type: ignore[no-untyp
         previous = time[i]
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque):  # type: ignore[no-untyped-def]
     previous = time[0]
     for i in range(time.size):
