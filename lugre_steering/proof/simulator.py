@@ -1,0 +1,348 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The second simulator: recordings of a drawn vehicle with known hidden physics, made without the estimator's code.
+
+A case is two bags of one vehicle. It is a pure function of the sheet and of ``Case``; two cases that differ only in their
+effects share vehicle, manoeuvres and sensor noise. Nothing about the effects enters the bags; the truth is written apart.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from lugre_steering.proof import conceal, hydraulics, manoeuvres
+from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, Concealed, Hidden, Motion
+from lugre_steering.proof.contact import HiddenContact, Patches, Track, patches, run_track
+from lugre_steering.proof.rubber import rubber_table
+from lugre_steering.proof.sensors import PERIOD_S, Habits, NoiseKind, Samples, draw_habits, sense_angle, sense_pressures
+from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle, draw_vehicle, load_sheet
+
+__all__ = [
+    "EFFECT_IDS", "UNLISTED_IDS", "BagData", "Case", "CaseData", "Concealed", "load_sheet", "noise_variance",
+    "recalibrated_variance", "removable_variance", "simulate_case", "write_case",
+]
+
+Array = NDArray[np.float64]
+
+EPOCH_S = 1_790_000_000
+ACTIVE_SHARE = 0.05  # an effect acts where its torque exceeds this share of its largest
+_FINE = round(PERIOD_S / manoeuvres.STEP_S)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recipe: everything is drawn from ``seed``; ``parameter_spread`` is how far true values leave the sheet."""
+
+    seed: int
+    effects: tuple[Concealed, ...] = ()
+    noise: NoiseKind = "white"
+    manoeuvres: tuple[str, str] | None = None
+    parameter_spread: float = 0.15
+
+
+@dataclass(frozen=True)
+class BagData:
+    """One bag and its truth. ``angles`` left, right; ``pressures`` in the sheet's order of lines.
+
+    On the clean 100 Hz grid ``time`` (n,) [s]: the torque [N m] that noise-free sensors would show with every effect, with
+    none, and the part that each effect adds. ``intervals`` [s]: where each effect acts, holds included.
+    """
+
+    manoeuvre: str
+    angles: tuple[Samples, ...]
+    pressures: tuple[Samples, ...]
+    time: Array
+    clean_angles: Array
+    torque: Array
+    torque_without: Array
+    effect_torque: dict[str, Array]
+    intervals: dict[str, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class CaseData:
+    """Both bags of a case with the vehicle and the effects that made them."""
+
+    case: Case
+    sheet: Sheet
+    vehicle: TrueVehicle
+    hidden: tuple[Hidden, ...]
+    bags: tuple[BagData, ...]
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """What the runs of one bag have in common: clean measured angles (2, n) and the habits of its hydraulics."""
+
+    sheet: Sheet
+    patches: tuple[Patches, Patches]
+    time: Array
+    measured: Array
+    line_share: Array
+    return_flow_Pas: float
+    seed: tuple[int, int]
+
+
+def simulate_case(case: Case, sheet: Sheet) -> CaseData:
+    """Simulate both bags of a case, with, without, and (for pairs) with all but each of its effects."""
+    vehicle_rng, effect_rng, logger_rng = (np.random.default_rng((case.seed, k)) for k in range(3))
+    vehicle = draw_vehicle(sheet, vehicle_rng, case.parameter_spread)
+    both = (patches(sheet, vehicle_rng), patches(sheet, vehicle_rng))
+    share = np.where([line.startswith("aux") for line in sheet.lines], vehicle_rng.uniform(0.9, 1.0), 1.0)
+    flow = vehicle_rng.uniform(0.0, 8e5)
+    hidden = tuple(_place_patch(conceal.draw(wanted, effect_rng), effect_rng) for wanted in case.effects)
+    habits = draw_habits(logger_rng)
+    kinds = case.manoeuvres or tuple(str(kind) for kind in logger_rng.choice(list(manoeuvres.KINDS), 2, replace=False))
+    benches = []
+    for index, kind in enumerate(kinds):
+        mean = manoeuvres.mean_angle(kind, np.random.default_rng((case.seed, 10 + index)))
+        angles = manoeuvres.ackermann(mean, sheet.wheelbase_m, sheet.kingpin_distance_m)
+        time = np.arange(mean.size) * manoeuvres.STEP_S
+        benches.append(_Bench(sheet, both, time, angles, share, flow, (case.seed, 20 + index)))
+    hidden = tuple(_set_ceiling(effect, vehicle, benches) for effect in hidden)
+    bags = []
+    for index, (kind, bench) in enumerate(zip(kinds, benches, strict=True)):
+        rng = np.random.default_rng((case.seed, 30 + index))
+        bags.append(_bag(kind, bench, vehicle, [h for h in hidden if h.only_bag in (None, index)], case.noise, habits, rng))
+    return CaseData(case, sheet, vehicle, hidden, tuple(bags))
+
+
+def _place_patch(effect: Hidden, rng: np.random.Generator) -> Hidden:
+    """Give a surface patch its window: mostly an angle window, sometimes a stretch of time (rad or s, and its edge)."""
+    if effect.id != "surface_patch":
+        return effect
+    in_time = rng.random() < 0.4
+    low, high = (rng.uniform(25.0, 40.0), rng.uniform(55.0, 70.0)) if in_time else np.deg2rad(
+        rng.choice([[3.0, 14.0], [-15.0, -4.0], [-8.0, 5.0], [9.0, 22.0]]) + rng.uniform(-2.0, 2.0)
+    )
+    window = {"low": float(low), "high": float(high), "edge": 0.8 if in_time else 0.012, "in_time": float(in_time)}
+    return effect._replace(values={**effect.values, **window})
+
+
+def _set_ceiling(effect: Hidden, vehicle: TrueVehicle, benches: list[_Bench]) -> Hidden:
+    """Put a relief valve a little below the highest pressure of the case."""
+    if effect.id != "relief_saturation":
+        return effect
+    peak = max(float(_pressures(bench, vehicle, [], {}).max()) for bench in benches)
+    return effect._replace(values={**effect.values, "ceiling": peak * (1.0 - effect.values["margin"])})
+
+
+def _bag(
+    kind: str, bench: _Bench, vehicle: TrueVehicle, hidden: list[Hidden], noise: NoiseKind, habits: Habits,
+    rng: np.random.Generator,
+) -> BagData:
+    tracks: dict[tuple[str, ...], tuple[Track, ...]] = {}
+    gain = hydraulics.line_gain(bench.sheet, bench.measured)
+    pressures = _pressures(bench, vehicle, hidden, tracks)
+    torque = hydraulics.torque_of(pressures, gain)[::_FINE]
+    plain = hydraulics.torque_of(_pressures(bench, vehicle, [], tracks), gain)[::_FINE]
+    time = bench.time[::_FINE]
+    added = {}
+    for effect in hidden:
+        others = [h for h in hidden if h is not effect]
+        without = hydraulics.torque_of(_pressures(bench, vehicle, others, tracks), gain)[::_FINE] if others else plain
+        added[effect.id] = torque - without
+    return BagData(
+        manoeuvre=kind,
+        angles=tuple(sense_angle(bench.sheet, bench.time, angle, habits, rng) for angle in bench.measured),
+        pressures=tuple(sense_pressures(bench.sheet, bench.time, pressures, noise, habits, rng)),
+        time=time,
+        clean_angles=bench.measured[:, ::_FINE],
+        torque=torque,
+        torque_without=plain,
+        effect_torque=added,
+        intervals={name: active_intervals(time, part) for name, part in added.items()},
+    )
+
+
+def _pressures(
+    bench: _Bench, vehicle: TrueVehicle, hidden: list[Hidden], tracks: dict[tuple[str, ...], tuple[Track, ...]]
+) -> Array:
+    """Noise-free pressures (lines, n) [Pa] as the line sensors see them; ``tracks`` remembers contact runs by effects."""
+    time, step = bench.time, manoeuvres.STEP_S
+    angle, arm_factor = bench.measured, None
+    for effect in hidden:
+        on = conceal.gate(time, effect.start_s)
+        if effect.id == "angle_offset":
+            angle = angle - on * effect.values["offset"]
+        elif effect.id == "angle_scale":
+            angle = angle / (1.0 + on * effect.values["scale"])
+        elif effect.id == "moment_arm_error":
+            arm_factor = 1.0 + on * (effect.values["a"] * bench.measured + effect.values["b"] * bench.measured**2)
+    before = [h for h in hidden if h.id in conceal.ANGLE or h.id in conceal.CONTACT]
+    key = tuple(h.id for h in before)
+    if key not in tracks:
+        fields = {f"{h.id}_{name}": value for h in before if h.id in conceal.CONTACT for name, value in h.values.items()}
+        fields |= {f"{h.id}_from": h.start_s for h in before if h.id in conceal.CONTACT}
+        inside, rubber = HiddenContact(**fields), rubber_table(vehicle.reference_degC)
+        tracks[key] = tuple(
+            run_track(np.ascontiguousarray(side), step, vehicle, rubber, cells, inside)
+            for side, cells in zip(angle, bench.patches, strict=True)
+        )
+    rate = np.gradient(angle, step, axis=1)
+    motion = Motion(time, angle, rate, np.gradient(rate, step, axis=1))
+    sides = np.stack([track.friction + track.aligning for track in tracks[key]])
+    for effect in hidden:
+        if effect.id in conceal.PARALLEL_LAWS:
+            chance = np.random.default_rng(bench.seed)
+            law = conceal.PARALLEL_LAWS[effect.id]
+            sides = sides + conceal.gate(time, effect.start_s) * law(motion, effect.values, chance)
+    torque = sides.sum(axis=0)
+    for effect in hidden:
+        if effect.id in conceal.LOSS_LAWS:
+            torque = torque + conceal.gate(time, effect.start_s) * conceal.LOSS_LAWS[effect.id](torque, motion, effect.values)
+    gain = hydraulics.line_gain(bench.sheet, angle, arm_factor)
+    flow = bench.return_flow_Pas * np.abs(motion.rate.mean(axis=0))
+    pressures = hydraulics.line_pressures(torque, gain, bench.line_share, flow)
+    for effect in hidden:
+        if effect.id == "relief_saturation":  # opens softly: the valve needs some 0.1 MPa to pass its flow
+            over = np.logaddexp(0.0, (pressures - effect.values["ceiling"]) / 1e5) * 1e5
+            pressures = pressures - conceal.gate(time, effect.start_s) * over
+        elif effect.id in conceal.SENSING:
+            pressures = conceal.sensed(pressures, time, effect)
+    return pressures
+
+
+def active_intervals(time: Array, part: Array) -> list[tuple[float, float]]:
+    """Stretches [s] in which ``|part|`` exceeds ACTIVE_SHARE of its maximum; gaps below half a second are bridged."""
+    size = np.abs(part)
+    if not size.any():
+        return []
+    at = np.flatnonzero(size > ACTIVE_SHARE * size.max())
+    ends = np.flatnonzero(np.diff(at) > 0.5 / PERIOD_S)
+    starts, stops = at[np.concatenate([[0], ends + 1])], at[np.concatenate([ends, [at.size - 1]])]
+    return [(float(time[a]), float(time[b])) for a, b in zip(starts, stops, strict=True) if b - a > 0.1 / PERIOD_S]
+
+
+def removable_variance(bag: BagData) -> float:
+    """Variance [N2 m2] of what the effects add to the noise-free torque of a bag: all that a perfect diagnosis removes."""
+    return float(np.var(bag.torque - bag.torque_without))
+
+
+def noise_variance(data: CaseData, bag: BagData) -> float:
+    """Variance [N2 m2] of the measured cylinder torque about the noise-free one: the sensors' share, ripple included."""
+    gain = hydraulics.line_gain(data.sheet, bag.clean_angles)
+    seen = np.stack([np.interp(bag.time, samples.time, samples.value) for samples in bag.pressures])
+    return float(np.var(hydraulics.torque_of(seen, gain) - bag.torque))
+
+
+_CALIBRATED = (
+    "static_torque_Nm", "coulomb_torque_Nm", "stiffness_Nm_rad", "stribeck_speed_rad_s", "heat_capacity_J_K",
+    "heat_loss_W_K", "aligning_torque_Nm",
+)
+
+
+def recalibrated_variance(data: CaseData) -> float:
+    """``removable_variance`` of both bags together, less what moving the baseline's parameters can imitate [N2 m2].
+
+    Linear: the added torque is projected off the tangents of this simulator's own baseline (finite differences of 1 %).
+    """
+    case, sheet = data.case, data.sheet
+    rng = np.random.default_rng((case.seed, 0))
+    draw_vehicle(sheet, rng, case.parameter_spread)
+    both = (patches(sheet, rng), patches(sheet, rng))
+    added = np.concatenate([bag.torque - bag.torque_without for bag in data.bags])
+    columns = []
+    for name in _CALIBRATED:
+        moved = data.vehicle._replace(**{name: 1.01 * getattr(data.vehicle, name)})
+        columns.append(np.concatenate([_baseline(bag, moved, both) - _baseline(bag, data.vehicle, both) for bag in data.bags]))
+    tangents = np.stack(columns, axis=1)
+    tangents /= np.linalg.norm(tangents, axis=0)
+    left = added - tangents @ np.linalg.lstsq(tangents, added, rcond=1e-9)[0]
+    return float(np.mean(left**2))
+
+
+def _baseline(bag: BagData, vehicle: TrueVehicle, both: tuple[Patches, Patches]) -> Array:
+    rubber = rubber_table(vehicle.reference_degC)
+    tracks = [
+        run_track(np.ascontiguousarray(angle), PERIOD_S, vehicle, rubber, cells, HiddenContact())
+        for angle, cells in zip(bag.clean_angles, both, strict=True)
+    ]
+    return np.asarray(sum(track.friction + track.aligning for track in tracks))
+
+
+def write_case(data: CaseData, folder: Path, truth_folder: Path, name: str = "run") -> list[Path]:
+    """Write ``folder/bags/<name>_a``, ``_b`` and ``folder/vehicle.yaml`` with its table; the truth goes to ``truth_folder``.
+
+    Storage is mcap or sqlite3 by the seed. ``truth.json`` holds values and intervals, ``truth.npz`` the clean torques.
+    """
+    bags, truth = folder / "bags", {}
+    bags.mkdir(parents=True, exist_ok=True)
+    truth_folder.mkdir(parents=True, exist_ok=True)
+    sheet_file, table = data.sheet.files
+    shutil.copyfile(sheet_file, folder / "vehicle.yaml")
+    shutil.copyfile(table, folder / table.name)
+    plugin = StoragePlugin.SQLITE3 if data.case.seed % 3 == 0 else StoragePlugin.MCAP
+    paths = []
+    for letter, bag in zip("ab", data.bags, strict=True):
+        path = bags / f"{name}_{letter}"
+        _write_bag(path, data.sheet, bag, EPOCH_S + 1000 * (data.case.seed % 1000) + (500 if letter == "b" else 0), plugin)
+        paths.append(path)
+        truth |= {f"{letter}_time": bag.time, f"{letter}_torque": bag.torque, f"{letter}_torque_without": bag.torque_without}
+        truth |= {f"{letter}_{effect}": part for effect, part in bag.effect_torque.items()}
+    np.savez_compressed(truth_folder / "truth.npz", **truth)
+    (truth_folder / "truth.json").write_text(json.dumps(_truth(data, name), indent=1), encoding="utf-8")
+    return paths
+
+
+def _truth(data: CaseData, name: str) -> dict[str, object]:
+    return {
+        "synthetic": True,
+        "case": asdict(data.case),
+        "vehicle": data.vehicle._asdict(),
+        "effects": [
+            {
+                "id": effect.id,
+                "parameters": {
+                    key: {"value": value, "unit": conceal.CATALOGUE[effect.id][key].unit if key != "ceiling" else "Pa"}
+                    for key, value in effect.values.items()
+                },
+                "only_bag": effect.only_bag,
+                "start_s": max(effect.start_s, 0.0),
+            }
+            for effect in data.hidden
+        ],
+        "bags": {
+            f"{name}_{letter}": {
+                "manoeuvre": bag.manoeuvre,
+                "duration_s": float(bag.time[-1]),
+                "intervals_s": bag.intervals,
+                "removable_variance": removable_variance(bag),
+                "noise_variance": noise_variance(data, bag),
+            }
+            for letter, bag in zip("ab", data.bags, strict=True)
+        },
+    }
+
+
+def _write_bag(path: Path, sheet: Sheet, bag: BagData, epoch_s: int, plugin: StoragePlugin) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kinds = {name: store.types[name] for name in ("sensor_msgs/msg/JointState", "sensor_msgs/msg/FluidPressure")}
+    stamp, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
+    joint, fluid = kinds["sensor_msgs/msg/JointState"], kinds["sensor_msgs/msg/FluidPressure"]
+    none = np.zeros(0)
+    with Writer(path, version=9, storage_plugin=plugin) as writer:
+        queue = []
+        for side, samples in zip(("left", "right"), bag.angles, strict=True):
+            topic = writer.add_connection(f"/steering/{side}/joint_state", joint.__msgtype__, typestore=store)
+            queue.append((topic, f"{side}_track_steer_joint", samples))
+        for line, samples in zip(sheet.lines, bag.pressures, strict=True):
+            queue.append((writer.add_connection(f"/steering/pressure/{line}", fluid.__msgtype__, typestore=store), "", samples))
+        nanoseconds = [epoch_s * 10**9 + np.round(samples.time * 1e9).astype(np.int64) for _, _, samples in queue]
+        which = np.repeat(np.arange(len(queue)), [ns.size for ns in nanoseconds])
+        within = np.concatenate([np.arange(ns.size) for ns in nanoseconds])
+        for k in np.argsort(np.concatenate(nanoseconds), kind="stable"):
+            source, i = which[k], within[k]
+            topic, name, samples = queue[source]
+            ns, value = int(nanoseconds[source][i]), float(samples.value[i])
+            head = header(stamp(ns // 10**9, ns % 10**9), "steering_axle")
+            message = joint(head, [name], np.array([value]), none, none) if name else fluid(head, value, 0.0)
+            writer.write(topic, ns + 600_000, store.serialize_cdr(message, topic.msgtype))
