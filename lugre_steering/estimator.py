@@ -1,16 +1,18 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator: timestamped samples in, torque, temperature and residual out. Live node and replay push the same messages
-through the same compiled loop, so equal inputs give equal numbers.
+"""The estimator: timestamped samples in, torque, temperature and residual out.
+
+Live node and replay push the same messages through the same compiled loop, so equal inputs give equal numbers.
 
 Rules of time (header stamps only, never arrival times):
 
-* Each angle sample advances its own side exactly once. A torque is published when both sides have a sample of (nearly) the
-  same stamp; a sample without a partner is counted as unpaired and advances its side all the same.
-* The residual of a torque follows when every line has a pressure at or after its stamp; pressures are interpolated linearly,
-  never held or extrapolated, and not across a gap.
-* Duplicate, backward, zero, not finite, absurd and jumping samples are rejected and counted by reason. A jump is believed
-  when the next sample of the same channel confirms it; a confirmed jump back in time starts the estimator anew.
+* Each angle sample advances its own side exactly once. A torque is published when both sides have a sample of (nearly)
+  the same stamp; a sample without a partner is counted as unpaired and advances its side all the same.
+* The residual of a torque follows when every line has a pressure at or after its stamp; pressures are interpolated
+  linearly, never held or extrapolated, and not across a gap.
+* Duplicate, backward, zero, not finite, absurd and jumping samples are rejected and counted by reason. A jump is
+  believed when the next sample of the same channel confirms it; a confirmed jump back in time starts the estimator
+  anew.
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
 
-REASONS = ("duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun")
+REASONS = (
+    "duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun",
+)  # fmt: skip
 _DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _GAP, _OVERRUN = range(len(REASONS))
 
 LINE_RING = 8192
@@ -144,7 +148,7 @@ class Core(NamedTuple):
 
 
 @njit
-def _reset(core, keep):  # type: ignore[no-untyped-def]
+def _reset(core, keep):
     """Forget the past after a jump back in time, except the counters and channel ``keep``'s confirmation."""
     core.state[:] = np.zeros_like(core.state)
     core.motion[:] = np.zeros_like(core.motion)
@@ -163,7 +167,7 @@ def _reset(core, keep):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _admit(core, k, stamp_ns, value):  # type: ignore[no-untyped-def]
+def _admit(core, k, stamp_ns, value):
     """Whether channel ``k`` accepts the sample; counts the reason if not."""
     c, ch = core.config[0], core.channels[k]
     if stamp_ns <= 0:
@@ -205,7 +209,10 @@ def _admit(core, k, stamp_ns, value):  # type: ignore[no-untyped-def]
     if ch.kind == 0:
         reach = c.max_rate * ahead * 1e-9 + 10.0 * c.angle_noise
         if abs(value - ch.last_value) > reach:
-            near = follows_suspect and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
+            near = (
+                follows_suspect
+                and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
+            )
             if not near:
                 ch.reasons[_SPIKE] += 1
                 ch.suspect_ns = stamp_ns
@@ -218,8 +225,8 @@ def _admit(core, k, stamp_ns, value):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _planned(core, side, stamp_ns):  # type: ignore[no-untyped-def]
-    """Planned angle of a side at a time, linear between points, held at the last; NaN before the plan or without one."""
+def _planned(core, side, stamp_ns):
+    """Planned angle of a side at a time, linear between points, held at the last; NaN before or without a plan."""
     n = core.config[0].plan_size
     if n == 0 or stamp_ns < core.plan_ns[0]:
         return math.nan
@@ -233,7 +240,7 @@ def _planned(core, side, stamp_ns):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _preview(core, side, stamp_ns):  # type: ignore[no-untyped-def]
+def _preview(core, side, stamp_ns):
     """Torque [N m] that this side will need one horizon ahead: along the plan, or at the present rate without one."""
     c, motion = core.config[0], core.motion[side]
     if c.horizon <= 0.0:
@@ -245,13 +252,15 @@ def _preview(core, side, stamp_ns):  # type: ignore[no-untyped-def]
         planned = _planned(core, side, stamp_ns + np.int64(i * dt * 1e9))
         target = theta + motion.omega * dt if math.isnan(planned) else planned
         omega = (target - theta) / dt
-        advance(core.parameters[side], core.scratch_state[0], core.rubber, core.scratch_output[0], dt, target, omega, 0.0)
+        advance(
+            core.parameters[side], core.scratch_state[0], core.rubber, core.scratch_output[0], dt, target, omega, 0.0
+        )
         theta = target
     return core.scratch_output[0].torque
 
 
 @njit
-def _angle(core, k, stamp_ns, value, rate, estimates, count):  # type: ignore[no-untyped-def]
+def _angle(core, k, stamp_ns, value, rate, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
     c, ch = core.config[0], core.channels[k]
     side = ch.index
@@ -264,7 +273,14 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):  # type: ignore[no
     motion = core.motion[side]
     follow(motion, dt, value, rate, c.angle_noise)
     advance(
-        core.parameters[side], core.state[side], core.rubber, core.output[side], dt, motion.theta, motion.omega, motion.alpha
+        core.parameters[side],
+        core.state[side],
+        core.rubber,
+        core.output[side],
+        dt,
+        motion.theta,
+        motion.omega,
+        motion.alpha,
     )
     waiting = core.waiting[side]
     if waiting.ready:
@@ -315,8 +331,8 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):  # type: ignore[no
 
 
 @njit
-def _measured_torque(core, e, value):  # type: ignore[no-untyped-def]
-    """Torque [N m] on the steering axis from the interpolated line values (cylinders, or the torque sensor as it is)."""
+def _measured_torque(core, e, value):
+    """Torque [N m] on the steering axis from the interpolated line values (or the torque sensor as it is)."""
     c = core.config[0]
     if core.lines.shape[0] == 0:
         return value[0]
@@ -335,7 +351,7 @@ def _measured_torque(core, e, value):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _residuals(core, first_line, residuals, count):  # type: ignore[no-untyped-def]
+def _residuals(core, first_line, residuals, count):
     """Form every residual whose pressures have all come, in stamp order."""
     c = core.config[0]
     lines = core.line_ns.shape[0]
@@ -380,7 +396,7 @@ def _residuals(core, first_line, residuals, count):  # type: ignore[no-untyped-d
 
 
 @njit(nogil=True, cache=True)
-def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residuals):  # type: ignore[no-untyped-def]
+def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residuals):
     """Push messages in the order given; returns how many estimates and residuals were written."""
     n_estimates, n_residuals = 0, 0
     for i in range(channel.size):
@@ -454,7 +470,9 @@ class Estimator:
     @property
     def latest_ns(self) -> Mapping[str, int]:
         """Stamp of the latest accepted sample per channel name; 0 before the first."""
-        return {_label(c.kind, c.name): int(r["last_ns"]) for c, r in zip(self.channels, self._core.channels, strict=True)}
+        return {
+            _label(c.kind, c.name): int(r["last_ns"]) for c, r in zip(self.channels, self._core.channels, strict=True)
+        }
 
     @property
     def saturated_steps(self) -> int:

@@ -20,7 +20,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 import yaml
 
 from lugre_steering.errors import VehicleFileError
@@ -42,7 +41,9 @@ _Loader.add_implicit_resolver(
 )
 
 
-def quantity(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False, default: Any = dataclasses.MISSING) -> Any:
+def quantity(
+    low: float = -math.inf, high: float = math.inf, *, open_low: bool = False, default: Any = dataclasses.MISSING
+) -> Any:
     """A dataclass field whose numbers must lie in [low, high] (``open_low``: low itself excluded)."""
     metadata = {"low": low, "high": high, "open_low": open_low}
     if default is dataclasses.MISSING:
@@ -92,10 +93,10 @@ class Rollers:
 class Track:
     """One track assembly; left and right are mirror images."""
 
+    rollers: Rollers
     weight_N: float = quantity(0.0, 1e6)
     width_m: float = positive(5.0)
     hinge_offset_m: float = quantity(-5.0, 5.0)
-    rollers: Rollers = field()
     yaw_inertia_kgm2: float = positive(1e5)
     ground_pressure_exponent: float = quantity(2.0, 4.0, default=3.0)
     damping_ratio: float = quantity(0.0, 10.0, default=0.5)
@@ -181,15 +182,15 @@ class Initial:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Pivots [x, y] in m from that side's hinge (x forward, y left), knuckle pivot at zero angle; lines of its chambers."""
+    """Pivots [x, y] [m] from that side's hinge, knuckle pivot at zero angle; lines of its chambers."""
 
     side: str
+    cap: str
+    rod: str
     chassis_m: tuple[float, ...] = quantity(-10.0, 10.0)
     knuckle_m: tuple[float, ...] = quantity(-10.0, 10.0)
     bore_m: float = positive(2.0)
     rod_m: float = quantity(0.0, 2.0)
-    cap: str = field()
-    rod: str = field()
 
 
 @dataclass(frozen=True)
@@ -279,10 +280,13 @@ class Vehicle:
     def channels(self) -> tuple[Channel, ...]:
         """Every input this vehicle listens to, in the order the compiled loop numbers them."""
         found = [
-            Channel(Kind.ANGLE, side, getattr(self.topics, side), getattr(self.topics, f"{side}_joint")) for side in self.sides
+            Channel(Kind.ANGLE, side, getattr(self.topics, side), getattr(self.topics, f"{side}_joint"))
+            for side in self.sides
         ]
         if self.hydraulics is not None:
-            found += [Channel(Kind.PRESSURE, line, self.topics.pressure_prefix + line) for line in self.hydraulics.lines]
+            found += [
+                Channel(Kind.PRESSURE, line, self.topics.pressure_prefix + line) for line in self.hydraulics.lines
+            ]
         if self.torque_sensor is not None:
             found.append(Channel(Kind.TORQUE, "torque", self.torque_sensor.topic))
         found.append(Channel(Kind.AIR_TEMPERATURE, "air", self.topics.ambient_temperature))
@@ -394,7 +398,9 @@ def from_mapping(data: object, file: Path) -> Vehicle:
 
 def save(vehicle: Vehicle, path: str | Path) -> None:
     """Write a vehicle file that stands alone; keys left at None and empty defaults are not written."""
-    Path(path).write_text(yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120), encoding="utf-8")
+    Path(path).write_text(
+        yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120), encoding="utf-8"
+    )
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:
@@ -452,17 +458,25 @@ def _read_table(reader: _Reader, key: str, name: object, columns: tuple[str, ...
     for number, line in rows[1:]:
         cells = line.split(",")
         for column in columns:
-            try:
-                table[column].append(float(cells[header.index(column)]))
-            except (ValueError, IndexError) as error:
-                raise reader.fail(key, line, f"a number in column {column} of {path}, line {number}") from error
+            table[column].append(_cell(reader, key, cells, header.index(column), f"{path}, line {number}"))
     return table
+
+
+def _cell(reader: _Reader, key: str, cells: list[str], index: int, place: str) -> float:
+    try:
+        return float(cells[index])
+    except (ValueError, IndexError) as error:
+        raise reader.fail(key, ",".join(cells), f"a number in column {index + 1} of {place}") from error
 
 
 def _check(vehicle: Vehicle, reader: _Reader) -> None:
     """What single fields cannot say: sections that belong together, sums, orders, names that must exist."""
     fail = reader.fail
-    if not vehicle.sides or any(side not in SIDES for side in vehicle.sides) or len(set(vehicle.sides)) != len(vehicle.sides):
+    if (
+        not vehicle.sides
+        or any(side not in SIDES for side in vehicle.sides)
+        or len(set(vehicle.sides)) != len(vehicle.sides)
+    ):
         raise fail("sides", list(vehicle.sides), "a list out of left, right")
     if vehicle.contact is not None:
         for section in ("axle", "track", "friction"):
@@ -479,7 +493,7 @@ def _check(vehicle: Vehicle, reader: _Reader) -> None:
         raise fail("hydraulics", None, "exactly one of 'hydraulics' and 'torque_sensor'")
     if vehicle.rubber is not None:
         _check_rubber(vehicle, vehicle.rubber, reader)
-    law = (vehicle.friction or vehicle.contact)
+    law = vehicle.friction or vehicle.contact
     if law is not None and law.temperature_law not in ("loss_over_modulus", "loss_tangent", "loss_modulus"):
         key = "friction" if vehicle.friction else "contact"
         raise fail(f"{key}.temperature_law", law.temperature_law, "loss_over_modulus, loss_tangent or loss_modulus")
@@ -499,7 +513,9 @@ def _check_track(vehicle: Vehicle, reader: _Reader) -> None:
         raise fail("track.rollers", list(rollers.x_m), "exactly one of load_share and levers")
     if rollers.load_share is not None:
         if len(rollers.load_share) != len(rollers.x_m):
-            raise fail("track.rollers.load_share", list(rollers.load_share), f"{len(rollers.x_m)} shares, one per roller")
+            raise fail(
+                "track.rollers.load_share", list(rollers.load_share), f"{len(rollers.x_m)} shares, one per roller"
+            )
         if abs(sum(rollers.load_share) - 1.0) > 1e-6:
             raise fail("track.rollers.load_share", sum(rollers.load_share), "shares that sum to 1")
     if rollers.levers is not None:
@@ -536,7 +552,9 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: _Reader) -> None:
         ("friction.reference_temperature_degC", law.reference_temperature_degC if law else math.nan),
     ):
         if rubber.dma is not None and not columns[0][0] <= value <= columns[0][-1]:
-            raise fail(key, value, f"a temperature inside the rubber table ({columns[0][0]:g} to {columns[0][-1]:g} degC)")
+            raise fail(
+                key, value, f"a temperature inside the rubber table ({columns[0][0]:g} to {columns[0][-1]:g} degC)"
+            )
 
 
 def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: _Reader) -> None:
@@ -558,8 +576,7 @@ def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: _Reader)
         for pivot in ("chassis_m", "knuckle_m"):
             if len(getattr(cylinder, pivot)) != 2:
                 raise fail(f"{key}.{pivot}", list(getattr(cylinder, pivot)), "two coordinates [x, y]")
-        gap = np.subtract(cylinder.chassis_m, cylinder.knuckle_m)
-        if float(np.hypot(*cylinder.knuckle_m)) == 0.0 or float(np.hypot(*gap)) == 0.0:
+        if math.hypot(*cylinder.knuckle_m) == 0.0 or cylinder.knuckle_m == cylinder.chassis_m:
             raise fail(f"{key}.knuckle_m", list(cylinder.knuckle_m), "a pivot away from the hinge and from chassis_m")
 
 
@@ -578,7 +595,11 @@ def _with_pavement(vehicle: Vehicle, reader: _Reader) -> Vehicle:
         return vehicle
     table = pavements()
     if friction.pavement not in table:
-        raise reader.fail("friction.pavement", friction.pavement, f"friction.static and friction.coulomb, or one of {', '.join(table)}")
+        raise reader.fail(
+            "friction.pavement",
+            friction.pavement,
+            f"friction.static and friction.coulomb, or one of {', '.join(table)}",
+        )
     row = table[friction.pavement]
     static = row["static"] if friction.static is None else friction.static
     coulomb = row["coulomb"] if friction.coulomb is None else friction.coulomb

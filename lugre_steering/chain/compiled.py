@@ -15,7 +15,6 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 
-
 def _keep_compiled_code() -> None:
     """Give Numba a cache folder that changes with any source of the compiled chain.
 
@@ -25,7 +24,7 @@ def _keep_compiled_code() -> None:
     sources = [*sorted((package / "chain").glob("*.py")), package / "estimator.py"]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    numba.config.CACHE_DIR = str(base / "lugre_steering" / digest)
+    numba.config.CACHE_DIR = str(base / "lugre_steering" / digest)  # type: ignore[attr-defined]
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
@@ -37,7 +36,7 @@ _LN2_LOW = 1.90821492927058770002e-10
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves round(x) in the low mantissa bits
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (signature fixed by Numba)
     """2**n for the integer n that ``x + 1.5 * 2**52`` carries in its low bits."""
 
@@ -53,8 +52,8 @@ def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (si
 def exp(x: float) -> float:
     """e**x within 2 ulp for -708 < x < 708, clamped outside (0 is never returned; inf never either).
 
-    Cody-Waite reduction and the Taylor polynomial of degree 12 in Estrin's order. The library call costs about four times
-    as much here because it can be neither inlined nor vectorised over parameter sets.
+    Cody-Waite reduction and the Taylor polynomial of degree 12 in Estrin's order. The library call costs about four
+    times as much here because it can be neither inlined nor vectorised over parameter sets.
     """
     x = -708.0 if x < -708.0 else (708.0 if x > 708.0 else x)
     shifted = x * _LOG2_E + _ROUND
@@ -64,5 +63,9 @@ def exp(x: float) -> float:
     r4 = r2 * r2
     low = (1.0 + r) + r2 * (0.5 + r * (1.0 / 6.0))
     mid = (1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0 + r * (1.0 / 5040.0))
-    high = (1.0 / 40320.0 + r * (1.0 / 362880.0)) + r2 * (1.0 / 3628800.0 + r * (1.0 / 39916800.0)) + r4 * (1.0 / 479001600.0)
-    return (low + r4 * (mid + r4 * high)) * _power_of_two(shifted)
+    high = (
+        (1.0 / 40320.0 + r * (1.0 / 362880.0))
+        + r2 * (1.0 / 3628800.0 + r * (1.0 / 39916800.0))
+        + r4 * (1.0 / 479001600.0)
+    )
+    return (low + r4 * (mid + r4 * high)) * _power_of_two(shifted)  # type: ignore[call-arg]

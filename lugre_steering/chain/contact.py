@@ -3,7 +3,8 @@
 """Contact stage: LuGre friction of rubber on the ground, and the friction physics the baseline leaves out.
 
 Sources: C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, "A new model for control of systems with friction",
-IEEE TAC 40 (1995) 419; K. J. Astrom, C. Canudas de Wit, "Revisiting the LuGre friction model", IEEE CSM 28(6) (2008) 101.
+IEEE TAC 40 (1995) 419; K. J. Astrom, C. Canudas de Wit, "Revisiting the LuGre friction model", IEEE CSM
+28(6) (2008) 101.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PATCH_EDGE_S = 0.2
 
 @njit(fastmath=_FAST)
 def stribeck(omega: float, static: float, coulomb: float, speed: float, exponent: float) -> float:
-    """Steady sliding torque g = Mc + (Ms - Mc) exp(-|omega / omega_St|**delta) [N m] (Canudas de Wit et al. 1995, eq. 3)."""
+    """Steady sliding torque g = Mc + (Ms - Mc) exp(-|omega / omega_St|**delta) [N m] (op. cit. 1995)."""
     ratio = abs(omega) / speed
     power = ratio * ratio if exponent == 2.0 else ratio**exponent
     return coulomb + (static - coulomb) * exp(-power)
@@ -31,14 +32,15 @@ def stribeck(omega: float, static: float, coulomb: float, speed: float, exponent
 def bristle(z: float, d_theta: float, stiffness: float, g: float) -> float:
     """Bristle deflection [rad] after the contact turned by ``d_theta`` [rad] at constant rate: exact for any step.
 
-    dz/dt = omega - sigma_0 |omega| z / g  =>  z+ = z_ss + (z - z_ss) exp(-sigma_0 |d_theta| / g), z_ss = sgn(omega) g / sigma_0.
+    dz/dt = omega - sigma_0 |omega| z / g  =>  z+ = z_ss + (z - z_ss) exp(-sigma_0 |d_theta| / g),
+    z_ss = sgn(omega) g / sigma_0.
     """
     z_ss = math.copysign(g / stiffness, d_theta)
     return z_ss + (z - z_ss) * exp(-stiffness * abs(d_theta) / g)
 
 
 @njit(fastmath=_FAST)
-def bristle_work(z: float, z_next: float, d_theta: float, stiffness: float, g: float) -> float:
+def bristle_work(z: float, z_next: float, d_theta: float, g: float) -> float:
     """Work of the elastic torque [J] over the exact step from ``z`` to ``z_next``: integral of sigma_0 z dtheta.
 
     g (|d_theta| + sgn(d_theta) (z - z_next)), the closed-form integral of the exponential step.
@@ -53,7 +55,7 @@ def window(x: float, low: float, high: float, edge: float) -> float:
 
 
 @njit
-def level_factor(p, s, sign):  # type: ignore[no-untyped-def]
+def level_factor(p, s, sign):
     """Friction level relative to the baseline: direction_asymmetry, surface_patch, wear_polishing (1 when neutral).
 
     1 + a sgn(omega); 1 + change inside the angle and time window; 1 - amount (1 - exp(-slip / slip_scale)).
@@ -72,8 +74,8 @@ def level_factor(p, s, sign):  # type: ignore[no-untyped-def]
 
 
 @njit
-def aged_level(p, s, d_theta, dt):  # type: ignore[no-untyped-def]
-    """static_ageing: extra friction level as a share of the Coulomb level, rate * ln(1 + dwell / t_c), lost over a slip scale.
+def aged_level(p, s, d_theta, dt):
+    """static_ageing: extra level as a share of Coulomb friction, rate * ln(1 + dwell / t_c), lost over a slip scale.
 
     Log-time strengthening of resting contacts (Dieterich 1972; Rice and Ruina 1983).
     """
@@ -87,26 +89,29 @@ def aged_level(p, s, d_theta, dt):  # type: ignore[no-untyped-def]
 
 
 @njit
-def relaxed_share(p, s, d_theta, dt, length):  # type: ignore[no-untyped-def]
-    """stress_relaxation: share of the elastic torque lost, R log10(1 + hold / t_0); recovered over the presliding length.
+def relaxed_share(p, s, d_theta, dt, length):
+    """stress_relaxation: share of the elastic torque lost, R log10(1 + hold / t_0), recovered over ``length``.
 
     Log-time relaxation of filled rubber (Gent 1962).
     """
     if p.stress_relaxation_per_decade == 0.0:
         return 0.0
     if d_theta == 0.0:
-        s.relaxed = max(s.relaxed, p.stress_relaxation_per_decade * math.log10(1.0 + (s.dwell + dt) / p.stress_relaxation_onset))
+        s.relaxed = max(
+            s.relaxed, p.stress_relaxation_per_decade * math.log10(1.0 + (s.dwell + dt) / p.stress_relaxation_onset)
+        )
     else:
         s.relaxed *= exp(-abs(d_theta) / length)
     return min(s.relaxed, 0.9)
 
 
 @njit
-def stiffness_factor(p, s, sign, length):  # type: ignore[no-untyped-def]
+def stiffness_factor(p, s, sign, length):
     """Presliding stiffness relative to the baseline: payne_softening and mullins_softening (1 when neutral).
 
-    Payne: 1 + a / (1 + ((z - z_reversal) / angle)**2), stiffer for small amplitudes since the last reversal (Payne 1962, Kraus 1984);
-    Mullins: 1 + a (1 - z_max / length), virgin rubber is stiffer until it was once fully sheared (Mullins 1948).
+    Payne: 1 + a / (1 + ((z - z_reversal) / angle)**2), stiffer for small amplitudes since the last reversal (Payne
+    1962, Kraus 1984); Mullins: 1 + a (1 - z_max / length), virgin rubber is stiffer until it was once fully sheared
+    (Mullins 1948).
     """
     factor = 1.0
     if p.payne_softening_amplitude != 0.0:

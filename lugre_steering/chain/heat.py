@@ -20,12 +20,12 @@ def heat(temperature: float, energy: float, dt: float, capacity: float, cooling:
 
 
 @njit
-def advance_heat(p, s, energy, dt):  # type: ignore[no-untyped-def]
-    """Tread (and, as effects, carcass, ground share and flash power) after friction released ``energy`` [J] in ``dt`` [s].
+def advance_heat(p, s, energy, dt):
+    """Temperatures after friction released ``energy`` [J] in ``dt`` [s]: tread and, as effects, carcass and flash.
 
-    heat_partition: (1 - ground_share) of it enters the rubber. carcass_heat_sink: a second node of its own capacity behind
-    the tread, coupled by a conductance. flash_temperature: low-passed power times a resistance is added where friction
-    reads the temperature. ambient_drift: the air warms linearly.
+    heat_partition: (1 - ground_share) of it enters the rubber. carcass_heat_sink: a second node of its own capacity
+    behind the tread, coupled by a conductance. flash_temperature: low-passed power times a resistance is added where
+    friction reads the temperature. ambient_drift: the air warms linearly.
     """
     energy *= 1.0 - p.heat_partition_ground_share
     air = s.air_temperature + p.ambient_drift_rate * s.time

@@ -14,15 +14,15 @@ ATMOSPHERE_PA = 101_325.0
 
 
 def cylinder_length(theta: Array, chassis_m: tuple[float, ...], knuckle_m: tuple[float, ...]) -> Array:
-    """Pin-to-pin length [m] (n,) of a cylinder whose knuckle pivot turns by ``theta`` [rad] about the hinge at the origin."""
+    """Pin-to-pin length [m] (n,) of a cylinder whose knuckle pivot turned by ``theta`` [rad] about the hinge."""
     x = knuckle_m[0] * np.cos(theta) - knuckle_m[1] * np.sin(theta)
     y = knuckle_m[0] * np.sin(theta) + knuckle_m[1] * np.cos(theta)
     return np.hypot(x - chassis_m[0], y - chassis_m[1])
 
 
 @njit(fastmath={"contract"})
-def moment_arm(theta, chassis_x, chassis_y, knuckle_x, knuckle_y):  # type: ignore[no-untyped-def]
-    """dL/dtheta [m] (exact, not a constant arm): (chassis x knuckle(theta)) / L, from L**2 = |knuckle(theta) - chassis|**2."""
+def moment_arm(theta, chassis_x, chassis_y, knuckle_x, knuckle_y):
+    """dL/dtheta [m], exact: (chassis x knuckle(theta)) / L, from L**2 = |knuckle(theta) - chassis|**2."""
     c, s = np.cos(theta), np.sin(theta)
     x = knuckle_x * c - knuckle_y * s
     y = knuckle_x * s + knuckle_y * c
@@ -47,9 +47,10 @@ class CylinderTable:
 
 
 def line_gains(vehicle: Vehicle, theta: Array) -> Array:
-    """Torque per pressure of each line [N m/Pa]: (sides, lines, n), theta (sides, n). Cylinder torque = sum gain * pressure.
+    """Torque per pressure of each line [N m/Pa]: (sides, lines, n) at ``theta`` [rad] (sides, n).
 
-    Force of a cylinder = p_cap A_cap - p_rod A_rod, torque = force * dL/dtheta (virtual work).
+    Cylinder torque = sum of gain x gauge pressure. Force of a cylinder = p_cap A_cap - p_rod A_rod, torque = force *
+    dL/dtheta (virtual work).
     """
     assert vehicle.hydraulics is not None
     table = CylinderTable(vehicle.hydraulics, vehicle.sides)

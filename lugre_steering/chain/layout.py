@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flat records of the compiled chain: parameters, state and outputs of ONE track (or joint).
 
-Every field is a float64, so a record can be saved with ``numpy.save``, restored and compared. An effect's parameters are
-the fields ``<effect id>_<parameter>``; they are zero (neutral) unless a catalogue entry is applied.
+Every field is a float64, so a record can be saved with ``numpy.save``, restored and compared. An effect's parameters
+are the fields ``<effect id>_<parameter>``; they are zero (neutral) unless a catalogue entry is applied.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ EFFECT_FIELDS = (
     "yaw_inertia_inertia", "kingpin_jacking_amplitude", "kingpin_jacking_second_harmonic", "slope_bias_torque",
     "soil_shear_torque", "soil_shear_span", "soil_shear_growth",
     # measurement: torque the actuators must deliver on top
-    "cylinder_friction_coulomb", "cylinder_friction_load_share", "cylinder_friction_viscous", "cylinder_friction_holding",
-    "cylinder_friction_breakaway", "line_loss_linear_b", "line_loss_quadratic_c", "back_pressure_torque",
-    "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
+    "cylinder_friction_coulomb", "cylinder_friction_load_share", "cylinder_friction_viscous",
+    "cylinder_friction_holding", "cylinder_friction_breakaway", "line_loss_linear_b", "line_loss_quadratic_c",
+    "back_pressure_torque", "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
 )  # fmt: skip
 
 PARAMETERS = np.dtype([(name, np.float64) for name in BASELINE_FIELDS + EFFECT_FIELDS])

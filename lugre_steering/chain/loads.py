@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.special import gamma
 
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.recording import Array
@@ -18,7 +18,7 @@ def vertical_load(axle: Axle, track: Track) -> float:
 
 
 def roller_loads(axle: Axle, track: Track) -> Array:
-    """Load of each roller [N] (n,): given shares, or two levels of balance levers (lever rule; R, Liang et al. 2022, eq. 16-20).
+    """Load of each roller [N] (n,): given shares, or two levels of balance levers (R; Liang et al. 2022, eq. 16-20).
 
     P1 = alpha1 F + alpha2 G, P2 = (1 - alpha1) F + (1 - alpha2) G, alpha1 = l2 / (l1 + l2), alpha2 = l4 / (l3 + l4);
     F1 = beta1 P1, F2 = (1 - beta1) P1, F3 = beta2 P2, F4 = (1 - beta2) P2 in the same way.
@@ -39,7 +39,8 @@ def roller_loads(axle: Axle, track: Track) -> Array:
 
 def roller_radii(track: Track) -> Array:
     """Distance of each roller centre from the hinge [m] (n,): hypot(x_i, hinge offset)."""
-    return np.hypot(np.array(track.rollers.x_m), track.hinge_offset_m)
+    radii: Array = np.hypot(np.array(track.rollers.x_m), track.hinge_offset_m)
+    return radii
 
 
 def load_moment(axle: Axle, track: Track) -> float:
@@ -50,7 +51,8 @@ def load_moment(axle: Axle, track: Track) -> float:
 def ground_pressure(x_m: Array, y_m: Array, peak_Pa: float, length_m: float, width_m: float, exponent: float) -> Array:
     """Pressure under one roller [Pa]: p_max cos**n(pi x / L) (1 - 2 |y| / W) inside the footprint, 0 outside.
 
-    x, y [m] from the roller centre, broadcast together. Exponent n = 2 (soft) ... 4 (hard) (R; Keller and Arvidsson 2016 in words).
+    x, y [m] from the roller centre, broadcast together. Exponent n = 2 (soft) ... 4 (hard) (R; Keller and Arvidsson
+    2016 in words).
     """
     inside = (np.abs(x_m) <= 0.5 * length_m) & (np.abs(y_m) <= 0.5 * width_m)
     along = np.cos(np.pi * np.clip(x_m / length_m, -0.5, 0.5)) ** exponent
@@ -58,11 +60,8 @@ def ground_pressure(x_m: Array, y_m: Array, peak_Pa: float, length_m: float, wid
 
 
 def contact_length(load_N: float, peak_Pa: float, width_m: float, exponent: float) -> float:
-    """Length [m] of the footprint under one roller from load balance: load = p_max (W / 2) L I_n, I_n = mean of cos**n."""
-    t = np.linspace(-0.5, 0.5, 2001)
-    mean_cosine = float(np.trapezoid(np.cos(np.pi * t) ** exponent, t)) if hasattr(np, "trapezoid") else float(
-        np.trapz(np.cos(np.pi * t) ** exponent, t)  # type: ignore[attr-defined]
-    )
+    """Length [m] of the footprint under one roller from load balance: load = p_max (W / 2) L mean(cos**n)."""
     if peak_Pa <= 0.0:
         raise VehicleFileError(f"peak ground pressure: got {peak_Pa:g} Pa, expected a positive value")
-    return float(brentq(lambda length: 0.5 * peak_Pa * width_m * length * mean_cosine - load_N, 0.0, 1e3))
+    mean_cosine = float(gamma(0.5 * (exponent + 1.0)) / (np.sqrt(np.pi) * gamma(0.5 * exponent + 1.0)))
+    return load_N / (0.5 * peak_Pa * width_m * mean_cosine)

@@ -17,7 +17,7 @@ from lugre_steering.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Model:
-    """What the compiled chain needs of a vehicle: one parameter record per side (alike, mirror images) and the rubber table."""
+    """What the compiled chain needs of a vehicle: one parameter record per side (alike) and the rubber table."""
 
     parameters: tuple[Records, ...]
     rubber: Array
@@ -43,7 +43,7 @@ def build_model(vehicle: Vehicle) -> Model:
 
 
 def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:
-    """Baseline fields of the parameter record, one track, SI (PHYSICS: loads, radii, friction torques, damping, heat)."""
+    """Baseline fields of the parameter record of one track, SI."""
     values = {"sides": float(len(vehicle.sides)), **_thermal(vehicle)}
     if vehicle.contact is not None:
         joint = vehicle.contact
@@ -79,7 +79,9 @@ def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:
         values["gravity_cos"] = vehicle.gravity.cos_Nm
         values["aligning_torque"] = values.get("aligning_torque", 0.0) + vehicle.gravity.sin_Nm
     sensors = vehicle.sensors
-    values["angle_noise"] = math.radians(math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0)))
+    values["angle_noise"] = math.radians(
+        math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0))
+    )
     return values
 
 

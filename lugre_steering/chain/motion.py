@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Motion stage, from the corrected angle to the motion of the contact (effects only; the rate estimate is in ``rates``)."""
+"""Motion stage, from the corrected angle to the motion of the contact (effects only; for the rate see ``rates``)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numba import njit
 
 
 @njit
-def contact_increment(p, s, theta, stiffness, length):  # type: ignore[no-untyped-def]
+def contact_increment(p, s, theta, stiffness, length):
     """Angle [rad] by which the contact turns when the corrected steering angle reaches ``theta``.
 
-    linkage_compliance: contact = theta - c M (1 + stiffening ...), solved with the tangent stiffness, so stable for any c.
-    backlash: a gap of ``width`` that opens when the bristle torque has fallen to zero.
+    linkage_compliance: contact = theta - c M (1 + stiffening ...), solved with the tangent stiffness, so stable for any
+    c. backlash: a gap of ``width`` that opens when the bristle torque has fallen to zero.
     ``length`` is the presliding length g / sigma_0 [rad].
     """
     if p.linkage_compliance_compliance != 0.0:
@@ -31,7 +31,7 @@ def contact_increment(p, s, theta, stiffness, length):  # type: ignore[no-untype
 
 
 @njit
-def through_gap(p, s, d_theta, length):  # type: ignore[no-untyped-def]
+def through_gap(p, s, d_theta, length):
     """Part of a link motion that passes a backlash [rad]; ``s.gap`` is the position inside it, -width/2 ... width/2.
 
     A loaded flank follows until the bristle torque is zero, after the travel L ln(1 + |z| / L) of the exact LuGre step;

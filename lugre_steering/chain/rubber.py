@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rubber: moduli over temperature and frequency, and what follows from them for stiffness and friction.
 
-Sources: M. L. Williams, R. F. Landel, J. D. Ferry, JACS 77 (1955) 3701 (shift); B. N. J. Persson, J. Phys.: Condens. Matter 10
-(1998) 7789 and J. Chem. Phys. 115 (2001) 3840 (friction of rubber on rough ground); Liang et al. 2022 for their use here (R).
+Sources: M. L. Williams, R. F. Landel, J. D. Ferry, JACS 77 (1955) 3701 (shift); B. N. J. Persson, J. Phys.: Condens.
+Matter 10 (1998) 7789 and J. Chem. Phys. 115 (2001) 3840 (friction of rubber on rough ground); Liang et al. 2022 for
+their use here (R).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lugre_steering.recording import Array
@@ -16,19 +18,22 @@ from lugre_steering.vehicle import Rubber, Wlf
 
 TABLE_STEP_K = 0.1
 
+ComplexArray = NDArray[np.complex128]
+
 
 def wlf_shift(temperature_degC: Array, wlf: Wlf) -> Array:
-    """Shift factor aT (n,): log10 aT = -c1 (T - Tr) / (c2 + T - Tr); valid above Tr - c2 (below, clamped just above it)."""
+    """Shift factor aT (n,): log10 aT = -c1 (T - Tr) / (c2 + T - Tr); valid above Tr - c2 (clamped there)."""
     delta = np.maximum(np.asarray(temperature_degC, float) - wlf.reference_degC, 1e-3 - wlf.c2_K)
     shift: Array = 10.0 ** np.clip(-wlf.c1 * delta / (wlf.c2_K + delta), -30.0, 30.0)
     return shift
 
 
-def moduli(rubber: Rubber, temperature_degC: Array, frequency_Hz: float | None = None) -> Array:
+def moduli(rubber: Rubber, temperature_degC: Array, frequency_Hz: float | None = None) -> ComplexArray:
     """Complex modulus E' + i E'' [Pa] (n,) at each temperature and one frequency (default: the DMA frequency).
 
     A DMA table is interpolated in log modulus over temperature; another frequency f is reached through the equivalent
-    temperature T* with f aT(T) = f_DMA aT(T*). A master curve is interpolated in log-log over the reduced frequency f aT.
+    temperature T* with f aT(T) = f_DMA aT(T*). A master curve is interpolated in log-log over the reduced
+    frequency f aT.
     """
     temperature = np.asarray(temperature_degC, float)
     frequency = rubber.dma_frequency_Hz if frequency_Hz is None else frequency_Hz
@@ -45,8 +50,9 @@ def moduli(rubber: Rubber, temperature_degC: Array, frequency_Hz: float | None =
         x, axis = temperature, np.array(rubber.dma.temperature_degC)
         storage, loss = rubber.dma.storage_modulus_Pa, rubber.dma.loss_modulus_Pa
     x = np.clip(x, axis[0], axis[-1])
-    result: Array = 10.0 ** PchipInterpolator(axis, np.log10(storage))(x) + 1j * 10.0 ** PchipInterpolator(axis, np.log10(loss))(x)
-    return result
+    real, imaginary = (10.0 ** PchipInterpolator(axis, np.log10(column))(x) for column in (storage, loss))
+    modulus: ComplexArray = real + 1j * imaginary
+    return modulus
 
 
 def _equivalent_temperature(rubber: Rubber, temperature: Array, frequency: float) -> Array:
@@ -61,17 +67,18 @@ def _equivalent_temperature(rubber: Rubber, temperature: Array, frequency: float
     return result
 
 
-def friction_measure(modulus: Array, law: str) -> Array:
+def friction_measure(modulus: ComplexArray, law: str) -> Array:
     """Quantity to which the friction coefficient is proportional: E''/|E| (Persson, light contact), E''/E' or E''."""
     if law == "loss_tangent":
         return modulus.imag / modulus.real
     if law == "loss_modulus":
         return modulus.imag
-    return modulus.imag / np.abs(modulus)
+    measure: Array = modulus.imag / np.abs(modulus)
+    return measure
 
 
 def ratio_table(rubber: Rubber | None, reference_degC: float, law: str) -> tuple[Array, float, float]:
-    """Table for the compiled step: columns stiffness ratio E'/E'_ref and friction ratio over a uniform temperature grid.
+    """Table for the compiled step: columns E'/E'_ref and friction ratio over a uniform temperature grid.
 
     Returns (n, 2) table, first temperature [degC], step [K]. Without rubber both ratios are 1 everywhere.
     """
@@ -82,7 +89,7 @@ def ratio_table(rubber: Rubber | None, reference_degC: float, law: str) -> tuple
     else:
         low, high = min(-40.0, reference_degC), max(150.0, reference_degC)
     temperature = low + TABLE_STEP_K * np.arange(round((high - low) / TABLE_STEP_K) + 1)
-    modulus = moduli(rubber, temperature)
+    modulus = moduli(rubber, np.asarray(temperature, np.float64))
     reference = moduli(rubber, np.array([reference_degC]))
     table = np.column_stack(
         [modulus.real / reference.real, friction_measure(modulus, law) / friction_measure(reference, law)]

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from lugre_steering.chain.compiled import exp
 from lugre_steering.chain.contact import (
     aged_level,
     bristle,
@@ -32,8 +31,8 @@ _NORMAL_QUANTILES = (-1.38299413, -0.67448975, -0.21042839, 0.21042839, 0.674489
 
 
 @njit(fastmath={"contract"})
-def ratios(rubber, low, step, temperature):  # type: ignore[no-untyped-def]
-    """Stiffness and friction ratios at a temperature [degC] by linear interpolation; clamped, and told so, outside the table."""
+def ratios(rubber, low, step, temperature):
+    """Stiffness and friction ratios at a temperature [degC], linear between rows, clamped (and told) outside."""
     position = (temperature - low) / step
     last = rubber.shape[0] - 2
     index = int(position) if position > 0.0 else 0
@@ -48,8 +47,8 @@ def ratios(rubber, low, step, temperature):  # type: ignore[no-untyped-def]
 
 
 @njit
-def begin(p, s, theta):  # type: ignore[no-untyped-def]
-    """State at the first sample of a recording: bristles at ``initial_bristle``, temperatures as the vehicle file says."""
+def begin(p, s, theta):
+    """State at the first sample of a recording: bristles and temperatures as the parameters say."""
     s.started = 1.0
     s.theta = theta
     s.link_angle = theta
@@ -65,10 +64,10 @@ def begin(p, s, theta):  # type: ignore[no-untyped-def]
 
 
 @njit
-def distributed(p, s, d_theta, stiffness, g):  # type: ignore[no-untyped-def]
+def distributed(p, s, d_theta, stiffness, g):
     """distributed_contact: parallel elements of log-normally graded stiffness, each carrying an equal share of g.
 
-    Returns elastic torque [N m], its mean deflection [rad] and its work [J] (Maxwell slip / generalised Iwan: Iwan 1966).
+    Returns elastic torque [N m], its mean deflection [rad] and its work [J] (Maxwell slip; Iwan 1966).
     """
     total = 0.0
     for q in _NORMAL_QUANTILES:
@@ -79,18 +78,18 @@ def distributed(p, s, d_theta, stiffness, g):  # type: ignore[no-untyped-def]
         k = stiffness * math.exp(p.distributed_contact_spread * _NORMAL_QUANTILES[i]) / total
         z = s.elements[i]
         s.elements[i] = bristle(z, d_theta, k, share)
-        work += bristle_work(z, s.elements[i], d_theta, k, share) - 0.5 * k * (s.elements[i] ** 2 - z * z)
+        work += bristle_work(z, s.elements[i], d_theta, share) - 0.5 * k * (s.elements[i] ** 2 - z * z)
         torque += k * s.elements[i]
     z_next = torque / stiffness
     return torque, z_next, work + 0.5 * stiffness * (z_next * z_next - s.z * s.z)
 
 
 @njit(fastmath={"contract"})
-def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):  # type: ignore[no-untyped-def]
-    """One sample of one track: angle [rad], rate [rad/s], acceleration [rad/s2] after ``dt`` [s] -> torque [N m] and the rest.
+def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):
+    """One sample of one track: angle [rad], rate [rad/s], acceleration [rad/s2] after ``dt`` [s] -> OUTPUT record.
 
-    Order: motion -> contact -> heat -> parallel torque -> losses. All effects are neutral at zero. The angle increment, not
-    omega dt, drives the bristle; omega only sets the level (Stribeck) and the damping.
+    Order: motion -> contact -> heat -> parallel torque -> losses. All effects are neutral at zero. The angle increment,
+    not omega dt, drives the bristle; omega only sets the level (Stribeck) and the damping.
     """
     theta = (theta_measured - p.angle_offset_offset) / (1.0 + p.angle_scale_scale)
     if s.started == 0.0:
@@ -115,7 +114,7 @@ def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):  # type: ignor
     z = s.z
     if p.distributed_contact_spread == 0.0:
         z_next = bristle(z, d_theta, stiffness, g)
-        work = bristle_work(z, z_next, d_theta, stiffness, g)
+        work = bristle_work(z, z_next, d_theta, g)
         elastic = stiffness * z_next
     else:
         elastic, z_next, work = distributed(p, s, d_theta, stiffness, g)
@@ -156,7 +155,7 @@ def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):  # type: ignor
 
 
 @njit(nogil=True, cache=True)
-def _run(p, s, rubber, time, theta, omega, alpha, out):  # type: ignore[no-untyped-def]
+def _run(p, s, rubber, time, theta, omega, alpha, out):
     previous = time[0]
     for i in range(time.size):
         advance(p[0], s[0], rubber, out[i], time[i] - previous, theta[i], omega[i], alpha[i])
@@ -164,7 +163,7 @@ def _run(p, s, rubber, time, theta, omega, alpha, out):  # type: ignore[no-untyp
 
 
 @njit(nogil=True, cache=True)
-def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque):  # type: ignore[no-untyped-def]
+def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque):
     previous = time[0]
     for i in range(time.size):
         advance(p[0], s[0], rubber, scratch[0], time[i] - previous, theta[i], omega[i], alpha[i])
@@ -185,7 +184,7 @@ def new_parameters() -> Records:
 def run_side(
     p: Records, rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array, state: Records | None = None
 ) -> Records:
-    """Whole record of one track -> OUTPUT records (n,). ``time`` [s] increasing; ``state`` is advanced in place if given."""
+    """Whole record of one track -> OUTPUT records (n,). ``time`` [s] increases; a given ``state`` is advanced."""
     out = np.zeros(time.size, OUTPUT)
     _run(p, new_state() if state is None else state, rubber, time, theta, omega, alpha, out)
     return out

@@ -18,12 +18,12 @@ SEAL_TRAVEL_RAD = 2e-3
 
 @njit(fastmath={"contract"})
 def aligning(theta: float, amplitude: float, gravity_cos: float) -> float:
-    """Conservative torque of the angle [N m]: M_a = F_z e sin(theta_k) sin(theta) (Reimpell; R), plus a known gravity cosine."""
+    """Conservative torque of the angle [N m]: M_a = F_z e sin(theta_k) sin(theta) (Reimpell; R), plus gravity."""
     return amplitude * math.sin(theta) + gravity_cos * math.cos(theta)
 
 
 @njit
-def parallel_torque(p, s, d_theta, alpha):  # type: ignore[no-untyped-def]
+def parallel_torque(p, s, d_theta, alpha):
     """Effects that act beside the contact [N m]: end_stop, soil_shear, yaw_inertia, kingpin_jacking, slope_bias."""
     torque = p.slope_bias_torque / p.sides + p.yaw_inertia_inertia * alpha
     if p.kingpin_jacking_amplitude != 0.0 or p.kingpin_jacking_second_harmonic != 0.0:
@@ -37,11 +37,11 @@ def parallel_torque(p, s, d_theta, alpha):  # type: ignore[no-untyped-def]
 
 
 @njit
-def end_stop(p, s, d_theta):  # type: ignore[no-untyped-def]
-    """Elastic limit device: sgn(theta) (k1 x + k3 x**3), x = |theta| - engage_angle > 0; the unloading branch is lower by ``loss``.
+def end_stop(p, s, d_theta):
+    """Elastic limit device: sgn(theta) (k1 x + k3 x**3), x = |theta| - engage_angle > 0; unloading lower by ``loss``.
 
-    ``shift`` moves the knee of negative angles only. Compare the translational hard stop of multibody libraries; hysteresis as
-    a share of the loading branch (rubber buffers: 0.15 ... 0.4).
+    ``shift`` moves the knee of negative angles only. Compare the translational hard stop of multibody libraries;
+    hysteresis as a share of the loading branch (rubber buffers: 0.15 ... 0.4).
     """
     engage = p.end_stop_engage_angle + (p.end_stop_shift if s.theta < 0.0 else 0.0)
     x = abs(s.theta) - engage
@@ -55,10 +55,10 @@ def end_stop(p, s, d_theta):  # type: ignore[no-untyped-def]
 
 
 @njit
-def soil_shear(p, s):  # type: ignore[no-untyped-def]
+def soil_shear(p, s):
     """Berm of soft ground on both sides: pushed outward when the track goes farther than before, slack between.
 
-    torque (1 + growth b) (1 - (b - x) / span) within ``span`` of the farthest push b, full at fresh ground (Wong, ch. 2).
+    torque (1 + growth b) (1 - (b - x) / span) within ``span`` of the farthest push b, full at fresh ground (Wong).
     """
     s.berm_left = max(s.berm_left, s.theta)
     s.berm_right = max(s.berm_right, -s.theta)
@@ -70,12 +70,12 @@ def soil_shear(p, s):  # type: ignore[no-untyped-def]
 
 
 @njit
-def losses(p, s, omega, d_theta, load):  # type: ignore[no-untyped-def]
+def losses(p, s, omega, d_theta, load):
     """Torque lost between cylinder pressures and steering axis [N m]; each entry is zero when neutral.
 
-    cylinder_friction: (coulomb + load_share |load|) times a direction function, half of it (``holding``) kept at rest by the
-    seal, raised by ``breakaway`` at low speed (Stribeck), plus viscous omega. line_loss: b omega and c omega |omega|.
-    back_pressure: constant, opposes motion, vanishes at rest.
+    cylinder_friction: (coulomb + load_share |load|) times a direction function, half of it (``holding``) kept at rest
+    by the seal, raised by ``breakaway`` at low speed (Stribeck), plus viscous omega. line_loss: b omega and c omega
+    |omega|. back_pressure: constant, opposes motion, vanishes at rest.
     """
     torque = p.cylinder_friction_viscous * omega + p.line_loss_linear_b * omega
     torque += p.line_loss_quadratic_c * omega * abs(omega)
@@ -90,7 +90,7 @@ def losses(p, s, omega, d_theta, load):  # type: ignore[no-untyped-def]
 
 
 @njit
-def hydraulic_limits(p, s, torque):  # type: ignore[no-untyped-def]
+def hydraulic_limits(p, s, torque):
     """What the hydraulics can hold: relief_saturation clips at a ceiling, trapped_pressure leaks away at standstill.
 
     trapped: torque (1 - share (1 - exp(-dwell / tau))).

@@ -12,8 +12,8 @@ from lugre_steering.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class SensorCorrection:
-    """What to undo on the measured side: offset [Pa] and drift [Pa/s] per line, late stamps [s] (positive: pressures stamped
-    late), first-order lag [s], and the true moment arm as arm (1 + a theta + b theta**2)."""
+    """What to undo on the measured side: offset [Pa] and drift [Pa/s] per line, late stamps [s] (positive: pressures
+    stamped late), first-order lag [s], and the true moment arm as arm (1 + a theta + b theta**2)."""
 
     offset_Pa: Mapping[str, float] = field(default_factory=dict)
     drift_Pa_s: Mapping[str, float] = field(default_factory=dict)
@@ -24,7 +24,7 @@ class SensorCorrection:
 
 
 def sensor_correction(vehicle: Vehicle) -> SensorCorrection:
-    """The sensor effects of a vehicle file, gathered; pressure_offset and pressure_drift name their lines as parameters."""
+    """The sensor effects of a vehicle file, gathered; pressure_offset and pressure_drift take line names."""
     found = {effect.id: effect.parameters for effect in vehicle.effects}
     arm = found.get("moment_arm_error", {})
     return SensorCorrection(
