@@ -102,11 +102,12 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
         offset = stamp[use] - log[use]
         reject("absurd_stamp", np.abs(offset - np.median(offset)) > STRAY_NS)
     if len(use):
-        # A stamp counts as reached once the next message confirms it, so that one wild stamp cannot outdate the rest.
-        following = np.append(stamp[use][1:], stamp[use][-1])
-        reached = np.maximum.accumulate(np.minimum(stamp[use], following))
-        ahead = stamp[use] > following + LATE_NS
-        behind = stamp[use] < reached - LATE_NS
+        # A stamp counts as reached once one of the next two confirms it: one wild stamp must not outdate the rest.
+        s = stamp[use]
+        following = np.maximum(np.append(s[1:], s[-1]), np.append(s[2:], s[-2:]))
+        reached = np.maximum.accumulate(np.minimum(s, following))
+        ahead = s > following + LATE_NS
+        behind = s < reached - LATE_NS
         reject("backward_stamp", ahead | behind)
     reordered = int((stamp[use] < np.maximum.accumulate(stamp[use])).sum()) if len(use) else 0
     use = use[np.argsort(stamp[use], kind="stable")]

@@ -286,7 +286,7 @@ class McapFile:
         while at + RECORD.size <= end:
             op, size = RECORD.unpack(self._read(at, RECORD.size))
             if op in (0, DATA_END, FOOTER):
-                self._complete = op != 0
+                self._complete = op != 0 and self._read(end - len(MAGIC), len(MAGIC)) == MAGIC
                 break
             after = at + RECORD.size + size
             if (op == CHUNK or after > end or at - loose > _PIECE) and at > loose:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,6 +31,8 @@ MESSAGE_TYPE = {
     Kind.TORQUE: cdr.WRENCH_STAMPED,
 }
 _SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
+# The same safe loader in C where PyYAML has it.
+_YAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PEEK = 500_000  # messages looked at to find which topic carries a joint
 
 
@@ -101,7 +104,7 @@ class Bag:
         metadata = self.path / "metadata.yaml"
         if metadata.is_file():
             try:
-                content: Any = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+                content: Any = yaml.load(metadata.read_bytes(), _YAML)["rosbag2_bagfile_information"]
                 listed = [self.path / Path(str(name)).name for name in content["relative_file_paths"]]
                 self.message_count = int(content["message_count"])
             except (yaml.YAMLError, KeyError, TypeError, ValueError, OSError) as error:
@@ -161,8 +164,8 @@ class Bag:
                 if lost:
                     self._say("damaged_bag", f"{lost} compressed messages are damaged and left out")
                 yield messages
-        except OSError as error:
-            raise BagError(f"{self.path}: reading stopped ({error.strerror or error})") from error
+        except (OSError, sqlite3.Error) as error:
+            raise BagError(f"{self.path}: reading stopped ({error})") from error
         if wanted is None and self.message_count is not None and count != self.message_count:
             self._say("message_count", f"metadata.yaml promises {self.message_count} messages, {count} could be read")
 

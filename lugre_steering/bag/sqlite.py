@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from lugre_steering.bag.messages import Connection, Messages, from_rows
+from lugre_steering.bag.sqlite_pages import leaf_rows
 from lugre_steering.errors import BagError
 from lugre_steering.recording import Finding
 
 MAGIC = b"SQLite format 3\0"
 _PIECE_BYTES = 8 << 20
 _PIECE_ROWS = 20_000
-_LARGEST_SKIP = 1 << 40
 
 Row = tuple[Any, ...]
 
@@ -51,21 +51,21 @@ class SqliteFile:
             header = file.read(100)
         if header[: len(MAGIC)] != MAGIC:
             raise BagError(f"{self.path}: not an sqlite3 file (it does not begin with the SQLite magic bytes)")
+        page = int.from_bytes(header[16:18], "big")
+        page = 65536 if page == 1 else page
+        size, expected = self.path.stat().st_size, int.from_bytes(header[28:32], "big") * page
         log = self.path.with_name(self.path.name + "-wal")
+        self._opened = self.path
         if log.exists() and log.stat().st_size:  # an interrupted recording: its last messages are in the log
-            copy = self._temporary() / self.path.name
-            shutil.copyfile(self.path, copy)
-            shutil.copyfile(log, copy.with_name(log.name))
-            self._db = self._connect(copy, "mode=rw")
-        else:
-            self._db = self._connect(self.path, "mode=ro&immutable=1")
+            self._opened = self._temporary() / self.path.name
+            shutil.copyfile(self.path, self._opened)
+            shutil.copyfile(log, self._opened.with_name(log.name))
+        self._db = self._connect(self._opened, "mode=ro&immutable=1" if self._opened == self.path else "mode=rw")
         # Lets SQLite open a file that is shorter than its header says; nothing is ever written to it.
         self._db.execute("PRAGMA writable_schema=ON")
         self._index = self._read_topics()
-        page_size = int.from_bytes(header[16:18], "big")
-        expected = int.from_bytes(header[28:32], "big") * (page_size if page_size > 1 else 65536)
-        if self.path.stat().st_size < expected:
-            self._salvage(f"cut off: {self.path.stat().st_size} of {expected} bytes", "truncated_bag")
+        if page and size < expected and self._opened == self.path:
+            self._salvage(f"cut off after {size} of {expected} bytes", "truncated_bag")
 
     def _connect(self, path: Path, how: str) -> sqlite3.Connection:
         db = sqlite3.connect(f"{path.resolve().as_uri()}?{how}", uri=True)
@@ -106,37 +106,41 @@ class SqliteFile:
         return [(begin if isinstance(begin, int) else 0, self._pieces(topics))]
 
     def _pieces(self, topics: Sequence[int]) -> Iterator[Messages]:
-        after = (-(2**63), 0)
+        after: tuple[int, int] | None = None
         while True:
             try:
-                for rows in self._rows(topics, after):
+                cursor = self._select(topics, after)
+                size = 100
+                while rows := cursor.fetchmany(size):
                     messages = self._columns(rows)
+                    size = min(max(_PIECE_BYTES * len(rows) // (len(messages.data) + 1), 1), _PIECE_ROWS)
+                    after = (rows[-1][2], rows[-1][0])
                     if len(messages):
                         yield messages
-                    after = (rows[-1][2], rows[-1][0])
                 return
             except sqlite3.DatabaseError as error:  # noqa: PERF203
                 self._salvage(f"damaged: {_text(error)}", "damaged_bag")
 
-    def _rows(self, topics: Sequence[int], after: tuple[int, int]) -> Iterator[list[Row]]:
-        marks = ",".join("?" * len(topics))
-        cursor = self._db.execute(
-            "SELECT id, topic_id, timestamp, data FROM messages "
-            f"WHERE (timestamp, id) > (?, ?) AND topic_id IN ({marks}) ORDER BY timestamp, id",
-            (*after, *topics),
-        )
-        size = 100
-        while rows := cursor.fetchmany(size):
-            yield rows
-            mean = sum(len(row[3]) for row in rows if isinstance(row[3], bytes)) // len(rows) + 1
-            size = min(max(_PIECE_BYTES // mean, 1), _PIECE_ROWS)
+    def _select(self, topics: Sequence[int], after: tuple[int, int] | None) -> sqlite3.Cursor:
+        """Rows in log order, ``after`` some (timestamp, id)."""
+        conditions, values = [], list(topics)
+        if len(topics) < len(self._index):
+            conditions.append(f"topic_id IN ({','.join('?' * len(topics))})")
+        else:
+            values.clear()
+        if after is not None:
+            conditions.append("(timestamp, id) > (?, ?)")
+            values += after
+        where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
+        query = f"SELECT id, topic_id, timestamp, data FROM messages {where} ORDER BY timestamp, id"
+        return self._db.execute(query, values)
 
     def _columns(self, rows: list[Row]) -> Messages:
         _, topic, log_ns, data = zip(*rows, strict=True)
         try:
             return from_rows([self._index[number] for number in topic], log_ns, data)
-        except (TypeError, ValueError, OverflowError):
-            sound = [row for row in rows if isinstance(row[2], int) and isinstance(row[3], bytes)]
+        except (KeyError, TypeError, ValueError, OverflowError):
+            sound = [row for row in rows if self._is_message(row)]
             self.findings.append(
                 Finding(
                     "damaged_bag",
@@ -145,6 +149,9 @@ class SqliteFile:
                 )
             )
             return from_rows([self._index[r[1]] for r in sound], [r[2] for r in sound], [r[3] for r in sound])
+
+    def _is_message(self, row: Row) -> bool:
+        return row[1] in self._index and isinstance(row[2], int) and isinstance(row[3], bytes)
 
     def _salvage(self, why: str, finding: str) -> None:
         """Copy every row that can be reached to a new database and read on from that one."""
@@ -155,25 +162,18 @@ class SqliteFile:
             "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB); BEGIN;"
         )
         copy.executemany("INSERT OR IGNORE INTO messages VALUES(?, ?, ?, ?)", self._reachable_rows())
-        copy.executescript("COMMIT; CREATE INDEX timestamp_idx ON messages(timestamp);")
+        copy.execute("COMMIT")
+        copy.execute("CREATE INDEX timestamp_idx ON messages(timestamp)")
         count, first, last = copy.execute("SELECT COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages").fetchone()
         upto = f" up to t={(last - first) / 1e9:.3f} s" if count else ""
         self._db = copy
         self.findings.append(Finding(finding, "", f"{self.path.name}: {why}; kept {count} messages{upto}"))
 
     def _reachable_rows(self) -> Iterator[Row]:
-        """Well-formed rows in the order of their numbers, stepping over what SQLite cannot read."""
-        next_id, step = 0, 1
-        while step < _LARGEST_SKIP:
-            try:
-                query = "SELECT id, topic_id, timestamp, data FROM messages WHERE id >= ? ORDER BY id"
-                for row in self._db.execute(query, (next_id,)):
-                    if row[1] in self._index and isinstance(row[2], int) and isinstance(row[3], bytes):
-                        yield row
-                    next_id, step = max(next_id, row[0] + 1), 1
-                return
-            except sqlite3.DatabaseError:  # noqa: PERF203
-                next_id, step = next_id + step, 2 * step
+        for number, columns in leaf_rows(self._opened):
+            row = (number, *columns[1:])
+            if len(row) == 4 and self._is_message(row):
+                yield row
 
 
 def _text(value: object) -> str:

@@ -1,0 +1,224 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged bags: what is readable is kept and the loss is stated, or a clear error; never anything else."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import shutil
+import struct
+from pathlib import Path
+
+import bag_making as make
+import numpy as np
+import pytest
+from bag_making import CHANNELS, T0
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+
+from lugre_steering.bag import Bag, read_recording
+from lugre_steering.errors import BagError
+
+FORMS = [
+    (s, c) for s, cs in (("mcap", "none storage message file"), ("sqlite3", "none message file")) for c in cs.split()
+]
+
+
+@pytest.fixture(scope="module")
+def run() -> list[make.Message]:
+    return make.steering(60.0)
+
+
+def sound(folder: Path) -> tuple[int, list[str]]:
+    """Read all; whatever is delivered must be true. (number of values, names of findings)."""
+    with Bag(folder) as bag:
+        count = 0
+        for block in bag.blocks(CHANNELS, all_messages=True):
+            t = (block.stamp_ns - T0) * 1e-9
+            left = block.channel == 0
+            np.testing.assert_allclose(block.value[left], 0.5 * np.sin(t[left]), atol=1e-8)
+            count += len(t)
+        return count, [f.finding for f in bag.findings]
+
+
+@pytest.mark.parametrize(("storage", "compression"), FORMS)
+@pytest.mark.parametrize("with_metadata", [True, False])
+def test_cut_at_70_percent(
+    tmp_path: Path, run: list[make.Message], storage: str, compression: str, with_metadata: bool
+) -> None:
+    folder = make.write(tmp_path / "run", run, storage, compression)
+    file = make.file_of(folder)
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) * 7 // 10])
+    if not with_metadata:
+        (folder / "metadata.yaml").unlink()
+    count, findings = sound(folder)
+    # Most of what was not cut off; where the index at the end is large, cutting it costs no message.
+    assert 0.6 * len(run) < count < len(run)
+    assert "truncated_bag" in findings
+    assert ("message_count" in findings) == with_metadata
+    recording = read_recording(folder, CHANNELS)
+    assert any("kept" in f.statement for f in recording.findings)
+    np.testing.assert_allclose(recording.angle["left"].value, 0.5 * np.sin(recording.angle["left"].time_s), atol=1e-8)
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.001, 0.01, 0.3, 0.9, 0.99, 0.9999])
+@pytest.mark.parametrize(("storage", "compression"), FORMS)
+def test_cut_anywhere(tmp_path: Path, storage: str, compression: str, fraction: float) -> None:
+    folder = make.write(tmp_path / "run", make.steering(5.0), storage, compression)
+    file = make.file_of(folder)
+    data = file.read_bytes()
+    file.write_bytes(data[: int(len(data) * fraction)])
+    count, findings = sound(folder)
+    assert findings  # never silent
+    if count == 0:
+        with pytest.raises(BagError, match="no usable message"):
+            read_recording(folder, CHANNELS)
+
+
+@pytest.mark.parametrize(("storage", "compression"), FORMS)
+@pytest.mark.parametrize("seed", range(12))
+def test_flipped_bytes_never_raise_anything_but_bag_errors(
+    tmp_path: Path, storage: str, compression: str, seed: int
+) -> None:
+    folder = make.write(tmp_path / "run", make.steering(5.0), storage, compression)
+    file = make.file_of(folder)
+    data = bytearray(file.read_bytes())
+    rng = random.Random(seed)
+    for _ in range(rng.choice([1, 10, 200])):
+        data[rng.randrange(len(data))] ^= rng.randrange(1, 256)
+    file.write_bytes(data)
+    for path in (folder, file):
+        with contextlib.suppress(BagError):
+            recording = read_recording(path, CHANNELS)
+            for signal in (*recording.angle.values(), *recording.pressure.values()):
+                assert (np.diff(signal.time_s) > 0).all()
+                assert np.isfinite(signal.value).all()
+
+
+def test_overwritten_middle_of_a_checksummed_mcap(tmp_path: Path) -> None:
+    """With checksums (as rosbag2 writes them) a damaged chunk is left out whole, named, and the rest is true."""
+    file = tmp_path / "run.mcap"
+    messages = make.steering(20.0)
+    with file.open("wb") as stream:
+        writer = McapWriter(stream, chunk_size=50_000, compression=CompressionType.LZ4)
+        writer.start(profile="ros2")
+        channels = {}
+        for topic, msgtype, log_ns, data in messages:
+            if topic not in channels:
+                schema = writer.register_schema(msgtype, "ros2msg", b"")
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], log_ns, data, log_ns)
+        writer.finish()
+    assert sound(file) == (len(messages), [])
+    data = bytearray(file.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 20] = b"\x55" * 20
+    file.write_bytes(data)
+    count, findings = sound(file)
+    assert 0.8 * len(messages) < count < len(messages)
+    assert findings == ["damaged_bag"]
+
+
+def test_overwritten_page_of_a_sqlite_file(tmp_path: Path, run: list[make.Message]) -> None:
+    folder = make.write(tmp_path / "run", run, "sqlite3")
+    file = make.file_of(folder)
+    data = bytearray(file.read_bytes())
+    page = len(data) // 2 // 4096 * 4096
+    data[page : page + 4096] = b"\x55" * 4096
+    file.write_bytes(data)
+    count, findings = sound(folder)
+    assert len(run) - 200 < count < len(run)
+    assert "damaged_bag" in findings
+    assert "message_count" in findings
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_empty_bag(tmp_path: Path, storage: str) -> None:
+    empty = make.write(tmp_path / "run", [], storage)
+    assert sound(empty) == (0, [])
+    with pytest.raises(BagError, match="no usable message"):
+        read_recording(empty, CHANNELS)
+    announced = make.write(
+        tmp_path / "announced", [], storage, topics=[("/" + c.topic, make.JOINT_STATE) for c in CHANNELS[:2]]
+    )
+    with Bag(announced) as bag:
+        assert len(bag.topics) == 2
+    with pytest.raises(BagError, match=r"no usable message.*/steering/left/joint_state"):
+        read_recording(announced, CHANNELS)
+
+
+def test_not_a_bag(tmp_path: Path) -> None:
+    for name, content, reason in (
+        ("empty.mcap", b"", "empty"),
+        ("empty.db3", b"", "empty"),
+        ("notes.txt", b"these are notes, and long enough", "neither MCAP nor sqlite3"),
+        ("notes.mcap", b"these are notes, and long enough", "neither MCAP nor sqlite3"),
+        ("image.db3", bytes(range(256)), "neither MCAP nor sqlite3"),
+        ("head.db3", b"SQLite format 3\0", "not a readable sqlite3|not a rosbag2"),
+    ):
+        file = tmp_path / name
+        file.write_bytes(content)
+        with pytest.raises(BagError, match=reason) as error:
+            Bag(file)
+        assert name in str(error.value)
+    with pytest.raises(BagError, match="no such file"):
+        Bag(tmp_path / "absent")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(BagError, match=r"no \.mcap or \.db3"):
+        Bag(tmp_path / "folder")
+
+
+def test_an_sqlite_file_of_another_program(tmp_path: Path) -> None:
+    import sqlite3
+
+    db = sqlite3.connect(tmp_path / "other.db3")
+    db.execute("CREATE TABLE songs(name)")
+    db.commit()
+    db.close()
+    with pytest.raises(BagError, match="not a rosbag2 recording"):
+        Bag(tmp_path / "other.db3")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "a: [1", "rosbag2_bagfile_information: 5", "rosbag2_bagfile_information: {}", "\x00\xff"]
+)
+def test_damaged_metadata_is_done_without(tmp_path: Path, text: str) -> None:
+    folder = make.write(tmp_path / "run", make.steering(1.0))
+    (folder / "metadata.yaml").write_bytes(text.encode("latin-1"))
+    count, findings = sound(folder)
+    assert (count, findings) == (len(make.steering(1.0)), ["damaged_metadata"])
+
+
+def test_an_mcap_without_index_is_read_in_full(tmp_path: Path) -> None:
+    """No summary and no chunks, as small writers make them: whole, so nothing to report."""
+    for chunked in (True, False):
+        file = tmp_path / f"plain{chunked}.mcap"
+        messages = make.steering(3.0)
+        with file.open("wb") as stream:
+            writer = McapWriter(stream, use_chunking=chunked, compression=CompressionType.NONE)
+            writer.start(profile="ros2")
+            channels = {}
+            for topic, msgtype, log_ns, data in messages:
+                if topic not in channels:
+                    channels[topic] = writer.register_channel(
+                        topic, "cdr", writer.register_schema(msgtype, "ros2msg", b"")
+                    )
+                writer.add_message(channels[topic], log_ns, data, log_ns)
+            writer.finish()
+        data = file.read_bytes()
+        footer = 8 + 9 + 20
+        without = data[:-footer] + struct.pack("<BQQQI", 2, 20, 0, 0, 0) + data[-8:]
+        file.write_bytes(without)
+        assert sound(file) == (len(messages), [])
+
+
+def test_a_lost_file_of_a_split_recording_does_not_cost_the_others(tmp_path: Path) -> None:
+    folder = make.write(tmp_path / "run", make.steering(1.0))
+    (folder / "metadata.yaml").unlink()
+    (folder / "run_1.mcap").write_bytes(b"")
+    shutil.copy(make.file_of(make.write(tmp_path / "b", make.steering(1.0), "sqlite3")), folder / "run_2.db3")
+    count, findings = sound(folder)
+    assert count == 2 * len(make.steering(1.0))
+    assert sorted(findings) == ["lost_file", "no_metadata"]
