@@ -149,7 +149,9 @@ class McapFile:
         return (run.begin_ns - self.begin_ns) / 1e9
 
     def _report(self, statement: str) -> None:
-        self.findings.append(Finding("damaged_bag", "", f"{self.path.name}: {statement}"))
+        finding = Finding("damaged_bag", "", f"{self.path.name}: {statement}")
+        if finding not in self.findings:  # a bag may be read more than once
+            self.findings.append(finding)
 
     def _read(self, offset: int, size: int) -> bytes:
         self._file.seek(offset)

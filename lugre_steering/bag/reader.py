@@ -89,7 +89,9 @@ class Bag:
         return {c.topic: c.msgtype for c in self.connections}
 
     def _say(self, finding: str, statement: str, topic: str = "") -> None:
-        self.findings.append(Finding(finding, topic, statement))
+        found = Finding(finding, topic, statement)
+        if found not in self.findings:  # a bag may be read more than once
+            self.findings.append(found)
 
     # ---------------------------------------------------------------- files
 
@@ -180,6 +182,7 @@ class Bag:
                 if connection.topic == topics.get(channel):
                     readers.setdefault(k, []).append(i)
         seen: Counter[int] = Counter()
+        self.malformed.clear()
         for messages in self.messages(None if all_messages else set(readers), messages_per_block):
             block = self._decode(messages, channels, readers)
             seen.update(dict(enumerate(np.bincount(block.channel, minlength=len(channels)).tolist())))
@@ -237,8 +240,7 @@ class Bag:
         missing = [c for c in channels if c.kind is Kind.ANGLE and c.joint and c not in result]
         for channel, topic in self._shared_topics(missing).items():
             statement = f"topic {channel.topic!r} is missing; joint {channel.joint!r} is read from {topic!r} instead"
-            if all(f.statement != statement for f in self.findings):
-                self._say("shared_topic", statement, topic)
+            self._say("shared_topic", statement, topic)
             result[channel] = topic
         return result
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import random
 import shutil
+import sqlite3
 import struct
 from pathlib import Path
 
@@ -119,6 +120,10 @@ def test_overwritten_middle_of_a_checksummed_mcap(tmp_path: Path) -> None:
     count, findings = sound(file)
     assert 0.8 * len(messages) < count < len(messages)
     assert findings == ["damaged_bag"]
+    with Bag(file) as bag:
+        for _ in range(2):  # read twice, reported once
+            assert sum(len(b.value) for b in bag.blocks(CHANNELS)) == count
+        assert [f.finding for f in bag.findings] == ["damaged_bag"]
 
 
 def test_overwritten_page_of_a_sqlite_file(tmp_path: Path, run: list[make.Message]) -> None:
@@ -171,8 +176,6 @@ def test_not_a_bag(tmp_path: Path) -> None:
 
 
 def test_an_sqlite_file_of_another_program(tmp_path: Path) -> None:
-    import sqlite3
-
     db = sqlite3.connect(tmp_path / "other.db3")
     db.execute("CREATE TABLE songs(name)")
     db.commit()
