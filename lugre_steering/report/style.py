@@ -1,0 +1,66 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How every figure of the project looks: white ground, open frame, units on every axis, captions inside the picture."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 (the backend must be chosen first)
+
+MEASURED = {"color": "black", "linestyle": "-", "linewidth": 1.4}
+IMPROVED = {"color": "#d62728", "linestyle": "--", "linewidth": 1.4}
+ORIGINAL = {"color": "#1f4fb4", "linestyle": "-.", "linewidth": 1.4}
+"""The paper's three curves: test black, improved LuGre red dashed, original LuGre blue dash-dot."""
+
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
+"""Colours for any other family of curves; told apart by readers with colour-deficient sight too (Okabe and Ito)."""
+
+RC: dict[str, Any] = {
+    "figure.dpi": 110,
+    "savefig.dpi": 130,
+    "font.size": 10,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.prop_cycle": mpl.cycler(color=SERIES),
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.3,
+}
+
+_CAPTION_SIZE = 8.5
+_LINE_INCHES = 0.165
+
+
+@contextmanager
+def figure(rows: int, columns: int, caption: str, file: Path, row_inches: float = 3.0, width: float = 10.0) -> Iterator[Any]:
+    """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to ``file``.
+
+    The figure grows with its caption, so no line of it is ever cut off.
+    """
+    lines = [line for paragraph in caption.split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]]
+    below = _LINE_INCHES * len(lines) + 0.15
+    height = rows * row_inches + below
+    with mpl.rc_context(RC):
+        fig, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False)
+        try:
+            yield axes
+            fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
+            fig.text(0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333")
+            fig.savefig(file, metadata={"Software": None})
+        finally:
+            plt.close(fig)
