@@ -17,17 +17,23 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from lugre_steering.errors import DataError
+
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Concealed:
-    """One hidden effect: its name, its size, and optionally the only bag (0 or 1) or the time [s] at which it begins."""
+    """One hidden effect: its name, its size, optionally the only bag (0 or 1) or the time [s] at which it begins."""
 
     id: str
     strength: float = 1.0
     only_bag: int | None = None
     from_time_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.id not in CATALOGUE:
+            raise DataError(f"concealed effect {self.id!r} is unknown; expected one of {', '.join(CATALOGUE)}")
 
 
 class Range(NamedTuple):
@@ -42,8 +48,8 @@ class Range(NamedTuple):
 
 DEG = float(np.pi / 180.0)
 
-# Sizes: typical values for a vehicle of this class (literature ranges of the effect notes). Torques of `parallel` effects
-# marked "per side" act on each track; others are sums of both. Rates of total torques are the mean of both tracks.
+# Sizes: typical values for a vehicle of this class. Entries marked "per side" act on each track, like everything in the
+# contact; other torques are sums of both tracks. The rate of a loss is the mean rate of both tracks.
 CONTACT: dict[str, dict[str, Range]] = {
     "backlash": {
         "width": Range(0.3 * DEG, 0.6 * DEG, "rad", scales=True),
@@ -103,7 +109,7 @@ PARALLEL: dict[str, dict[str, Range]] = {
     "yaw_inertia": {"inertia": Range(200.0, 500.0, "kg m2", scales=True)},  # per side
     "kingpin_jacking": {  # per side
         "amplitude": Range(1000.0, 2000.0, "N m", scales=True, signed=True),
-        "caster_share": Range(0.1, 0.3, "1", signed=True),
+        "caster_share": Range(0.3, 0.6, "1", signed=True),
     },
     "slope_bias": {"torque": Range(300.0, 600.0, "N m", scales=True, signed=True)},
     "soil_shear": {  # per side
@@ -133,7 +139,7 @@ LOSSES: dict[str, dict[str, Range]] = {
     },
     "line_loss_linear": {"b": Range(5e3, 1.2e4, "N m s/rad", scales=True)},
     "line_loss_quadratic": {"c": Range(5e4, 1e5, "N m s2/rad2", scales=True)},
-    "back_pressure": {"pressure": Range(1e5, 3e5, "Pa", scales=True)},
+    "back_pressure": {"pressure": Range(0.8e5, 2.2e5, "Pa", scales=True)},
     "trapped_pressure": {"share": Range(0.05, 0.12, "1", scales=True), "time": Range(4.0, 15.0, "s")},
     "body_mode": {  # unlisted: acts on the sum of both sides
         "gain": Range(0.05, 0.1, "1", scales=True),
@@ -145,7 +151,10 @@ SENSING: dict[str, dict[str, Range]] = {
     "time_delay": {"delay": Range(0.015, 0.03, "s", scales=True, signed=True)},
     "pressure_lag": {"tau": Range(0.015, 0.03, "s", scales=True)},
     "pressure_offset": {"offset": Range(5e4, 1e5, "Pa", scales=True, signed=True), "line": Range(0.0, 4.0, "index")},
-    "pressure_drift": {"drift": Range(400.0, 900.0, "Pa/s", scales=True, signed=True), "line": Range(0.0, 4.0, "index")},
+    "pressure_drift": {
+        "drift": Range(400.0, 900.0, "Pa/s", scales=True, signed=True),
+        "line": Range(0.0, 4.0, "index"),
+    },
     "relief_saturation": {"margin": Range(0.04, 0.08, "1", scales=True)},
     "moment_arm_error": {
         "a": Range(0.03, 0.08, "1/rad", scales=True, signed=True),
@@ -229,7 +238,8 @@ def _end_stop(angle: Array, low: float, high: float, k1: float, k3: float, loss:
 def end_stop(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
     """Rubber buffers of the four stops; their thresholds differ by half a degree or so."""
     shift = 0.5 * DEG
-    stops = [(-v["threshold"] + 0.4 * shift, v["threshold"] + shift), (-v["threshold"] - shift, v["threshold"] - 0.4 * shift)]
+    at = v["threshold"]
+    stops = ((-at + 0.4 * shift, at + shift), (-at - shift, at - 0.4 * shift))
     sides = zip(motion.angle, stops, strict=True)
     return np.stack([_end_stop(angle, low, high, v["k1"], v["k3"], v["loss"]) for angle, (low, high) in sides])
 
@@ -246,7 +256,7 @@ def kingpin_jacking(motion: Motion, v: Values, _rng: np.random.Generator) -> Arr
 
 
 def slope_bias(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
-    """Side force of the slope on the kingpin trail, which shortens a little as the track turns; a sum over both sides."""
+    """Side force of the slope on the kingpin trail, which shortens as the track turns; a sum over both sides."""
     return np.asarray(0.5 * v["torque"] * np.cos(motion.angle))
 
 
@@ -304,7 +314,7 @@ def _seal_memory(rate: Array, step: float, angle: float) -> Array:
 
 
 def cylinder_friction(torque: Array, motion: Motion, v: Values) -> Array:
-    """Seal friction that grows with the load, with a Stribeck bump; at rest a drawn part of it stays (0 none, 1 all)."""
+    """Seal friction that grows with the load, with a Stribeck bump; at rest a part of it stays (0 none, 1 all)."""
     rate = motion.rate.mean(axis=0)
     kept = _seal_memory(rate, motion.step, 0.05 * DEG)
     moving = np.tanh(rate / (0.15 * DEG))
@@ -327,13 +337,16 @@ def line_loss_quadratic(_torque: Array, motion: Motion, v: Values) -> Array:
 
 
 def back_pressure(_torque: Array, motion: Motion, v: Values) -> Array:
-    """Pressure at the return ports that the sensors at the valve do not see: builds with flow, gone at rest."""
+    """Pressure at the return ports that the sensors at the valve do not see: builds with flow, gone at rest.
+
+    ``pressure`` acts on the return areas times their arms, 5.75e-3 m3 for the reference vehicle, at 0.1 rad/s.
+    """
     rate = motion.rate.mean(axis=0)
-    return np.asarray(v["pressure"] * 4.4e-3 * np.tanh(rate / (1.0 * DEG)) * (0.7 + 0.3 * np.abs(rate) / 0.1))
+    return np.asarray(v["pressure"] * 5.75e-3 * np.tanh(rate / (1.0 * DEG)) * (0.7 + 0.3 * np.abs(rate) / 0.1))
 
 
 def trapped_pressure(torque: Array, motion: Motion, v: Values) -> Array:
-    """A closing valve leaks: while parked the load falls towards (1 - share) of itself; it comes back with the motion."""
+    """A closing valve leaks: while parked the load falls towards (1 - share) of itself; motion brings it back."""
     parked = np.abs(motion.rate.mean(axis=0)) < 0.15 * DEG
     return -v["share"] * torque * _leak(parked, motion.step, v["time"])
 
@@ -388,7 +401,9 @@ def sensed(pressures: Array, time: Array, hidden: Hidden) -> Array:
         delay = v["delay"] * on * (1.0 + 0.1 * np.sin(2.0 * np.pi * time / time[-1]))
         return np.stack([np.interp(time - delay, time, line) for line in pressures])
     if hidden.id == "pressure_lag":  # a slow filter behind a quicker damping orifice; their sum is tau
-        lagged = _low_pass(_low_pass(pressures, step, 0.75 * v["tau"]), step, 0.25 * v["tau"]) if v["tau"] else pressures
+        if v["tau"] == 0.0:
+            return out
+        lagged = _low_pass(_low_pass(pressures, step, 0.75 * v["tau"]), step, 0.25 * v["tau"])
         return np.asarray(pressures + on * (lagged - pressures))
     if hidden.id == "pressure_offset":  # settles within the first minute as the sensor warms up
         out[int(v["line"])] += on * v["offset"] * (1.0 - 0.15 * np.exp(-time / 20.0))

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contact of one track, patch by patch: local bristles, local temperature, and the physics hidden in them.
 
-Each roller's footprint is split into four patches with their own load, radius, bristle and temperature. A patch follows
-LuGre (Canudas de Wit et al. 1995), integrated with the implicit midpoint rule on a 1 ms grid; play and elasticity between
-sensor and track are solved with it in each step.
+Each roller's footprint is split into four patches with their own load, radius, bristle and temperature. A patch
+follows LuGre (Canudas de Wit et al. 1995), integrated with the implicit midpoint rule on a 1 ms grid; play and
+elasticity between sensor and track are solved with it in each step.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle
 
 Array = NDArray[np.float64]
 
-MIXING_S = 4.0  # local temperatures relax to the track's mean: the belt turns, lugs conduct
-NATURAL_SPREAD = 0.015  # no two lugs are equally stiff: relative standard deviation that every drawn vehicle has
+MIXING_S = 6.0  # local temperatures relax to the track's mean: the belt turns, lugs conduct
+NATURAL_SPREAD = 0.04  # no two lugs are equally stiff: relative standard deviation that every drawn vehicle has
 GATE_S = 1.0  # effects that begin late begin over this time
 _CHAIN_S = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)  # Maxwell chain: equal shares at equal log spacing give a log-time decay
 _SINK_NODES = 3
@@ -36,7 +36,7 @@ class Patches(NamedTuple):
 
 
 class Track(NamedTuple):
-    """Time series of one track, each (n,): contact torque, aligning torque [N m], contact angle [rad], temperature [degC]."""
+    """Series (n,) of one track: contact and aligning torque [N m], contact angle [rad], mean temperature [degC]."""
 
     friction: Array
     aligning: Array
@@ -103,18 +103,19 @@ def patches(sheet: Sheet, rng: np.random.Generator) -> Patches:
     """Quarter the footprint of every roller; each quarter sits at the centroid of its share of the ground pressure.
 
     Pressure is ``cos^n`` along a roller pitch and linear from the centreline to the edge. The torque share is load x
-    radius, scaled per roller so that the track's friction torque stays ``mu sum F_i r_i`` with the roller centres. Patch
-    stiffness is in proportion to that share (all patches saturate at one angle) up to a small natural deviation;
+    radius, scaled per roller so that the track's friction torque stays ``mu sum F_i r_i`` with the roller centres.
+    Patch stiffness is in proportion to that share (all patches saturate at one angle) up to a small natural deviation;
     ``graded`` is the deviation, of unit standard deviation, that the hidden effect ``distributed_contact`` scales.
     """
     pitch = float(np.min(np.diff(np.sort(sheet.roller_x_m))))
-    x = np.linspace(0.0, 0.5 * pitch, 400)
-    pressure = np.cos(np.pi * x / pitch) ** sheet.pressure_exponent
-    along = float(np.sum(x * pressure) / np.sum(pressure))
+    ahead = np.linspace(0.0, 0.5 * pitch, 400)
+    pressure = np.cos(np.pi * ahead / pitch) ** sheet.pressure_exponent
+    along = float(np.sum(ahead * pressure) / np.sum(pressure))
     across = sheet.track_width_m / 6.0
     share = []
     for roller_x, load in zip(sheet.roller_x_m, sheet.roller_load_N, strict=True):
-        radius = np.hypot(roller_x + along * np.array([-1, -1, 1, 1]), sheet.hinge_offset_m + across * np.array([-1, 1, -1, 1]))
+        x, y = roller_x + along * np.array([-1, -1, 1, 1]), sheet.hinge_offset_m + across * np.array([-1, 1, -1, 1])
+        radius = np.hypot(x, y)
         share.append(load * np.hypot(roller_x, sheet.hinge_offset_m) * radius / radius.sum())
     weight = np.concatenate(share)
     weight /= weight.sum()
@@ -139,7 +140,7 @@ def _gate(t: float, start: float) -> float:
 
 @njit(cache=True)
 def _bristles(rate: float, h: float, speed_up: float, stiffness: Array, level: Array, z: Array, out: Array) -> float:
-    """One implicit midpoint step of ``dz/dt = k (w - s |w| z / g)`` for all patches; returns the elastic torque at its end."""
+    """Implicit midpoint step of ``dz/dt = k (w - s |w| z / g)`` for all patches; the elastic torque at its end."""
     torque = 0.0
     for p in range(z.size):
         a = 0.5 * h * speed_up * stiffness[p] * abs(rate) / level[p]
@@ -151,12 +152,14 @@ def _bristles(rate: float, h: float, speed_up: float, stiffness: Array, level: A
 @njit(cache=True)
 def _wind_up(torque: float, width: float, soft: float, compliance: float, stiffening: float) -> float:
     """Angle lost between sensor and track [rad]: play with soft walls plus a spring that stiffens with load."""
-    lost = 0.5 * width * np.tanh(torque / soft)
-    return lost + compliance * stiffening * np.arcsinh(torque / stiffening)
+    lost: float = 0.5 * width * np.tanh(torque / soft) + compliance * stiffening * np.arcsinh(torque / stiffening)
+    return lost
 
 
 @njit(cache=True)
-def run_track(angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, hidden: HiddenContact) -> Any:
+def run_track(
+    angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, hidden: HiddenContact
+) -> Any:  # Track, compiled
     """Simulate one track (see ``Track``) for its clean angle (n,) on a grid of ``h`` seconds."""
     n, count = angle.size, patch.torque_share.size
     friction, aligning, contact, heat = np.zeros(n), np.zeros(n), np.empty(n), np.empty(n)
@@ -168,7 +171,7 @@ def run_track(angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch
     mean_T, flash, air = v.rubber_degC, 0.0, v.air_degC
     theta, torque = angle[0], v.aligning_torque_Nm * np.sin(angle[0])
     contact[0], heat[0], aligning[0] = theta, mean_T, torque
-    previous_rate, turned_at, way = 0.0, theta, 1.0
+    previous_rate, sensor_rate, turned_at, way = 0.0, 0.0, theta, 1.0
     rest, slipped, lugs, largest = 0.0, 0.0, 0.0, 0.0
     damping = v.damping_Nms_rad
     loaded = hidden.backlash_width > 0.0 or hidden.linkage_compliance_compliance > 0.0
@@ -187,7 +190,8 @@ def run_track(angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch
         factor *= 1.0 - hidden.wear_polishing_amount * worn
         aged = np.log(1.0 + rest / hidden.static_ageing_time)
         factor *= 1.0 + hidden.static_ageing_rate * _gate(t, hidden.static_ageing_from) * aged
-        rate = previous_rate if loaded else (angle[k] - theta) / h
+        rate = previous_rate + (angle[k] - angle[k - 1]) / h - sensor_rate  # exact when nothing gives way
+        sensor_rate = (angle[k] - angle[k - 1]) / h
         drop = (abs(rate) / v.stribeck_speed_rad_s) ** v.stribeck_exponent
         curve = factor * (v.coulomb_torque_Nm + (v.static_torque_Nm - v.coulomb_torque_Nm) * np.exp(-drop))
         hot = flash * _gate(t, hidden.flash_temperature_from)
@@ -216,18 +220,20 @@ def run_track(angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch
         viscous = hidden.viscous_friction_sigma2 * _gate(t, hidden.viscous_friction_from)
         bend = hidden.viscous_friction_bend_speed
         viscous /= np.arcsinh(0.1 / bend) / 0.1  # exact at 0.1 rad/s; less than linear above, more below (Eyring)
-        elastic_before = 0.0
+        elastic_before, whole = 0.0, 0.0
         for p in range(count):
             elastic_before += stiffness[p] * z[p]
+            whole += stiffness[p]
+        lossy = damping / np.sqrt(whole * v.stiffness_Nm_rad)  # sigma1 ~ sqrt(sigma0(T)), shared like the stiffness
         width = hidden.backlash_width * _gate(t, hidden.backlash_from)
         compliance = hidden.linkage_compliance_compliance * _gate(t, hidden.linkage_compliance_from)
         # The rate of the contact: the sensor's, unless something between the two gives way under the torque.
         low_rate, high_rate, low_error, high_error = 0.0, 0.0, 0.0, 0.0
         bracketed, width_of_search = 0, 0.003
-        trial = rate - width_of_search if loaded else rate
+        trial = rate - width_of_search if loaded else (angle[k] - theta) / h
         for _ in range(60):
             elastic = _bristles(trial, h, speed_up, stiffness, level, z, z_next)
-            part = (elastic * (1.0 - relaxed)) + damping * (elastic - elastic_before) / (h * v.stiffness_Nm_rad)
+            part = (elastic * (1.0 - relaxed)) + lossy * (elastic - elastic_before) / h
             part += viscous * np.arcsinh(trial / bend)
             torque = part + v.aligning_torque_Nm * np.sin(theta + h * trial)
             if not loaded:
@@ -270,13 +276,14 @@ def run_track(angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch
         lost_share *= (abs(rate) / 0.1) ** 0.1  # quicker rubbing leaves relatively more heat in the ground
         pull = hidden.carcass_heat_sink_conductance * _gate(t, hidden.carcass_heat_sink_from)
         rise = hidden.ambient_drift_rise * _gate(t, hidden.ambient_drift_from)
-        air = v.air_degC + rise * (1.0 - np.exp(-max(t - max(hidden.ambient_drift_from, 0.0), 0.0) / hidden.ambient_drift_time))
+        since = max(t - max(hidden.ambient_drift_from, 0.0), 0.0)
+        air = v.air_degC + rise * (1.0 - np.exp(-since / hidden.ambient_drift_time))
         stretch = 0.0
         for p in range(count):
             speed = (z_next[p] - z[p]) / h
             slip += patch.torque_share[p] * abs(rate - speed)
             local = 0.5 * stiffness[p] * (z[p] + z_next[p]) * (rate - speed)
-            local += damping * stiffness[p] / v.stiffness_Nm_rad * speed * rate
+            local += lossy * stiffness[p] * speed * rate
             power += local
             T[p] += h * (
                 ((1.0 - lost_share) * local * count - v.heat_loss_W_K * (T[p] - air) - pull * (mean_T - sink[0]))
@@ -299,7 +306,8 @@ def run_track(angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch
         slipped += h * slip * _gate(t, hidden.wear_polishing_from)
         lugs += h * abs(rate) * (np.sign(rate) - lugs) / hidden.direction_asymmetry_turn_angle
         for j in range(chain.size):
-            chain[j] += h * ((1.0 - chain[j]) / _CHAIN_S[j] - abs(rate) * chain[j] / hidden.stress_relaxation_erase_angle)
+            erased = abs(rate) * chain[j] / hidden.stress_relaxation_erase_angle
+            chain[j] += h * ((1.0 - chain[j]) / _CHAIN_S[j] - erased)
             if t < hidden.stress_relaxation_from:
                 chain[j] = 0.0
         heated = hidden.flash_temperature_rise * np.sqrt(max(power, 0.0) / 3000.0)

@@ -15,7 +15,7 @@ BACK_PRESSURE_PA = 0.7e6
 
 
 def moment_arm(cylinder: Cylinder, angle: Array) -> Array:
-    """dL/dtheta [m] of a cylinder between its chassis pivot and the turning knuckle pivot, exact, shape as ``angle`` [rad]."""
+    """Exact dL/dtheta [m] of a cylinder from chassis pivot to turning knuckle pivot, shape as ``angle`` [rad]."""
     x0, y0 = cylinder.knuckle_m
     x, y = x0 * np.cos(angle) - y0 * np.sin(angle), x0 * np.sin(angle) + y0 * np.cos(angle)
     along_x, along_y = x - cylinder.chassis_m[0], y - cylinder.chassis_m[1]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP_S = 1.0e-3
-LIMIT_RAD = float(np.deg2rad(30.1))  # mean steering angle at which the inner track stands at about 35 and the outer at 26 deg
+LIMIT_RAD = float(np.deg2rad(30.1))  # mean angle: the inner track then stands at about 35, the outer at 26 deg
 
 
 def ackermann(mean: Array, wheelbase_m: float, kingpin_distance_m: float) -> Array:
@@ -70,8 +70,8 @@ def chirp(rng: np.random.Generator) -> Array:
     frequency = np.where(t < turn, slow + (fast - slow) * t / turn, fast)
     size = np.where(t < turn, 0.97, 0.97 * np.exp(-(t - turn) / rng.uniform(6.0, 10.0)))
     largest = np.deg2rad(10.5) / (2.0 * np.pi * frequency)
-    size = np.minimum(size * LIMIT_RAD, largest) * np.minimum(t / 2.0, 1.0)
-    return size * np.sin(2.0 * np.pi * np.cumsum(frequency) * STEP_S)
+    size = np.minimum(size * LIMIT_RAD, largest) * np.minimum(t / 8.0, 1.0)
+    return np.asarray(size * np.sin(2.0 * np.pi * np.cumsum(frequency) * STEP_S))
 
 
 def decaying(rng: np.random.Generator) -> Array:

@@ -16,7 +16,7 @@ LOWEST_DEGC, HIGHEST_DEGC, STEP_K = -30.0, 100.0, 0.05  # range in which the for
 
 
 class RubberTable(NamedTuple):
-    """Storage modulus and E''/|E*|, both relative to the reference temperature, on a grid of STEP_K from LOWEST_DEGC."""
+    """Storage modulus and E''/|E*|, relative to the reference temperature, on a grid of STEP_K from LOWEST_DEGC."""
 
     storage: Array
     loss_ratio: Array

@@ -41,7 +41,8 @@ def draw_habits(rng: np.random.Generator) -> Habits:
 def sampling(duration_s: float, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
     """Instants at which a sensor samples (m,) [s] and the stamps (m,) [s] its messages carry."""
     grid = np.arange(0.0, duration_s - PERIOD_S, PERIOD_S)
-    instants = grid + rng.uniform(0.0, 0.1 * PERIOD_S) + np.clip(rng.normal(0.0, habits.jitter_s, grid.size), -2e-3, 2e-3)
+    jitter = np.clip(rng.normal(0.0, habits.jitter_s, grid.size), -2e-3, 2e-3)
+    instants = grid + rng.uniform(0.0, 0.1 * PERIOD_S) + jitter
     kept = rng.random(grid.size) >= habits.lost_share
     instants = np.maximum(instants[kept], 0.0)
     return instants, instants + rng.uniform(0.0, 5e-5, instants.size)

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The second simulator: recordings of a drawn vehicle with known hidden physics, made without the estimator's code.
 
-A case is two bags of one vehicle. It is a pure function of the sheet and of ``Case``; two cases that differ only in their
-effects share vehicle, manoeuvres and sensor noise. Nothing about the effects enters the bags; the truth is written apart.
+A case is two bags of one vehicle. It is a pure function of the sheet and of ``Case``; two cases that differ only in
+their effects share vehicle, manoeuvres and sensor noise. Nothing about the effects enters the bags; the truth is
+written apart.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import json
 import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +54,8 @@ class Case:
 class BagData:
     """One bag and its truth. ``angles`` left, right; ``pressures`` in the sheet's order of lines.
 
-    On the clean 100 Hz grid ``time`` (n,) [s]: the torque [N m] that noise-free sensors would show with every effect, with
-    none, and the part that each effect adds. ``intervals`` [s]: where each effect acts, holds included.
+    On the clean 100 Hz grid ``time`` (n,) [s]: the torque [N m] that noise-free sensors would show with every effect,
+    with none, and the part that each effect adds. ``intervals`` [s]: where each effect acts, holds included.
     """
 
     manoeuvre: str
@@ -74,6 +76,7 @@ class CaseData:
     case: Case
     sheet: Sheet
     vehicle: TrueVehicle
+    patches: tuple[Patches, Patches]
     hidden: tuple[Hidden, ...]
     bags: tuple[BagData, ...]
 
@@ -96,23 +99,24 @@ def simulate_case(case: Case, sheet: Sheet) -> CaseData:
     vehicle_rng, effect_rng, logger_rng = (np.random.default_rng((case.seed, k)) for k in range(3))
     vehicle = draw_vehicle(sheet, vehicle_rng, case.parameter_spread)
     both = (patches(sheet, vehicle_rng), patches(sheet, vehicle_rng))
-    share = np.where([line.startswith("aux") for line in sheet.lines], vehicle_rng.uniform(0.9, 1.0), 1.0)
+    share = np.array([vehicle_rng.uniform(0.9, 1.0) if line.startswith("aux") else 1.0 for line in sheet.lines])
     flow = vehicle_rng.uniform(0.0, 8e5)
     hidden = tuple(_place_patch(conceal.draw(wanted, effect_rng), effect_rng) for wanted in case.effects)
     habits = draw_habits(logger_rng)
     kinds = case.manoeuvres or tuple(str(kind) for kind in logger_rng.choice(list(manoeuvres.KINDS), 2, replace=False))
-    benches = []
+    benches: list[_Bench] = []
     for index, kind in enumerate(kinds):
         mean = manoeuvres.mean_angle(kind, np.random.default_rng((case.seed, 10 + index)))
         angles = manoeuvres.ackermann(mean, sheet.wheelbase_m, sheet.kingpin_distance_m)
-        time = np.arange(mean.size) * manoeuvres.STEP_S
+        time = np.arange(mean.size, dtype=np.float64) * np.float64(manoeuvres.STEP_S)
         benches.append(_Bench(sheet, both, time, angles, share, flow, (case.seed, 20 + index)))
     hidden = tuple(_set_ceiling(effect, vehicle, benches) for effect in hidden)
     bags = []
     for index, (kind, bench) in enumerate(zip(kinds, benches, strict=True)):
         rng = np.random.default_rng((case.seed, 30 + index))
-        bags.append(_bag(kind, bench, vehicle, [h for h in hidden if h.only_bag in (None, index)], case.noise, habits, rng))
-    return CaseData(case, sheet, vehicle, hidden, tuple(bags))
+        here = [effect for effect in hidden if effect.only_bag in (None, index)]
+        bags.append(_bag(kind, bench, vehicle, here, case.noise, habits, rng))
+    return CaseData(case, sheet, vehicle, both, hidden, tuple(bags))
 
 
 def _place_patch(effect: Hidden, rng: np.random.Generator) -> Hidden:
@@ -166,7 +170,7 @@ def _bag(
 def _pressures(
     bench: _Bench, vehicle: TrueVehicle, hidden: list[Hidden], tracks: dict[tuple[str, ...], tuple[Track, ...]]
 ) -> Array:
-    """Noise-free pressures (lines, n) [Pa] as the line sensors see them; ``tracks`` remembers contact runs by effects."""
+    """Noise-free pressures (lines, n) [Pa] as the line sensors see them; ``tracks`` remembers contact runs."""
     time, step = bench.time, manoeuvres.STEP_S
     angle, arm_factor = bench.measured, None
     for effect in hidden:
@@ -180,8 +184,11 @@ def _pressures(
     before = [h for h in hidden if h.id in conceal.ANGLE or h.id in conceal.CONTACT]
     key = tuple(h.id for h in before)
     if key not in tracks:
-        fields = {f"{h.id}_{name}": value for h in before if h.id in conceal.CONTACT for name, value in h.values.items()}
-        fields |= {f"{h.id}_from": h.start_s for h in before if h.id in conceal.CONTACT}
+        fields: dict[str, float] = {}
+        for effect in before:
+            if effect.id in conceal.CONTACT:
+                fields |= {f"{effect.id}_{name}": value for name, value in effect.values.items()}
+                fields[f"{effect.id}_from"] = effect.start_s
         inside, rubber = HiddenContact(**fields), rubber_table(vehicle.reference_degC)
         tracks[key] = tuple(
             run_track(np.ascontiguousarray(side), step, vehicle, rubber, cells, inside)
@@ -198,7 +205,8 @@ def _pressures(
     torque = sides.sum(axis=0)
     for effect in hidden:
         if effect.id in conceal.LOSS_LAWS:
-            torque = torque + conceal.gate(time, effect.start_s) * conceal.LOSS_LAWS[effect.id](torque, motion, effect.values)
+            loss = conceal.LOSS_LAWS[effect.id](torque, motion, effect.values)
+            torque = torque + conceal.gate(time, effect.start_s) * loss
     gain = hydraulics.line_gain(bench.sheet, angle, arm_factor)
     flow = bench.return_flow_Pas * np.abs(motion.rate.mean(axis=0))
     pressures = hydraulics.line_pressures(torque, gain, bench.line_share, flow)
@@ -223,12 +231,15 @@ def active_intervals(time: Array, part: Array) -> list[tuple[float, float]]:
 
 
 def removable_variance(bag: BagData) -> float:
-    """Variance [N2 m2] of what the effects add to the noise-free torque of a bag: all that a perfect diagnosis removes."""
-    return float(np.var(bag.torque - bag.torque_without))
+    """Mean square [N2 m2] of what the effects add to the noise-free torque of a bag: what a perfect diagnosis removes.
+
+    Not taken about its mean: the baseline has no free constant, so a constant torque is error that can be removed.
+    """
+    return float(np.mean((bag.torque - bag.torque_without) ** 2))
 
 
 def noise_variance(data: CaseData, bag: BagData) -> float:
-    """Variance [N2 m2] of the measured cylinder torque about the noise-free one: the sensors' share, ripple included."""
+    """Variance [N2 m2] of the measured cylinder torque about the noise-free one: pressure noise, ripple included."""
     gain = hydraulics.line_gain(data.sheet, bag.clean_angles)
     seen = np.stack([np.interp(bag.time, samples.time, samples.value) for samples in bag.pressures])
     return float(np.var(hydraulics.torque_of(seen, gain) - bag.torque))
@@ -245,48 +256,53 @@ def recalibrated_variance(data: CaseData) -> float:
 
     Linear: the added torque is projected off the tangents of this simulator's own baseline (finite differences of 1 %).
     """
-    case, sheet = data.case, data.sheet
-    rng = np.random.default_rng((case.seed, 0))
-    draw_vehicle(sheet, rng, case.parameter_spread)
-    both = (patches(sheet, rng), patches(sheet, rng))
     added = np.concatenate([bag.torque - bag.torque_without for bag in data.bags])
+    nothing_moved = _baseline(data, data.vehicle)
     columns = []
     for name in _CALIBRATED:
         moved = data.vehicle._replace(**{name: 1.01 * getattr(data.vehicle, name)})
-        columns.append(np.concatenate([_baseline(bag, moved, both) - _baseline(bag, data.vehicle, both) for bag in data.bags]))
+        columns.append(_baseline(data, moved) - nothing_moved)
     tangents = np.stack(columns, axis=1)
     tangents /= np.linalg.norm(tangents, axis=0)
     left = added - tangents @ np.linalg.lstsq(tangents, added, rcond=1e-9)[0]
     return float(np.mean(left**2))
 
 
-def _baseline(bag: BagData, vehicle: TrueVehicle, both: tuple[Patches, Patches]) -> Array:
+def _baseline(data: CaseData, vehicle: TrueVehicle) -> Array:
+    """Torque of all bags in one row, nothing hidden, for another vehicle on the same clean angles."""
     rubber = rubber_table(vehicle.reference_degC)
-    tracks = [
-        run_track(np.ascontiguousarray(angle), PERIOD_S, vehicle, rubber, cells, HiddenContact())
-        for angle, cells in zip(bag.clean_angles, both, strict=True)
-    ]
-    return np.asarray(sum(track.friction + track.aligning for track in tracks))
+    torques = []
+    for bag in data.bags:
+        torque = np.zeros(bag.time.size)
+        for angle, cells in zip(bag.clean_angles, data.patches, strict=True):
+            track = run_track(np.ascontiguousarray(angle), PERIOD_S, vehicle, rubber, cells, HiddenContact())
+            torque += track.friction + track.aligning
+        torques.append(torque)
+    return np.concatenate(torques)
 
 
 def write_case(data: CaseData, folder: Path, truth_folder: Path, name: str = "run") -> list[Path]:
-    """Write ``folder/bags/<name>_a``, ``_b`` and ``folder/vehicle.yaml`` with its table; the truth goes to ``truth_folder``.
+    """Write ``folder/bags/<name>_a``, ``_b`` and ``folder/vehicle.yaml`` with its table; the truth to ``truth_folder``.
 
     Storage is mcap or sqlite3 by the seed. ``truth.json`` holds values and intervals, ``truth.npz`` the clean torques.
     """
-    bags, truth = folder / "bags", {}
+    bags = folder / "bags"
+    truth: dict[str, Any] = {}
     bags.mkdir(parents=True, exist_ok=True)
     truth_folder.mkdir(parents=True, exist_ok=True)
     sheet_file, table = data.sheet.files
     shutil.copyfile(sheet_file, folder / "vehicle.yaml")
     shutil.copyfile(table, folder / table.name)
     plugin = StoragePlugin.SQLITE3 if data.case.seed % 3 == 0 else StoragePlugin.MCAP
+    epoch_s = EPOCH_S + 1000 * (data.case.seed % 1000)
     paths = []
     for letter, bag in zip("ab", data.bags, strict=True):
         path = bags / f"{name}_{letter}"
-        _write_bag(path, data.sheet, bag, EPOCH_S + 1000 * (data.case.seed % 1000) + (500 if letter == "b" else 0), plugin)
+        _write_bag(path, data.sheet, bag, epoch_s + (500 if letter == "b" else 0), plugin)
         paths.append(path)
-        truth |= {f"{letter}_time": bag.time, f"{letter}_torque": bag.torque, f"{letter}_torque_without": bag.torque_without}
+        truth[f"{letter}_time"] = bag.time
+        truth[f"{letter}_torque"] = bag.torque
+        truth[f"{letter}_torque_without"] = bag.torque_without
         truth |= {f"{letter}_{effect}": part for effect, part in bag.effect_torque.items()}
     np.savez_compressed(truth_folder / "truth.npz", **truth)
     (truth_folder / "truth.json").write_text(json.dumps(_truth(data, name), indent=1), encoding="utf-8")
@@ -301,10 +317,7 @@ def _truth(data: CaseData, name: str) -> dict[str, object]:
         "effects": [
             {
                 "id": effect.id,
-                "parameters": {
-                    key: {"value": value, "unit": conceal.CATALOGUE[effect.id][key].unit if key != "ceiling" else "Pa"}
-                    for key, value in effect.values.items()
-                },
+                "parameters": {key: _quantity(data, effect, key) for key in effect.values},
                 "only_bag": effect.only_bag,
                 "start_s": max(effect.start_s, 0.0),
             }
@@ -323,11 +336,17 @@ def _truth(data: CaseData, name: str) -> dict[str, object]:
     }
 
 
+def _quantity(data: CaseData, effect: Hidden, key: str) -> dict[str, object]:
+    if key == "line":
+        return {"value": data.sheet.lines[int(effect.values[key])], "unit": "name"}
+    unit = "Pa" if key == "ceiling" else conceal.CATALOGUE[effect.id][key].unit
+    return {"value": effect.values[key], "unit": unit}
+
+
 def _write_bag(path: Path, sheet: Sheet, bag: BagData, epoch_s: int, plugin: StoragePlugin) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
-    kinds = {name: store.types[name] for name in ("sensor_msgs/msg/JointState", "sensor_msgs/msg/FluidPressure")}
     stamp, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
-    joint, fluid = kinds["sensor_msgs/msg/JointState"], kinds["sensor_msgs/msg/FluidPressure"]
+    joint, fluid = store.types["sensor_msgs/msg/JointState"], store.types["sensor_msgs/msg/FluidPressure"]
     none = np.zeros(0)
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         queue = []
@@ -335,7 +354,8 @@ def _write_bag(path: Path, sheet: Sheet, bag: BagData, epoch_s: int, plugin: Sto
             topic = writer.add_connection(f"/steering/{side}/joint_state", joint.__msgtype__, typestore=store)
             queue.append((topic, f"{side}_track_steer_joint", samples))
         for line, samples in zip(sheet.lines, bag.pressures, strict=True):
-            queue.append((writer.add_connection(f"/steering/pressure/{line}", fluid.__msgtype__, typestore=store), "", samples))
+            topic = writer.add_connection(f"/steering/pressure/{line}", fluid.__msgtype__, typestore=store)
+            queue.append((topic, "", samples))
         nanoseconds = [epoch_s * 10**9 + np.round(samples.time * 1e9).astype(np.int64) for _, _, samples in queue]
         which = np.repeat(np.arange(len(queue)), [ns.size for ns in nanoseconds])
         within = np.concatenate([np.arange(ns.size) for ns in nanoseconds])

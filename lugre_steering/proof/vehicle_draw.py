@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the proof simulator knows about a vehicle: the sheet's measured geometry, and true values drawn around its nominal ones.
+"""What the proof simulator knows about a vehicle: the sheet's geometry, and true values drawn around its nominal ones.
 
 The simulator reads the sheet by itself, so that a mistake in the estimator's reader cannot hide in both.
 """
@@ -105,6 +105,7 @@ def _sheet(path: Path, data: dict[str, Any]) -> Sheet:
     lever = float(np.sum(roller_load * np.hypot(roller_x, track["hinge_offset_m"])))
     stiffness = float(np.rad2deg(friction["stiffness_Nm_per_deg"]))
     area = rubber["contact_area_m2"]
+    inclined = float(np.sin(np.deg2rad(axle["kingpin_inclination_deg"])))
     nominal = TrueVehicle(
         static_torque_Nm=friction["static"] * lever,
         coulomb_torque_Nm=friction["coulomb"] * lever,
@@ -114,7 +115,7 @@ def _sheet(path: Path, data: dict[str, Any]) -> Sheet:
         stribeck_exponent=friction["stribeck_exponent"],
         heat_capacity_J_K=rubber["density_kg_m3"] * rubber["specific_heat_J_kgK"] * area * rubber["tread_thickness_m"],
         heat_loss_W_K=rubber["heat_transfer_W_m2K"] * area,
-        aligning_torque_Nm=load * axle["kingpin_lever_arm_m"] * float(np.sin(np.deg2rad(axle["kingpin_inclination_deg"]))),
+        aligning_torque_Nm=load * axle["kingpin_lever_arm_m"] * inclined,
         reference_degC=friction["reference_temperature_degC"],
         rubber_degC=data["initial"]["rubber_temperature_degC"],
         air_degC=data["initial"]["air_temperature_degC"],
