@@ -20,13 +20,16 @@ def heat(temperature: float, energy: float, dt: float, capacity: float, cooling:
 
 
 @njit
-def advance_heat(p, s, energy, dt):
+def advance_heat(p, s, energy, dt, effects):
     """Temperatures after friction released ``energy`` [J] in ``dt`` [s]: tread and, as effects, carcass and flash.
 
     heat_partition: (1 - ground_share) of it enters the rubber. carcass_heat_sink: a second node of its own capacity
     behind the tread, coupled by a conductance. flash_temperature: low-passed power times a resistance is added where
     friction reads the temperature. ambient_drift: the air warms linearly.
     """
+    if not effects:
+        s.temperature = heat(s.temperature, energy, dt, p.heat_capacity, p.cooling, s.air_temperature)
+        return
     energy *= 1.0 - p.heat_partition_ground_share
     air = s.air_temperature + p.ambient_drift_rate * s.time
     s.temperature = heat(s.temperature, energy, dt, p.heat_capacity, p.cooling, air)

@@ -67,6 +67,7 @@ STATE = np.dtype(
         ("gap", np.float64),  # position inside the backlash [rad]
         ("z", np.float64),  # bristle deflection [rad]
         ("elements", np.float64, (ELEMENTS,)),  # bristles of the distributed contact [rad]
+        ("element_shares", np.float64, (ELEMENTS,)),  # their shares of the stiffness, set at the start
         ("temperature", np.float64),  # tread rubber [degC]
         ("carcass_temperature", np.float64),  # second thermal node [degC]
         ("flash_power", np.float64),  # low-passed friction power [W]

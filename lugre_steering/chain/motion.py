@@ -10,14 +10,14 @@ from numba import njit
 
 
 @njit
-def contact_increment(p, s, theta, stiffness, length):
+def contact_increment(p, s, theta, stiffness, length, effects):
     """Angle [rad] by which the contact turns when the corrected steering angle reaches ``theta``.
 
     linkage_compliance: contact = theta - c M (1 + stiffening ...), solved with the tangent stiffness, so stable for any
     c. backlash: a gap of ``width`` that opens when the bristle torque has fallen to zero.
     ``length`` is the presliding length g / sigma_0 [rad].
     """
-    if p.linkage_compliance_compliance != 0.0:
+    if effects and p.linkage_compliance_compliance != 0.0:
         compliance = p.linkage_compliance_compliance / (1.0 + p.linkage_compliance_stiffening * abs(s.torque))
         wanted = theta - compliance * s.torque - s.link_angle
         saturation = math.copysign(s.z, s.z * wanted) / length
@@ -25,7 +25,7 @@ def contact_increment(p, s, theta, stiffness, length):
     else:
         d_theta = theta - s.link_angle
     s.link_angle += d_theta
-    if p.backlash_width > 0.0 and d_theta != 0.0:
+    if effects and p.backlash_width > 0.0 and d_theta != 0.0:
         d_theta = through_gap(p, s, d_theta, length)
     return d_theta
 

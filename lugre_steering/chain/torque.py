@@ -8,6 +8,8 @@ import math
 
 from numba import njit
 
+from lugre_steering.chain.compiled import exp
+
 STOP_TRAVEL_RAD = 0.002
 """Travel over which an end stop changes between its loading and unloading branch."""
 REST_RATE_RAD_S = 2e-3
@@ -27,8 +29,8 @@ def parallel_torque(p, s, d_theta, alpha):
     """Effects that act beside the contact [N m]: end_stop, soil_shear, yaw_inertia, kingpin_jacking, slope_bias."""
     torque = p.slope_bias_torque / p.sides + p.yaw_inertia_inertia * alpha
     if p.kingpin_jacking_amplitude != 0.0 or p.kingpin_jacking_second_harmonic != 0.0:
-        torque += p.kingpin_jacking_amplitude * math.sin(s.theta)
-        torque += p.kingpin_jacking_second_harmonic * math.sin(2.0 * s.theta)
+        sine = math.sin(s.theta)
+        torque += sine * (p.kingpin_jacking_amplitude + p.kingpin_jacking_second_harmonic * 2.0 * math.cos(s.theta))
     if p.end_stop_stiffness != 0.0 or p.end_stop_cubic_stiffness != 0.0:
         torque += end_stop(p, s, d_theta)
     if p.soil_shear_torque != 0.0:
@@ -83,7 +85,7 @@ def losses(p, s, omega, d_theta, load):
         moving = math.tanh(omega / REST_RATE_RAD_S)
         s.seal = max(-1.0, min(1.0, s.seal + d_theta / SEAL_TRAVEL_RAD))
         level = p.cylinder_friction_coulomb / p.sides + p.cylinder_friction_load_share * abs(load)
-        bump = 1.0 + p.cylinder_friction_breakaway * math.exp(-((omega / 0.02) ** 2))
+        bump = 1.0 + p.cylinder_friction_breakaway * exp(-((omega / 0.02) ** 2))
         torque += level * bump * (p.cylinder_friction_holding * s.seal + (1.0 - p.cylinder_friction_holding) * moving)
         torque += p.back_pressure_torque / p.sides * moving
     return torque
@@ -99,5 +101,5 @@ def hydraulic_limits(p, s, torque):
         limit = p.relief_saturation_ceiling / p.sides
         torque = max(-limit, min(limit, torque))
     if p.trapped_pressure_share != 0.0:
-        torque *= 1.0 - p.trapped_pressure_share * (1.0 - math.exp(-s.dwell / p.trapped_pressure_time_constant))
+        torque *= 1.0 - p.trapped_pressure_share * (1.0 - exp(-s.dwell / p.trapped_pressure_time_constant))
     return torque
