@@ -1,0 +1,124 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings on the time base of diagnosis: smoothed motion, measured torque, and what its noise is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lugre_steering.chain.hydraulics import gauge_offset, line_gains
+from lugre_steering.diagnosis.smoother import smooth_angle
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Array, Recording, Signal
+from lugre_steering.vehicle import Vehicle
+
+MAX_RATE_HZ = 125.0
+GAP_S = 0.25
+
+
+@dataclass(frozen=True)
+class Run:
+    """One bag, resampled on a uniform clock of n samples; sides first, lines second, time last.
+
+    ``side_torque`` (sides, n) is each side's share of the measured torque, ``gains`` (sides, lines, n) torque per pressure,
+    ``sigma`` (n,) standard deviation of the measured torque from the sheet's pressure noise, ``valid`` (n,) false in gaps.
+    """
+
+    name: str
+    time: Array
+    theta: Array
+    omega: Array
+    alpha: Array
+    gains: Array
+    pressure: Array
+    side_torque: Array
+    measured: Array
+    sigma: Array
+    valid: np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+    @property
+    def torque_per_line(self) -> Array:
+        """Vehicle torque per pressure of each line [N m/Pa] (lines, n)."""
+        summed: Array = self.gains.sum(axis=0)
+        return summed
+
+
+def motion(time: Array, theta: Array) -> tuple[Array, Array]:
+    """Rate and acceleration (sides, n) of smoothed angles by central differences."""
+    omega = np.gradient(theta, time, axis=1)
+    return omega, np.gradient(omega, time, axis=1)
+
+
+def angle_noise(vehicle: Vehicle) -> float:
+    """Standard deviation of one angle sample [rad], quantisation included."""
+    sensors = vehicle.sensors
+    return float(np.radians(np.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / np.sqrt(12.0))))
+
+
+def prepare(recording: Recording, vehicle: Vehicle) -> Run:
+    """Common clock, smoothed angles, measured torque. Raises DataError when a needed channel is missing or too short."""
+    signals = {f"angle/{side}": recording.angle.get(side) for side in vehicle.sides}
+    lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
+    signals |= {f"pressure/{line}": recording.pressure.get(line) for line in lines}
+    if vehicle.torque_sensor is not None:
+        signals["measured_torque"] = recording.measured_torque
+    for name, signal in signals.items():
+        if signal is None or signal.time_s.size < 20:
+            found = "nothing" if signal is None else f"{signal.time_s.size} samples"
+            raise DataError(f"{recording.name}: channel {name}: got {found}, expected at least 20 samples")
+    present = {name: signal for name, signal in signals.items() if signal is not None}
+    time, valid = _clock(recording.name, present)
+    noise = angle_noise(vehicle)
+    theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), noise) for side in vehicle.sides])
+    omega, alpha = motion(time, theta)
+    if vehicle.hydraulics is not None:
+        gains = line_gains(vehicle, theta)
+        pressure = np.array([_at(time, present[f"pressure/{line}"]) for line in lines]) - gauge_offset(vehicle)
+        sigma = vehicle.sensors.pressure_noise_Pa * np.sqrt((gains.sum(axis=0) ** 2).sum(axis=0))
+    else:
+        assert vehicle.torque_sensor is not None
+        gains = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
+        pressure = _at(time, present["measured_torque"])[None, :]
+        sigma = np.full(time.size, vehicle.torque_sensor.noise_Nm)
+    side_torque = np.einsum("slt,lt->st", gains, pressure)
+    floor = 1e-3 * float(np.std(side_torque.sum(axis=0))) + 1e-12
+    return Run(
+        name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
+        side_torque=side_torque, measured=side_torque.sum(axis=0), sigma=np.maximum(sigma, floor), valid=valid,
+    )  # fmt: skip
+
+
+def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    """Uniform clock over the span that all channels share, at the slowest channel's rate; false where any has a gap."""
+    start = max(signal.time_s[0] for signal in signals.values())
+    end = min(signal.time_s[-1] for signal in signals.values())
+    step = max(float(np.median(np.diff(signal.time_s))) for signal in signals.values())
+    step = max(step, 1.0 / MAX_RATE_HZ)
+    count = int((end - start) / step) + 1 if end > start else 0
+    if count < 20:
+        raise DataError(f"{name}: the channels share {max(end - start, 0.0):.2f} s, expected at least {20 * step:.1f} s")
+    time = start + step * np.arange(count)
+    valid = np.ones(count, bool)
+    for signal in signals.values():
+        after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
+        valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(GAP_S, 3.0 * step)
+    return time, valid
+
+
+def _at(time: Array, signal: Signal) -> Array:
+    """Signal on the clock: linear interpolation; a faster signal is averaged over each step first, so nothing aliases."""
+    step = time[1] - time[0]
+    spacing = float(np.median(np.diff(signal.time_s)))
+    value = signal.value
+    width = round(step / spacing)
+    if width > 1:
+        kernel = np.ones(width) / width
+        value = np.convolve(np.pad(value, (width // 2, width - 1 - width // 2), mode="edge"), kernel, mode="valid")
+    return np.interp(time, signal.time_s, value)
+
+
+def prepare_all(recordings: Sequence[Recording], vehicle: Vehicle) -> list[Run]:
+    return [prepare(recording, vehicle) for recording in recordings]

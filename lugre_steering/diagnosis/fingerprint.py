@@ -1,0 +1,198 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Fingerprints: the trace each effect would leave, after everything that recalibration can imitate has been taken out.
+
+Frisch-Waugh-Lovell: a signature projected off the tangent space of the calibration keeps exactly the part that can be seen;
+the rest is masked. The residual is compared with that part only.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, Values, in_threads
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.entry import Effect
+from lugre_steering.recording import Array
+
+WINDOW_EDGES = 9
+CEILINGS = (0.8, 0.88, 0.94, 0.98)
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate against a residual: energy it explains, share of the residual's energy, masked share, linear values.
+
+    ``explained`` and ``null_explained`` are in units of the noise variance; ``coefficients`` multiply the parameter scales.
+    """
+
+    candidate: Candidate
+    explained: float
+    share: float
+    masked_share: float
+    coefficients: tuple[float, ...]
+    null_explained: Array
+    trials: int = 1
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Starting values for the non-linear fit."""
+        free = {
+            name: c * self.candidate.parameter(name).scale
+            for name, c in zip(self.candidate.free, self.coefficients, strict=True)
+        }
+        return {**dict(self.candidate.shapes), **free}
+
+
+def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
+    """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
+    found: list[Candidate] = []
+    for effect in CATALOGUE.values():
+        if not effect.observable or effect.id in without or not _applies(problem, effect):
+            continue
+        free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
+        if effect.id == "surface_patch":
+            found += _windows(problem, effect)
+        elif effect.id == "relief_saturation":
+            top = float(np.max(np.abs(problem.measured)))
+            found += [Candidate(effect, (("ceiling", top * c),)) for c in CEILINGS]
+        elif effect.per_line:
+            lines = problem.vehicle.hydraulics.lines if problem.vehicle.hydraulics is not None else ()
+            found += [Candidate(effect, (), line, free=free) for line in lines]
+        else:
+            grids = [
+                [(p.name, value * _unit(problem, p.relative_to)) for value in p.grid] for p in effect.parameters if p.is_shape
+            ]
+            found += [Candidate(effect, shapes, free=free) for shapes in itertools.product(*grids)]
+    return found
+
+
+def _applies(problem: Problem, effect: Effect) -> bool:
+    """Thermal effects need rubber; hydraulic ones need hydraulics; nothing else is excluded beforehand."""
+    if effect.stage == "thermal" and problem.vehicle.rubber is None:
+        return False
+    return not (effect.id in ("moment_arm_error", "relief_saturation") and problem.vehicle.hydraulics is None)
+
+
+def _unit(problem: Problem, relative_to: str) -> float:
+    if relative_to == "max_angle":
+        return max(float(np.max(np.abs(run.theta))) for run in problem.runs)
+    if relative_to == "slip":
+        return max(float(np.sum(np.abs(np.diff(run.theta[0])))) for run in problem.runs)
+    if relative_to == "duration":
+        return max(float(run.time[-1]) for run in problem.runs)
+    return 1.0
+
+
+def _windows(problem: Problem, effect: Effect) -> list[Candidate]:
+    """Angle windows shared by all bags, and time windows of single bags."""
+    free = ("change",)
+    low = min(float(run.theta.min()) for run in problem.runs)
+    high = max(float(run.theta.max()) for run in problem.runs)
+    edges = np.linspace(low - 0.01, high + 0.01, WINDOW_EDGES)
+    found = [
+        Candidate(effect, (("angle_low", float(a)), ("angle_high", float(b))), free=free)
+        for a, b in itertools.combinations(edges, 2)
+        if b - a < 0.99 * (edges[-1] - edges[0])
+    ]
+    for bag, run in enumerate(problem.runs):
+        times = np.linspace(run.time[0] - 1.0, run.time[-1] + 1.0, WINDOW_EDGES)
+        found += [
+            Candidate(effect, (("time_start", float(a)), ("time_end", float(b))), bags=(bag,), free=free)
+            for a, b in itertools.combinations(times, 2)
+            if b - a < 0.99 * (times[-1] - times[0])
+        ]
+    return found
+
+
+def signature(
+    problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate
+) -> Array:
+    """Change of the prediction (n, k), one column per free parameter at its scale (or the whole effect if none is free)."""
+    shapes = dict(candidate.shapes)
+    trials: list[Values] = [
+        {**{n: 0.0 for n in candidate.free}, **shapes, name: candidate.parameter(name).scale} for name in candidate.free
+    ] or [shapes]
+    columns = np.zeros((problem.measured.size, len(trials)))
+    for bag in range(len(problem.runs)):
+        if candidate.active_in(bag):
+            part = slice(problem.edges[bag], problem.edges[bag + 1])
+            for k, values in enumerate(trials):
+                columns[part, k] = problem.predict(bag, fit.x, [*fit.effects, (candidate, values)]) - base[bag]
+    return columns
+
+
+def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Sequence[str] = ()) -> list[Score]:
+    """Every candidate against the residual of ``fit``, best first; ``draws`` (m, n) are residuals that hide nothing.
+
+    ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
+    """
+    basis, _ = np.linalg.qr(_tangent(problem, fit) * weight[:, None])
+    residuals = np.vstack([problem.measured - fit.prediction, draws]) * weight
+    residuals = residuals - (residuals @ basis) @ basis.T
+    base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
+    energy = float(residuals[0] @ residuals[0])
+
+    def score(candidate: Candidate) -> list[Score]:
+        columns = signature(problem, fit, base, candidate) * weight[:, None]
+        full = score_columns(candidate, columns, basis, residuals, energy)
+        found = [full] if full is not None else []
+        if candidate.bags is None and len(problem.runs) > 1:
+            for bag in range(len(problem.runs)):
+                alone = replace(candidate, bags=(bag,))
+                part = score_columns(alone, columns * (problem.bag == bag)[:, None], basis, residuals, energy)
+                found += [part] if part is not None else []
+        return found
+
+    scores = list(itertools.chain.from_iterable(in_threads(score, candidates(problem, without))))
+    trials: dict[str, int] = {}
+    for item in scores:
+        trials[item.candidate.effect.id] = trials.get(item.candidate.effect.id, 0) + 1
+    scores = [replace(item, trials=trials[item.candidate.effect.id]) for item in scores]
+    return sorted(scores, key=lambda item: -item.explained)
+
+
+def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals: Array, energy: float) -> Score | None:
+    """Projection of the residual (first row) and the null draws (other rows) on what of a signature is not masked.
+
+    Columns whose parameter would leave its allowed sign are dropped, since no such physics exists.
+    """
+    total = float(np.sum(columns**2))
+    if total < 1e-12:
+        return None
+    visible = columns - basis @ (basis.T @ columns)
+    active = [k for k in range(columns.shape[1]) if np.sum(visible[:, k] ** 2) > 1e-10 * max(total, 1e-30)]
+    while active:
+        q, r = np.linalg.qr(visible[:, active])
+        if abs(r[-1, -1]) < 1e-6 * abs(r[0, 0]):
+            active.pop()
+            continue
+        along = residuals @ q
+        coefficients = np.linalg.solve(r, along[0])
+        wrong = [
+            k for k, c in zip(active, coefficients, strict=True)
+            if (candidate.free and c < 0.0 <= candidate.parameter(candidate.free[k]).low) or (not candidate.free and c < 0.3)
+        ]  # fmt: skip
+        if wrong:
+            active = [k for k in active if k not in wrong]
+            continue
+        explained = float(along[0] @ along[0])
+        values = np.zeros(len(candidate.free))
+        if candidate.free:
+            values[active] = coefficients
+        return Score(
+            candidate, explained, explained / max(energy, 1e-30), 1.0 - float(np.sum(visible**2)) / total,
+            tuple(float(v) for v in values), np.sum(along[1:] ** 2, axis=1),
+        )  # fmt: skip
+    return None
+
+
+def _tangent(problem: Problem, fit: Fit) -> Array:
+    """Jacobian columns (n, q) of everything already free, without those that do nothing."""
+    norms = np.linalg.norm(fit.jacobian, axis=0)
+    kept: Array = fit.jacobian[:, norms > 0.0] / norms[norms > 0.0]
+    return kept

@@ -1,0 +1,291 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Predicting a recording: calibration values and trial physics in, the torque that the sensors would show out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from lugre_steering.chain.layout import EFFECT_FIELDS
+from lugre_steering.chain.model import Model, build_model
+from lugre_steering.chain.step import torque_side
+from lugre_steering.diagnosis.dataset import Run
+from lugre_steering.effects.entry import Effect, Parameter
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import Vehicle
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def in_threads(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Map over threads (the compiled chain releases the interpreter lock), results in order."""
+    if len(items) < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return list(pool.map(function, items))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One baseline value that a vehicle sheet may have wrong.
+
+    ``apply`` turns a change x into new parameter-record values; x = 0 is the sheet, ``prior`` its standard deviation.
+    Factors enter as exp(x), so a doubling and a halving are equally far from the sheet.
+    """
+
+    name: str
+    fields: tuple[str, ...]
+    prior: float
+    low: float
+    high: float
+    additive: bool = False
+
+
+FRICTION = Calibration("friction_level", ("static_torque", "coulomb_torque"), 0.15, -0.6, 0.6)
+STATIC = Calibration("static_ratio", ("static_torque",), 0.12, -0.3, 0.5, additive=True)
+STIFFNESS = Calibration("stiffness", ("sigma_0",), 0.15, -0.6, 0.6)
+STRIBECK = Calibration("stribeck_speed", ("stribeck_speed",), 0.15, -0.7, 0.7)
+CAPACITY = Calibration("heat_capacity", ("heat_capacity",), 0.15, -0.6, 0.6)
+COOLING = Calibration("cooling", ("cooling",), 0.15, -0.6, 0.6)
+STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
+
+
+def calibrations_for(vehicle: Vehicle) -> tuple[Calibration, ...]:
+    """The standard set; a vehicle without rubber has nothing thermal to calibrate."""
+    return STANDARD if vehicle.rubber is not None else (FRICTION, STATIC, STIFFNESS, STRIBECK)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect as it is tried: with fixed shape values, on one line or all bags, with free parameters named in ``free``."""
+
+    effect: Effect
+    shapes: tuple[tuple[str, float], ...] = ()
+    line: str = ""
+    bags: tuple[int, ...] | None = None
+    free: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        return self.effect.id + (f"[{self.line}]" if self.line else "")
+
+    def parameter(self, name: str) -> Parameter:
+        return next(p for p in self.effect.parameters if p.name == name)
+
+    def active_in(self, bag: int) -> bool:
+        return self.bags is None or bag in self.bags
+
+
+Values = Mapping[str, float]
+
+
+class Problem:
+    """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, effect parameters)."""
+
+    def __init__(self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None) -> None:
+        self.vehicle = vehicle
+        self.runs = list(runs)
+        self.model: Model = build_model(vehicle)
+        self.calibrations = tuple(calibrations_for(vehicle) if calibrations is None else calibrations)
+        self.measured = np.concatenate([run.measured for run in runs])
+        self.valid = np.concatenate([run.valid for run in runs])
+        self.bag = np.concatenate([np.full(run.time.size, i) for i, run in enumerate(runs)])
+        self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
+        record = self.model.parameters[0][0]
+        self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
+        self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
+
+    @property
+    def nuisances(self) -> int:
+        """Calibration values and one initial bristle deflection per bag."""
+        return len(self.calibrations) + len(self.runs)
+
+    def start(self) -> Array:
+        return np.zeros(self.nuisances)
+
+    def scales(self) -> Array:
+        """Finite-difference and normalisation scale of the nuisance part of x."""
+        return np.array([c.prior for c in self.calibrations] + [1.0] * len(self.runs))
+
+    def bounds(self) -> tuple[Array, Array]:
+        low = np.array([c.low for c in self.calibrations] + [-1.5] * len(self.runs))
+        high = np.array([c.high for c in self.calibrations] + [1.5] * len(self.runs))
+        return low, high
+
+    def fields(self, x: Array) -> dict[str, float]:
+        """Baseline parameter-record values for the calibration part of x."""
+        record = self.model.parameters[0][0]
+        values: dict[str, float] = {}
+        for calibration, change in zip(self.calibrations, x, strict=False):
+            for field in calibration.fields:
+                old = values.get(field, float(record[field]))
+                if calibration.additive:
+                    values[field] = old + change * values.get("coulomb_torque", float(record["coulomb_torque"]))
+                else:
+                    values[field] = old * float(np.exp(change))
+        if "static_torque" in values:
+            values["static_torque"] = max(values["static_torque"], 0.3 * values["coulomb_torque"])
+        return values
+
+    def torque(
+        self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
+    ) -> Array:
+        """Model torque of one bag (n,), before the sensors; ``run`` in place of the bag's own motion."""
+        run = run or self.runs[bag]
+        record = self.model.parameters[0].copy()
+        for field, value in self.fields(x).items():
+            record[field] = value
+        record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
+        for candidate, values in effects:
+            if candidate.active_in(bag):
+                for name, value in values.items():
+                    field = f"{candidate.effect.id}_{name}"
+                    if field in EFFECT_FIELDS:
+                        record[field] = value
+        total = np.zeros(run.time.size)
+        for side in range(run.theta.shape[0]):
+            total += torque_side(record, self.model.rubber, run.time, run.theta[side], run.omega[side], run.alpha[side])
+        return total
+
+    def predict(
+        self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
+    ) -> Array:
+        """Measured torque that the model expects in one bag (n,): sensor effects included."""
+        run = run or self.runs[bag]
+        torque = self.torque(bag, x, effects, run)
+        for candidate, values in effects:
+            if candidate.active_in(bag):
+                torque = self._through_sensor(run, candidate, values, torque)
+        return torque
+
+    def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array) -> Array:
+        """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
+        name = candidate.effect.id
+        if name == "pressure_lag":
+            return _lagged(torque, run.time[1] - run.time[0], values["tau"])
+        if name == "time_delay":
+            return np.interp(run.time - values["delay"], run.time, torque)
+        if name in ("pressure_offset", "pressure_drift"):
+            gain = run.torque_per_line[self._lines.index(candidate.line)]
+            return torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * run.time)
+        if name == "moment_arm_error":
+            factor = values.get("linear", 0.0) * run.theta + values.get("quadratic", 0.0) * run.theta**2
+            return torque - (factor * run.side_torque).sum(axis=0)
+        return torque
+
+    def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:
+        return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects), range(len(self.runs))))
+
+
+def _lagged(torque: Array, dt: float, tau: float) -> Array:
+    """First-order lag of a uniformly sampled signal, exact for piecewise linear input between samples."""
+    if tau < 0.02 * dt:
+        return torque
+    from scipy.signal import lfilter
+
+    decay = np.exp(-dt / tau)
+    ramp = (1.0 - decay) * tau / dt  # response at the end of a unit ramp is 1 - ramp
+    filtered, _ = lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], torque, zi=[torque[0] * (1.0 - (1.0 - ramp))])
+    return np.asarray(filtered)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of a joint fit: nuisance x, effects with their values, prediction (n,), weighted cost, Jacobian at the end."""
+
+    x: Array
+    effects: tuple[tuple[Candidate, dict[str, float]], ...]
+    prediction: Array
+    cost: float
+    jacobian: Array
+    covariance: Array
+
+    def with_effects(self, effects: Sequence[tuple[Candidate, dict[str, float]]]) -> Fit:
+        return replace(self, effects=tuple(effects))
+
+
+def fit(
+    problem: Problem,
+    weight: Array,
+    effects: Sequence[tuple[Candidate, Mapping[str, float]]] = (),
+    start: Array | None = None,
+    *,
+    evaluations: int = 12,
+    robust: bool = False,
+) -> Fit:
+    """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
+
+    ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
+    ``robust`` bounds the influence of samples beyond 3 sigma (soft L1).
+    """
+    x0 = problem.start() if start is None else start
+    low, high = problem.bounds()
+    free = [(i, name) for i, (candidate, _) in enumerate(effects) for name in candidate.free]
+    scale = np.concatenate([problem.scales(), [effects[i][0].parameter(n).scale for i, n in free]])
+    values0 = [dict(values) for _, values in effects]
+    p0 = np.concatenate([x0, [values0[i].get(n, 0.0) for i, n in free]]) / scale
+    low = np.concatenate([low, [effects[i][0].parameter(n).low for i, n in free]]) / scale
+    high = np.concatenate([high, [effects[i][0].parameter(n).high for i, n in free]]) / scale
+    prior = np.array([1.0] * len(problem.calibrations) + [0.3] * len(problem.runs) + [0.0] * len(free))
+    n = problem.nuisances
+
+    def unpack(p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:
+        values = [dict(v) for v in values0]
+        for (i, name), number in zip(free, p[n:] * scale[n:], strict=True):
+            values[i][name] = float(number)
+        return p[:n] * scale[:n], [(candidate, v) for (candidate, _), v in zip(effects, values, strict=True)]
+
+    def prediction(p: Array) -> Array:
+        return problem.predict_all(*unpack(p))
+
+    def residual(p: Array) -> Array:
+        return np.concatenate([(prediction(p) - problem.measured) * weight, p * prior])
+
+    def jacobian(p: Array) -> Array:
+        base = prediction(p)
+        columns = in_threads(lambda j: _column(problem, unpack, p, j, n, low, high, base), range(p.size))
+        return np.vstack([np.column_stack(columns) * weight[:, None], np.diag(prior)])
+
+    solution = least_squares(
+        residual, np.clip(p0, low + 1e-9, high - 1e-9), jac=jacobian, bounds=(low, high), max_nfev=evaluations,
+        loss="soft_l1" if robust else "linear", f_scale=3.0, xtol=1e-5, ftol=1e-7, gtol=1e-8,
+    )  # fmt: skip
+    x, fitted = unpack(solution.x)
+    final = jacobian(solution.x)
+    plain = residual(solution.x)
+    normal = final.T @ final
+    covariance = np.linalg.pinv(normal, rcond=1e-12) * np.outer(scale, scale)
+    return Fit(x, tuple(fitted), prediction(solution.x), float(plain @ plain), final[: weight.size] / scale, covariance)
+
+
+def _column(
+    problem: Problem,
+    unpack: Callable[[Array], tuple[Array, list[tuple[Candidate, dict[str, float]]]]],
+    p: Array,
+    j: int,
+    nuisances: int,
+    low: Array,
+    high: Array,
+    base: Array,
+) -> Array:
+    """One Jacobian column by a forward (or, at the upper bound, backward) difference of 2 % of the parameter's scale."""
+    step = 0.02 if p[j] + 0.02 <= high[j] else -0.02
+    moved = p.copy()
+    moved[j] += step
+    x, effects = unpack(moved)
+    bag = j - len(problem.calibrations)
+    if 0 <= bag < len(problem.runs) and j < nuisances:
+        column = np.zeros_like(base)
+        part = slice(problem.edges[bag], problem.edges[bag + 1])
+        column[part] = (problem.predict(bag, x, effects) - base[part]) / step
+        return column
+    moved_prediction = np.concatenate([problem.predict(i, x, effects) for i in range(len(problem.runs))])
+    return (moved_prediction - base) / step
