@@ -42,6 +42,7 @@ _DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _G
 LINE_RING = 8192
 PENDING_RING = 8192
 PREVIEW_STEPS = 20
+PLAN_POINTS = 1024
 
 ESTIMATE = np.dtype(
     [
@@ -241,15 +242,19 @@ def _planned(core, side, stamp_ns):
 
 @njit
 def _preview(core, side, stamp_ns):
-    """Torque [N m] that this side will need one horizon ahead: along the plan, or at the present rate without one."""
+    """Torque [N m] that this side will need one horizon ahead: along the plan, or at the present rate without one.
+
+    A plan that has run out says nothing about what is ahead, and is not used any more.
+    """
     c, motion = core.config[0], core.motion[side]
     if c.horizon <= 0.0:
         return core.output[side].torque
+    planning = c.plan_size > 0 and stamp_ns < core.plan_ns[c.plan_size - 1]
     core.scratch_state[0] = core.state[side]
     dt = c.horizon / PREVIEW_STEPS
     theta = motion.theta
     for i in range(1, PREVIEW_STEPS + 1):
-        planned = _planned(core, side, stamp_ns + np.int64(i * dt * 1e9))
+        planned = _planned(core, side, stamp_ns + np.int64(i * dt * 1e9)) if planning else math.nan
         target = theta + motion.omega * dt if math.isnan(planned) else planned
         omega = (target - theta) / dt
         advance(
@@ -544,8 +549,8 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
         geometry=geometry,
         areas=areas,
         lines=line_index,
-        plan_ns=np.zeros(1024, np.int64),
-        plan_theta=np.zeros((sides, 1024)),
+        plan_ns=np.zeros(PLAN_POINTS, np.int64),
+        plan_theta=np.zeros((sides, PLAN_POINTS)),
         scratch_value=np.zeros(lines),
         scratch_state=np.zeros(1, STATE),
         scratch_output=np.zeros(1, OUTPUT),
