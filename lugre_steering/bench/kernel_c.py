@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The baseline of one track as a hand-written C loop: what a compiler can reach, as a yardstick for the Numba kernel."""
+"""The baseline of one track as a hand-written C loop, the yardstick of the Numba kernel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lugre_steering.recording import Array
 SOURCE = r"""
 #include <math.h>
 
-struct parameters { %s };
+struct parameters { FIELDS };
 
 void run(long n, const double *time, const double *theta, const double *omega, const struct parameters *p,
          long rows, const double *rubber, double *torque)
@@ -57,7 +57,7 @@ void run(long n, const double *time, const double *theta, const double *omega, c
                     + p->gravity_cos * cos(theta[i]);
     }
 }
-""" % " ".join(f"double {name};" for name in BASELINE_FIELDS)
+""".replace("FIELDS", " ".join(f"double {name};" for name in BASELINE_FIELDS))
 
 
 class CLoop:

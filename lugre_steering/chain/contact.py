@@ -11,16 +11,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from lugre_steering.chain.compiled import exp, law
 
-from lugre_steering.chain.compiled import exp
-
-_FAST = {"contract"}
 PATCH_EDGE_RAD = 0.01
 PATCH_EDGE_S = 0.2
 
 
-@njit(fastmath=_FAST)
+@law
 def stribeck(omega: float, static: float, coulomb: float, speed: float, exponent: float) -> float:
     """Steady sliding torque g = Mc + (Ms - Mc) exp(-|omega / omega_St|**delta) [N m] (op. cit. 1995)."""
     ratio = abs(omega) / speed
@@ -28,7 +25,7 @@ def stribeck(omega: float, static: float, coulomb: float, speed: float, exponent
     return coulomb + (static - coulomb) * exp(-power)
 
 
-@njit(fastmath=_FAST)
+@law
 def bristle(z: float, d_theta: float, stiffness: float, g: float) -> float:
     """Bristle deflection [rad] after the contact turned by ``d_theta`` [rad] at constant rate: exact for any step.
 
@@ -39,7 +36,7 @@ def bristle(z: float, d_theta: float, stiffness: float, g: float) -> float:
     return z_ss + (z - z_ss) * exp(-stiffness * abs(d_theta) / g)
 
 
-@njit(fastmath=_FAST)
+@law
 def bristle_work(z: float, z_next: float, d_theta: float, g: float) -> float:
     """Work of the elastic torque [J] over the exact step from ``z`` to ``z_next``: integral of sigma_0 z dtheta.
 
@@ -48,13 +45,13 @@ def bristle_work(z: float, z_next: float, d_theta: float, g: float) -> float:
     return g * (abs(d_theta) + math.copysign(1.0, d_theta) * (z - z_next))
 
 
-@njit(fastmath=_FAST)
+@law
 def window(x: float, low: float, high: float, edge: float) -> float:
     """1 inside [low, high], 0 outside, linear over ``edge`` at each end."""
     return max(0.0, min(1.0, min((x - low) / edge + 0.5, (high - x) / edge + 0.5)))
 
 
-@njit
+@law
 def level_factor(p, s, sign):
     """Friction level relative to the baseline: direction_asymmetry, surface_patch, wear_polishing (1 when neutral).
 
@@ -73,7 +70,7 @@ def level_factor(p, s, sign):
     return max(factor, 0.05)
 
 
-@njit
+@law
 def aged_level(p, s, d_theta, dt):
     """static_ageing: extra level as a share of Coulomb friction, rate * ln(1 + dwell / t_c), lost over a slip scale.
 
@@ -88,7 +85,7 @@ def aged_level(p, s, d_theta, dt):
     return p.static_ageing_rate * s.ageing
 
 
-@njit
+@law
 def relaxed_share(p, s, d_theta, dt, length):
     """stress_relaxation: share of the elastic torque lost, R log10(1 + hold / t_0), recovered over ``length``.
 
@@ -105,7 +102,7 @@ def relaxed_share(p, s, d_theta, dt, length):
     return min(s.relaxed, 0.9)
 
 
-@njit
+@law
 def stiffness_factor(p, s, sign, length):
     """Presliding stiffness relative to the baseline: payne_softening and mullins_softening (1 when neutral).
 

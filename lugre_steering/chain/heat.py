@@ -4,12 +4,10 @@
 
 from __future__ import annotations
 
-from numba import njit
-
-from lugre_steering.chain.compiled import exp
+from lugre_steering.chain.compiled import exp, law
 
 
-@njit(fastmath={"contract"})
+@law
 def heat(temperature: float, energy: float, dt: float, capacity: float, cooling: float, air: float) -> float:
     """Rubber temperature [degC] after ``energy`` [J] over ``dt`` [s]: rho c A h dT/dt = P - lambda A (T - T_air).
 
@@ -19,7 +17,7 @@ def heat(temperature: float, energy: float, dt: float, capacity: float, cooling:
     return (temperature * (1.0 - k) + 2.0 * k * air + energy / capacity) / (1.0 + k)
 
 
-@njit
+@law
 def advance_heat(p, s, energy, dt, effects):
     """Temperatures after friction released ``energy`` [J] in ``dt`` [s]: tread and, as effects, carcass and flash.
 

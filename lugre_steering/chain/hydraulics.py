@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from lugre_steering.chain.compiled import law
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Hydraulics, Vehicle
 
@@ -20,7 +20,7 @@ def cylinder_length(theta: Array, chassis_m: tuple[float, ...], knuckle_m: tuple
     return np.hypot(x - chassis_m[0], y - chassis_m[1])
 
 
-@njit(fastmath={"contract"})
+@law
 def moment_arm(theta, chassis_x, chassis_y, knuckle_x, knuckle_y):
     """dL/dtheta [m], exact: (chassis x knuckle(theta)) / L, from L**2 = |knuckle(theta) - chassis|**2."""
     c, s = np.cos(theta), np.sin(theta)

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from lugre_steering.chain.compiled import law
 
 
-@njit
+@law
 def contact_increment(p, s, theta, stiffness, length, effects):
     """Angle [rad] by which the contact turns when the corrected steering angle reaches ``theta``.
 
@@ -30,7 +30,7 @@ def contact_increment(p, s, theta, stiffness, length, effects):
     return d_theta
 
 
-@njit
+@law
 def through_gap(p, s, d_theta, length):
     """Part of a link motion that passes a backlash [rad]; ``s.gap`` is the position inside it, -width/2 ... width/2.
 

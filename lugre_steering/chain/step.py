@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numba import literal_unroll, njit
 
-from lugre_steering.chain.compiled import exp
+from lugre_steering.chain.compiled import exp, law
 from lugre_steering.chain.contact import (
     aged_level,
     bristle,
@@ -31,7 +31,7 @@ Records = np.ndarray[Any, np.dtype[np.void]]
 _NORMAL_QUANTILES = (-1.38299413, -0.67448975, -0.21042839, 0.21042839, 0.67448975, 1.38299413)
 
 
-@njit(fastmath={"contract"})
+@law
 def ratios(rubber, low, step, temperature):
     """Stiffness and friction ratios at a temperature [degC], linear between rows, clamped (and told) outside."""
     position = (temperature - low) / step
@@ -47,7 +47,7 @@ def ratios(rubber, low, step, temperature):
     return stiffness, friction, outside
 
 
-@njit
+@law
 def begin(p, s, theta):
     """State at the first sample of a recording: bristles and temperatures as the parameters say."""
     s.started = 1.0
@@ -66,8 +66,8 @@ def begin(p, s, theta):
     s.stop_loading = 1.0
 
 
-@njit(fastmath={"contract"})
-def distributed(p, s, d_theta, stiffness, g):
+@law
+def distributed(s, d_theta, stiffness, g):
     """distributed_contact: parallel elements of log-normally graded stiffness, each carrying an equal share of g.
 
     Returns elastic torque [N m], its mean deflection [rad] and its work [J] (Maxwell slip; Iwan 1966).
@@ -85,16 +85,16 @@ def distributed(p, s, d_theta, stiffness, g):
     return torque, mean, work + 0.5 * stiffness * (mean * mean - s.z * s.z)
 
 
-@njit
+@law
 def has_effects(p):
     """Whether any effect parameter differs from neutral."""
-    for name in literal_unroll(EFFECT_FIELDS):
+    for name in literal_unroll(EFFECT_FIELDS):  # noqa: SIM110 (Numba cannot take the any())
         if p[name] != 0.0:
             return True
     return False
 
 
-@njit(fastmath={"contract"})
+@law
 def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     """One sample of one track: angle [rad], rate [rad/s], acceleration [rad/s2] after ``dt`` [s] -> OUTPUT record.
 
@@ -127,7 +127,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     g = level * (g + p.coulomb_torque * aged)
     z = s.z
     if effects and p.distributed_contact_spread != 0.0:
-        elastic, z_next, work = distributed(p, s, d_theta, stiffness, g)
+        elastic, z_next, work = distributed(s, d_theta, stiffness, g)
     else:
         z_next = bristle(z, d_theta, stiffness, g)
         work = bristle_work(z, z_next, d_theta, g)
@@ -168,7 +168,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     out.z = z_next
 
 
-@njit
+@law
 def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):
     """``step`` for callers that take single steps."""
     step(p, s, rubber, out, dt, theta_measured, omega, alpha, has_effects(p))

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from lugre_steering.chain.compiled import exp
+from lugre_steering.chain.compiled import exp, law
 
 STOP_TRAVEL_RAD = 0.002
 """Travel over which an end stop changes between its loading and unloading branch."""
@@ -18,13 +16,13 @@ SEAL_TRAVEL_RAD = 2e-3
 """Travel in which a cylinder seal changes sides."""
 
 
-@njit(fastmath={"contract"})
+@law
 def aligning(theta: float, amplitude: float, gravity_cos: float) -> float:
     """Conservative torque of the angle [N m]: M_a = F_z e sin(theta_k) sin(theta) (Reimpell; R), plus gravity."""
     return amplitude * math.sin(theta) + gravity_cos * math.cos(theta)
 
 
-@njit
+@law
 def parallel_torque(p, s, d_theta, alpha):
     """Effects that act beside the contact [N m]: end_stop, soil_shear, yaw_inertia, kingpin_jacking, slope_bias."""
     torque = p.slope_bias_torque / p.sides + p.yaw_inertia_inertia * alpha
@@ -38,7 +36,7 @@ def parallel_torque(p, s, d_theta, alpha):
     return torque
 
 
-@njit
+@law
 def end_stop(p, s, d_theta):
     """Elastic limit device: sgn(theta) (k1 x + k3 x**3), x = |theta| - engage_angle > 0; unloading lower by ``loss``.
 
@@ -56,7 +54,7 @@ def end_stop(p, s, d_theta):
     return math.copysign(torque * (1.0 - p.end_stop_loss * (1.0 - s.stop_loading)), s.theta)
 
 
-@njit
+@law
 def soil_shear(p, s):
     """Berm of soft ground on both sides: pushed outward when the track goes farther than before, slack between.
 
@@ -71,7 +69,7 @@ def soil_shear(p, s):
     return p.soil_shear_torque * (left * onset_left - right * onset_right)
 
 
-@njit
+@law
 def losses(p, s, omega, d_theta, load):
     """Torque lost between cylinder pressures and steering axis [N m]; each entry is zero when neutral.
 
@@ -91,7 +89,7 @@ def losses(p, s, omega, d_theta, load):
     return torque
 
 
-@njit
+@law
 def hydraulic_limits(p, s, torque):
     """What the hydraulics can hold: relief_saturation clips at a ceiling, trapped_pressure leaks away at standstill.
 
