@@ -24,16 +24,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Concealed:
-    """One hidden effect: its name, its size, optionally the only bag (0 or 1) or the time [s] at which it begins."""
+    """One hidden effect: its name, its size, and what makes it hard to find.
+
+    ``only_bag`` (0 or 1) limits it to one bag, ``from_time_s`` [s] lets it begin late, ``barely`` moves the zone in
+    which it acts (ZONED effects) to the edge of what manoeuvres visit.
+    """
 
     id: str
     strength: float = 1.0
     only_bag: int | None = None
     from_time_s: float | None = None
+    barely: bool = False
 
     def __post_init__(self) -> None:
         if self.id not in CATALOGUE:
             raise DataError(f"concealed effect {self.id!r} is unknown; expected one of {', '.join(CATALOGUE)}")
+        if self.barely and self.id not in ZONED:
+            raise DataError(f"concealed effect {self.id!r} has no zone to move; expected one of {', '.join(ZONED)}")
 
 
 class Range(NamedTuple):
@@ -163,6 +170,12 @@ SENSING: dict[str, dict[str, Range]] = {
 }
 
 CATALOGUE: dict[str, dict[str, Range]] = {**ANGLE, **CONTACT, **PARALLEL, **LOSSES, **SENSING}
+# Zones at the edge: where the inner track or the load hardly ever comes.
+ZONED: dict[str, dict[str, Range]] = {
+    "end_stop": {"threshold": Range(31.0 * DEG, 32.0 * DEG, "rad")},
+    "surface_patch": {"low": Range(25.0 * DEG, 28.0 * DEG, "rad")},
+    "relief_saturation": {"margin": Range(0.01, 0.02, "1", scales=True)},
+}
 UNLISTED_IDS: tuple[str, ...] = ("gear_ripple", "body_mode", "rate_memory", "intermittent_contact")
 EFFECT_IDS: tuple[str, ...] = tuple(name for name in CATALOGUE if name not in UNLISTED_IDS)
 
@@ -179,7 +192,8 @@ class Hidden(NamedTuple):
 def draw(wanted: Concealed, rng: np.random.Generator) -> Hidden:
     """True parameter values of one effect; strength 0 gives zero amplitudes."""
     values = {}
-    for name, wide in CATALOGUE[wanted.id].items():
+    ranges = {**CATALOGUE[wanted.id], **(ZONED[wanted.id] if wanted.barely else {})}
+    for name, wide in ranges.items():
         value, sign = rng.uniform(wide.low, wide.high), rng.choice([-1.0, 1.0])
         values[name] = float(value * (wanted.strength if wide.scales else 1.0) * (sign if wide.signed else 1.0))
     if wanted.id == "heat_partition":

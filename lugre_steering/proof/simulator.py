@@ -123,6 +123,8 @@ def _place_patch(effect: Hidden, rng: np.random.Generator) -> Hidden:
     """Give a surface patch its window: mostly an angle window, sometimes a stretch of time (rad or s, and its edge)."""
     if effect.id != "surface_patch":
         return effect
+    if effect.values["low"] > 0.0:  # already placed at the edge
+        return effect._replace(values={**effect.values, "high": 1.0, "edge": 0.012})
     in_time = rng.random() < 0.4
     low, high = (rng.uniform(25.0, 40.0), rng.uniform(55.0, 70.0)) if in_time else np.deg2rad(
         rng.choice([[3.0, 14.0], [-15.0, -4.0], [-8.0, 5.0], [9.0, 22.0]]) + rng.uniform(-2.0, 2.0)

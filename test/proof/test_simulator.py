@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.proof import hydraulics, manoeuvres, simulator
+from lugre_steering.proof.conceal import ZONED
 from lugre_steering.proof.contact import HiddenContact, Patches, patches, run_track
 from lugre_steering.proof.rubber import complex_modulus, rubber_table
 from lugre_steering.proof.simulator import (
@@ -247,6 +248,14 @@ def test_an_effect_can_be_limited_to_a_bag_or_begin_late(sheet: Sheet) -> None:
         assert bag.intervals[effect][0][0] >= 25.0
 
 
+@pytest.mark.parametrize("effect", list(ZONED))
+def test_a_zone_can_be_moved_to_the_edge(effect: str, sheet: Sheet) -> None:
+    usual, barely = (
+        simulate_case(short_case(Concealed(effect, barely=edge), seed=6), sheet).bags[0] for edge in (False, True)
+    )
+    assert 0.0 < removable_variance(barely) < 0.5 * removable_variance(usual)
+
+
 def test_two_effects_each_keep_their_own_part(sheet: Sheet) -> None:
     data = simulate_case(short_case(Concealed("end_stop"), Concealed("line_loss_linear")), sheet)
     bag = data.bags[0]
@@ -328,6 +337,8 @@ def test_bags_follow_the_interface_and_hold_no_answer(tmp_path: Path, sheet: She
 def test_bad_input_is_refused_with_a_reason(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="end_stopp"):
         Concealed("end_stopp")
+    with pytest.raises(DataError, match="no zone"):
+        Concealed("viscous_friction", barely=True)
     with pytest.raises(VehicleFileError, match="absent"):
         load_sheet(tmp_path / "absent.yaml")
     (tmp_path / "half.yaml").write_text("axle: {load_N: 1.0}\n", encoding="utf-8")
