@@ -54,9 +54,12 @@ ESTIMATE = np.dtype(
         ("feed_forward", np.float64, (2,)),
         ("total", np.float64),
         ("predicted", np.float64),  # total as the pressure sensors would show it (lagged)
+        ("message", np.int64),  # the pushed message that completed it, counted from 0
     ]
 )
-RESIDUAL = np.dtype([("stamp_ns", np.int64), ("measured_torque", np.float64), ("residual", np.float64)])
+RESIDUAL = np.dtype(
+    [("stamp_ns", np.int64), ("measured_torque", np.float64), ("residual", np.float64), ("message", np.int64)]
+)
 
 CONFIG = np.dtype(
     [
@@ -81,6 +84,7 @@ CONFIG = np.dtype(
         ("pending_first", np.int64),
         ("pending_count", np.int64),
         ("plan_size", np.int64),
+        ("message", np.int64),  # number of the message being processed, from 0
     ]
 )
 CHANNEL = np.dtype(
@@ -310,6 +314,7 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
             return count
     e = estimates[count]
     e.stamp_ns = latest
+    e.message = c.message
     e.total = 0.0
     for other in range(core.waiting.size):
         w = core.waiting[other]
@@ -396,6 +401,7 @@ def _residuals(core, first_line, residuals, count):
         r.stamp_ns = e.stamp_ns
         r.measured_torque = _measured_torque(core, e, value)
         r.residual = r.measured_torque - e.predicted
+        r.message = c.message
         count += 1
     return count
 
@@ -406,6 +412,7 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
     n_estimates, n_residuals = 0, 0
     for i in range(channel.size):
         k = channel[i]
+        core.config[0].message += 1
         if not _admit(core, k, stamp_ns[i], value[i]):
             continue
         ch = core.channels[k]
@@ -517,6 +524,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["lag"] = correction.lag_s
     config["arm_linear"], config["arm_quadratic"] = correction.arm_linear, correction.arm_quadratic
     config["horizon"] = options.feed_forward_horizon_s
+    config["message"] = -1
 
     channels = np.zeros(len(vehicle.channels), CHANNEL)
     lines = 0

@@ -41,6 +41,7 @@ class Block:
     """Consecutive messages of a bag in recorded (log time) order; one row per message and wanted channel it carries."""
 
     channel: NDArray[np.int32]  # index into the channels given to the reader
+    message: IntArray  # index into ``messages``
     stamp_ns: IntArray  # header stamp
     log_ns: IntArray
     value: Array  # position, pressure, temperature or torque.z in SI units; NaN where the message gives none
@@ -218,10 +219,12 @@ class Bag:
                     )
         if not rows:
             none = np.empty(0, np.int64)
-            return Block(none.astype(np.int32), none, none, none.astype(np.float64), none.astype(np.float64), messages)
+            empty = none.astype(np.float64)
+            return Block(none.astype(np.int32), none, none, none, empty, empty, messages)
         message, channel, stamp, value, rate = (np.concatenate(column) for column in zip(*rows, strict=True))
         order = np.lexsort((channel, message))
-        return Block(channel[order], stamp[order], messages.log_ns[message[order]], value[order], rate[order], messages)
+        channel, message, stamp, value, rate = (column[order] for column in (channel, message, stamp, value, rate))
+        return Block(channel, message, stamp, messages.log_ns[message], value, rate, messages)
 
     # --------------------------------------------------------------- topics
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sqlite3
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -90,8 +90,14 @@ class _Storage(Protocol):
 class BagWriter:
     """Writes one rosbag2 folder with metadata.yaml; use as a context manager."""
 
-    def __init__(self, folder: str | Path, storage: Literal["mcap", "sqlite3"] = "mcap") -> None:
+    def __init__(
+        self,
+        folder: str | Path,
+        storage: Literal["mcap", "sqlite3"] = "mcap",
+        custom_data: Mapping[str, str] | None = None,
+    ) -> None:
         self.folder = Path(folder)
+        self._custom_data = dict(custom_data or {})
         self.connections: list[Connection] = []
         self._counts: list[int] = []
         self._first_ns, self._last_ns = 2**63 - 1, 0
@@ -185,7 +191,7 @@ class BagWriter:
             "compression_mode": "",
             "relative_file_paths": [self._file.name],
             "files": [{"path": self._file.name, **span()}],
-            "custom_data": None,
+            "custom_data": self._custom_data or None,
             "ros_distro": "jazzy",
         }
         return yaml.safe_dump({"rosbag2_bagfile_information": content}, sort_keys=False)
