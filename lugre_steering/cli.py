@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 from rich.console import Console
 
-from lugre_steering.errors import LugreSteeringError
+from lugre_steering.errors import DataError, LugreSteeringError
 
 app = typer.Typer(
     help="Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out.",
@@ -54,6 +54,52 @@ def command(function: F) -> F:
             raise typer.Exit(2) from None
 
     return function
+
+
+@command
+def simulate(
+    what: Annotated[str, typer.Argument(help="manoeuvre, published experiment, YAML or CSV file, or bag; see --list")] = "",
+    vehicle: Annotated[Path | None, typer.Option(help="vehicle file (YAML); the shipped test vehicle if left out")] = None,
+    out: Annotated[Path | None, typer.Option(help="folder for the results")] = None,
+    show_list: Annotated[bool, typer.Option("--list", help="show manoeuvres and experiments")] = False,
+    effect: Annotated[list[str] | None, typer.Option(help="add physics, id:parameter=value,... (SI); repeatable")] = None,
+    storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
+    rate: Annotated[float | None, typer.Option(help="angle samples per second [100]")] = None,
+    pressure_rate: Annotated[float | None, typer.Option(help="pressure samples per second [as --rate]")] = None,
+    jitter: Annotated[float | None, typer.Option(help="standard deviation of the sampling instants [s]")] = None,
+    angle_noise: Annotated[float | None, typer.Option(help="deg [as the vehicle's sensors section]")] = None,
+    angle_resolution: Annotated[float | None, typer.Option(help="deg [as the vehicle's sensors section]")] = None,
+    pressure_noise: Annotated[float | None, typer.Option(help="Pa [as the vehicle's sensors section]")] = None,
+    pressure_resolution: Annotated[float | None, typer.Option(help="Pa [0: not quantised]")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of noise and jitter [0]")] = None,
+    as_json: Json = False,
+) -> None:
+    """Simulate a manoeuvre into a bag labelled synthetic, or reproduce the published experiments (exit code 1 if one fails)."""
+    from lugre_steering.simulate import command as simulation
+
+    if show_list:
+        simulation.show_catalogue(Console())
+        return
+    if not what or out is None:
+        raise DataError("simulate: needs what to simulate and --out DIR; 'lugre-steering simulate --list' shows what there is")
+    chosen = simulation.load_vehicle(vehicle, effect or [])
+    if simulation.is_experiment(what):
+        outcomes = simulation.run_experiments(what, chosen)
+        result = simulation.write_outcomes(what, outcomes, out)
+        print_json(result) if as_json else simulation.show_outcomes(Console(), outcomes, out)
+        raise typer.Exit(0 if result["passed"] else 1)
+    sensing = {
+        "angle_rate_Hz": rate,
+        "pressure_rate_Hz": pressure_rate if pressure_rate is not None else rate,
+        "jitter_s": jitter,
+        "angle_noise_deg": angle_noise,
+        "angle_resolution_deg": angle_resolution,
+        "pressure_noise_Pa": pressure_noise,
+        "pressure_resolution_Pa": pressure_resolution,
+        "seed": seed,
+    }
+    result = simulation.run_manoeuvre(what, chosen, out, sensing, storage)
+    print_json(result) if as_json else simulation.show_run(Console(), result)
 
 
 def main() -> None:

@@ -10,10 +10,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
+from lugre_steering.errors import LugreSteeringError
 
-mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 (the backend must be chosen first)
+try:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+except ImportError as error:
+    raise LugreSteeringError("pictures need matplotlib: install 'lugre_steering[report]'") from error
 
 MEASURED = {"color": "black", "linestyle": "-", "linewidth": 1.4}
 IMPROVED = {"color": "#d62728", "linestyle": "--", "linewidth": 1.4}

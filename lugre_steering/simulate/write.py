@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import cdr
+from lugre_steering.bag.messages import Bytes
 from lugre_steering.errors import BagError
-from lugre_steering.recording import Kind
+from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.simulate.run import Simulated
 from lugre_steering.simulate.sensors import nanoseconds
 
@@ -23,10 +23,10 @@ FRAME = "synthetic"
 TRUTH = "/synthetic_truth"
 STRING = "std_msgs/msg/String"
 
-Storage = Literal["mcap", "sqlite3"]
+STORAGES = ("mcap", "sqlite3")
 
 
-def write_bag(folder: Path, run: Simulated, label: str, storage: Storage = "mcap", compress: bool = True) -> None:
+def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", compress: bool = True) -> None:
     """Write all inputs and the truth (at the stamps of the first track's angles) into a new rosbag2 folder, zstd-compressed."""
     topics = [*_inputs(run), *_truth(run)]
     stamps = np.concatenate([stamp for _, _, stamp, _ in topics])
@@ -53,7 +53,7 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: Storage = "mcap
         raise BagError(f"{folder}: cannot be written ({error.strerror or error})") from error
 
 
-_Topic = tuple[str, str, "np.ndarray[tuple[int], np.dtype[np.int64]]", cdr.Bytes]
+_Topic = tuple[str, str, IntArray, Bytes]
 
 
 def _inputs(run: Simulated) -> list[_Topic]:
@@ -80,7 +80,7 @@ def _truth(run: Simulated) -> list[_Topic]:
     at = run.signals[angles[0]].time_s
     stamp = nanoseconds(at, START_NS)
 
-    def seen(rows: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def seen(rows: Array) -> Array:
         return np.stack([np.interp(at, truth.motion.time, row) for row in rows], axis=-1)
 
     torque = seen(truth.torque[None, :])[:, 0]

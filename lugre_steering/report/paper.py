@@ -1,0 +1,72 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Figures and tables of the published experiments, in the paper's style."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure
+from lugre_steering.simulate.paper.outcome import Outcome
+
+_STYLES: dict[str, dict[str, Any]] = {
+    "test": MEASURED,
+    "improved": IMPROVED,
+    "original": ORIGINAL,
+    "points": {"color": "black", "linestyle": "none", "marker": "o", "markersize": 5},
+    "series": {},
+}
+
+
+def draw_outcome(outcome: Outcome, file: Path) -> None:
+    """All panels one below the other; what was calibrated, what was checked and where it disagrees stands in the picture."""
+    with figure(len(outcome.panels), 1, outcome.caption, file) as axes:
+        for ax, panel in zip(axes[:, 0], outcome.panels, strict=True):
+            colours = iter(SERIES)
+            for curve in panel.curves:
+                style = _STYLES[curve.style] or {"color": next(colours)}
+                marker = {"marker": "o", "markersize": 4} if curve.style == "series" and len(curve.x) < 10 else {}
+                ax.plot(curve.x, curve.y, label=curve.label, **style, **marker)
+            ax.set_title(panel.title)
+            ax.set_xlabel(panel.x_label)
+            ax.set_ylabel(panel.y_label)
+            if len(panel.curves) > 1:
+                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def write_table(outcome: Outcome, file: Path) -> None:
+    """The table as CSV."""
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(outcome.columns)
+        writer.writerows([[f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in outcome.rows])
+
+
+def outcome_table(outcome: Outcome) -> Table:
+    """The table for a terminal."""
+    table = Table(title=f"{outcome.title} (simulated)", title_justify="left", title_style="bold")
+    for column in outcome.columns:
+        table.add_column(column, justify="right")
+    for row in outcome.rows:
+        table.add_row(*(_number(cell) if isinstance(cell, float) else str(cell) for cell in row))
+    return table
+
+
+def checks_table(outcomes: list[Outcome]) -> Table:
+    """Pass or fail of every published statement."""
+    table = Table(title="Published behaviour", title_justify="left", title_style="bold", show_lines=True)
+    for column in ("experiment", "statement", "published", "ours", ""):
+        table.add_column(column, overflow="fold")
+    for outcome in outcomes:
+        for check in outcome.checks:
+            verdict = "[green]pass[/green]" if check.passed else "[red]FAIL[/red]"
+            table.add_row(outcome.name, check.claim, check.published, check.ours, verdict)
+    return table
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"

@@ -1,0 +1,62 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Picture of one simulated recording: angles, torque, line pressures, rubber temperature."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lugre_steering.recording import Kind
+from lugre_steering.report.style import IMPROVED, MEASURED, figure
+from lugre_steering.simulate.run import Simulated
+
+DEGREES = {"rad": (180.0 / np.pi, "deg"), "m": (1000.0, "mm")}
+
+
+def draw_simulation(run: Simulated, label: str, file: Path) -> None:
+    """Write the picture as PNG."""
+    vehicle, truth = run.vehicle, run.truth
+    time, coordinate = truth.motion.time, vehicle.coordinate
+    scale, unit = DEGREES.get(coordinate.unit, (1.0, coordinate.unit))
+    pressures = {c.name: s for c, s in run.signals.items() if c.kind is Kind.PRESSURE}
+    torques = [s for c, s in run.signals.items() if c.kind is Kind.TORQUE]
+    effects = ", ".join(e.id for e in vehicle.effects) or "none"
+    caption = f"SYNTHETIC recording: {label}. Vehicle: {vehicle.name}. Effects added to the baseline: {effects}."
+    with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9) as axes:
+        rows = iter(axes[:, 0])
+        ax = next(rows)
+        for side, theta in zip(vehicle.sides, truth.motion.theta, strict=True):
+            ax.plot(time, scale * theta, label=side)
+        ax.set_title(f"{coordinate.name} (true)")
+        ax.set_ylabel(unit)
+        ax.legend(ncols=2, loc="upper right")
+
+        ax = next(rows)
+        for signal in torques:
+            ax.plot(signal.time_s, signal.value, **MEASURED, label="sensor")
+        ax.plot(time, truth.torque * 1e-3, **IMPROVED, label="all tracks")
+        for side, track in zip(vehicle.sides, truth.tracks, strict=True):
+            ax.plot(time, track["torque"] * 1e-3, linewidth=0.9, label=side)
+        ax.set_title("torque that the actuators deliver (true)")
+        ax.set_ylabel(f"k{coordinate.force_unit}")
+        ax.legend(ncols=4, loc="upper right")
+
+        if pressures:
+            ax = next(rows)
+            for name, signal in pressures.items():
+                ax.plot(signal.time_s, signal.value * 1e-6, linewidth=0.8, label=name)
+            ax.set_title(f"line pressures as recorded ({vehicle.sensors.pressure_reference})")
+            ax.set_ylabel("MPa")
+            ax.legend(ncols=len(pressures), loc="upper right")
+
+        ax = next(rows)
+        for side, track in zip(vehicle.sides, truth.tracks, strict=True):
+            ax.plot(time, track["temperature"], label=side)
+        ax.set_title("tread rubber temperature (true)")
+        ax.set_ylabel("degC")
+        ax.legend(ncols=2, loc="upper left")
+        for ax in axes[:, 0]:
+            ax.margins(x=0.0)
+        axes[-1, 0].set_xlabel("time (s)")

@@ -1,0 +1,158 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What ``lugre-steering simulate`` does, without the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.bag import read_recording
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Kind
+from lugre_steering.resources import config_folder
+from lugre_steering.simulate import manoeuvres, plant
+from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
+from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench
+from lugre_steering.simulate.paper.outcome import Outcome
+from lugre_steering.simulate.run import sensing_of, simulate
+from lugre_steering.simulate.write import STORAGES, write_bag
+from lugre_steering.vehicle import Vehicle
+
+
+def catalogue() -> list[tuple[str, str, str]]:
+    """(kind, name, description) of everything that can be simulated by name."""
+    rows = [("manoeuvre", m.name, m.description) for m in BUILT_IN.values()]
+    rows += [("experiment", name, text) for name, (text, _) in EXPERIMENTS.items()]
+    rows.append(("experiment", ALL, "all published experiments together"))
+    rows.append(("file", "FILE.yaml", "segments: a list of sweep, hold and chirp (mean steering angle)"))
+    rows.append(("file", "FILE.csv", "time_s and left_deg, right_deg, or angle_deg (mean); also in _rad"))
+    rows.append(("file", "BAG", "the steering angles of a recorded rosbag2 folder or file"))
+    return rows
+
+
+def is_experiment(what: str) -> bool:
+    return what == ALL or what in EXPERIMENTS
+
+
+def load_vehicle(file: Path | None, effects: Sequence[str] = ()) -> Vehicle:
+    """The vehicle file, or the shipped test vehicle, with effects added."""
+    vehicle = vehicle_file.load(file or config_folder() / "test_vehicle.yaml")
+    return plant.with_effects(vehicle, list(effects))
+
+
+def motion_named(what: str, vehicle: Vehicle) -> Motion:
+    """The motion of a built-in manoeuvre, a YAML or CSV file, or a recorded bag."""
+    if what in BUILT_IN:
+        return manoeuvres.motion_of(BUILT_IN[what], vehicle)
+    path = Path(what)
+    if not path.exists():
+        names = ", ".join([*BUILT_IN, *EXPERIMENTS, ALL])
+        raise DataError(f"'{what}': no such file, and none of the names {names}")
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        return manoeuvres.motion_of(manoeuvres.from_yaml(path), vehicle)
+    if path.suffix == ".csv" and path.is_file():
+        return manoeuvres.from_csv(path, vehicle)
+    angles = [channel for channel in vehicle.channels if channel.kind is Kind.ANGLE]
+    return manoeuvres.from_recording(read_recording(path, angles), vehicle)
+
+
+def run_manoeuvre(
+    what: str, vehicle: Vehicle, out: Path, sensing: Mapping[str, float | int | None], storage: str = "mcap"
+) -> dict[str, Any]:
+    """Simulate one manoeuvre; write the bag ``out/synthetic_<name>`` and its picture. ``sensing`` overrides fields of
+    ``Sensing``; None means the vehicle's own."""
+    from lugre_steering.report.simulation import draw_simulation  # plotting is loaded only where it is used
+
+    if storage not in STORAGES:
+        raise DataError(f"storage: got '{storage}', expected {' or '.join(STORAGES)}")
+    given = {name: value for name, value in sensing.items() if value is not None}
+    run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
+    make_folder(out)
+    folder = out / f"synthetic_{Path(what).stem.replace('-', '_')}"
+    label = f"{what}, vehicle '{vehicle.name}'"
+    write_bag(folder, run, label, storage)
+    draw_simulation(run, label, folder.with_suffix(".png"))
+    truth = run.truth
+    return {
+        "synthetic": True,
+        "bag": str(folder),
+        "picture": str(folder.with_suffix(".png")),
+        "duration_s": float(truth.motion.time[-1]),
+        "largest_torque_Nm": float(np.abs(truth.torque).max()),
+        "largest_angle_deg": float(np.degrees(np.abs(truth.motion.theta).max())),
+        "largest_pressure_Pa": float(run.pressures.max()) if run.pressures.size else None,
+        "rubber_at_end_degC": [float(t) for t in truth.tracks["temperature"][:, -1]],
+        "effects": {effect.id: dict(effect.parameters) for effect in vehicle.effects},
+    }
+
+
+def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:
+    """One published experiment, or all of them."""
+    names = list(EXPERIMENTS) if what == ALL else [what]
+    prepared = bench.build(vehicle)
+    return [EXPERIMENTS[name][1](prepared) for name in names]
+
+
+def write_outcomes(what: str, outcomes: list[Outcome], out: Path) -> dict[str, Any]:
+    """Table (CSV), result (JSON) and figure (PNG) of each experiment into ``out``; with several also a JSON of all."""
+    from lugre_steering.report.paper import draw_outcome, write_table
+
+    make_folder(out)
+    results = []
+    for outcome in outcomes:
+        results.append(outcome.to_json())
+        write_table(outcome, out / f"{outcome.name}.csv")
+        draw_outcome(outcome, out / f"{outcome.name}.png")
+        (out / f"{outcome.name}.json").write_text(json.dumps(results[-1], indent=2), encoding="utf-8")
+    result = {"passed": all(outcome.passed for outcome in outcomes), "experiments": results}
+    if what == ALL:
+        (out / f"{ALL}.json").write_text(json.dumps(result, indent=2), encoding="utf-8")
+    return result
+
+
+def make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DataError(f"{out}: cannot be made a folder ({error.strerror or error})") from error
+
+
+def show_catalogue(console: Console) -> None:
+    """Table of everything that can be simulated."""
+    table = Table("what", "name", "description")
+    for row in catalogue():
+        table.add_row(*row)
+    console.print(table)
+
+
+def show_run(console: Console, result: Mapping[str, Any]) -> None:
+    """What was simulated, in a few lines."""
+    table = Table(title="synthetic recording", show_header=False, title_justify="left")
+    for key, value in result.items():
+        table.add_row(key, f"{value:.6g}" if isinstance(value, float) else str(value))
+    console.print(table)
+
+
+def show_outcomes(console: Console, outcomes: Sequence[Outcome], out: Path) -> None:
+    """Tables, calibrated parameters, verdicts and disagreements of experiments."""
+    from lugre_steering.report.paper import checks_table, outcome_table
+
+    for outcome in outcomes:
+        console.print(outcome_table(outcome))
+    console.print(checks_table(outcomes))
+    fitted = ", ".join(f"{name} = {value:.5g}" for name, value in outcomes[0].calibrated.items())
+    console.print(f"Calibrated to the four published extremes: {fitted}")
+    for outcome in outcomes:
+        for note in outcome.notes:
+            console.print(f"[bold]{outcome.name}[/bold] differs or assumes: {note}")
+    passed = sum(check.passed for outcome in outcomes for check in outcome.checks)
+    console.print(f"{passed} of {sum(len(o.checks) for o in outcomes)} statements pass; tables and figures in {out}")
