@@ -296,7 +296,7 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
         ch.reasons[_UNPAIRED] += 1
     waiting.ready = 1
     waiting.stamp_ns = stamp_ns
-    waiting.theta = motion.theta
+    waiting.theta = core.state[side].theta
     waiting.omega = motion.omega
     waiting.torque = core.output[side].torque
     waiting.temperature = core.output[side].temperature

@@ -71,50 +71,51 @@ def level_factor(p, s, sign):
 
 
 @law
-def aged_level(p, s, d_theta, dt):
+def aged_level(p, s, d_theta, resting):
     """static_ageing: extra level as a share of Coulomb friction, rate * ln(1 + dwell / t_c), lost over a slip scale.
 
     Log-time strengthening of resting contacts (Dieterich 1972; Rice and Ruina 1983).
     """
     if p.static_ageing_rate == 0.0:
         return 0.0
-    if d_theta == 0.0:
-        s.ageing = max(s.ageing, math.log1p((s.dwell + dt) / p.static_ageing_dwell))
+    if resting:
+        s.ageing = max(s.ageing, math.log1p(s.dwell / p.static_ageing_dwell))
     else:
         s.ageing *= exp(-abs(d_theta) / p.static_ageing_slip_scale)
     return p.static_ageing_rate * s.ageing
 
 
 @law
-def relaxed_share(p, s, d_theta, dt, length):
-    """stress_relaxation: share of the elastic torque lost, R log10(1 + hold / t_0), recovered over ``length``.
+def relaxed_share(p, s, d_theta, resting):
+    """stress_relaxation: share of the elastic torque lost, R log10(1 + hold / t_0), recovered over an angle.
 
     Log-time relaxation of filled rubber (Gent 1962).
     """
     if p.stress_relaxation_per_decade == 0.0:
         return 0.0
-    if d_theta == 0.0:
+    if resting:
         s.relaxed = max(
-            s.relaxed, p.stress_relaxation_per_decade * math.log10(1.0 + (s.dwell + dt) / p.stress_relaxation_onset)
+            s.relaxed, p.stress_relaxation_per_decade * math.log10(1.0 + s.dwell / p.stress_relaxation_onset)
         )
     else:
-        s.relaxed *= exp(-abs(d_theta) / length)
+        s.relaxed *= exp(-abs(d_theta) / p.stress_relaxation_recovery_angle)
     return min(s.relaxed, 0.9)
 
 
 @law
-def stiffness_factor(p, s, sign, length):
-    """Presliding stiffness relative to the baseline: payne_softening and mullins_softening (1 when neutral).
+def tangent_factor(p, s, d_theta, sign, length):
+    """Presliding stiffness relative to the baseline, as a factor on the bristle's own motion (1 when neutral).
 
-    Payne: 1 + a / (1 + ((z - z_reversal) / angle)**2), stiffer for small amplitudes since the last reversal (Payne
-    1962, Kraus 1984); Mullins: 1 + a (1 - z_max / length), virgin rubber is stiffer until it was once fully sheared
-    (Mullins 1948).
+    Payne: 1 + a / (1 + (angle since reversal / angle)**2), stiffer for small amplitudes (Payne 1962, Kraus 1984);
+    Mullins: 1 + a (1 - z_max / length), virgin rubber is stiffer until it was once fully sheared (Mullins 1948).
+    The factor scales dz, not sigma_0, so the torque never jumps.
     """
     factor = 1.0
     if p.payne_softening_amplitude != 0.0:
         if sign != 0.0 and sign != s.direction:
-            s.z_reversal = s.z
-        strain = (s.z - s.z_reversal) / p.payne_softening_angle
+            s.since_reversal = 0.0
+        strain = (s.since_reversal + 0.5 * abs(d_theta)) / p.payne_softening_angle
+        s.since_reversal += abs(d_theta)
         factor += p.payne_softening_amplitude / (1.0 + strain * strain)
     if p.mullins_softening_amplitude != 0.0:
         factor += p.mullins_softening_amplitude * max(0.0, 1.0 - s.z_max / length)

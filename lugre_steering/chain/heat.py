@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from lugre_steering.chain.compiled import exp, law
 
 
@@ -22,8 +24,8 @@ def advance_heat(p, s, energy, dt, effects):
     """Temperatures after friction released ``energy`` [J] in ``dt`` [s]: tread and, as effects, carcass and flash.
 
     heat_partition: (1 - ground_share) of it enters the rubber. carcass_heat_sink: a second node of its own capacity
-    behind the tread, coupled by a conductance. flash_temperature: low-passed power times a resistance is added where
-    friction reads the temperature. ambient_drift: the air warms linearly.
+    behind the tread, coupled by a conductance. flash_temperature: a resistance times the low-passed power, which
+    beyond saturation_power counts with its root (large Peclet number), is added where friction reads the temperature. ambient_drift: the air warms linearly.
     """
     if not effects:
         s.temperature = heat(s.temperature, energy, dt, p.heat_capacity, p.cooling, s.air_temperature)
@@ -41,4 +43,6 @@ def advance_heat(p, s, energy, dt, effects):
         s.carcass_temperature = mean + (s.carcass_temperature - mean) * decay
     if p.flash_temperature_resistance != 0.0 and dt > 0.0:
         decay = exp(-dt / p.flash_temperature_time_constant)
-        s.flash_power = energy / dt + (s.flash_power - energy / dt) * decay
+        power = energy / dt
+        power /= math.sqrt(1.0 + power / p.flash_temperature_saturation_power)
+        s.flash_power = power + (s.flash_power - power) * decay

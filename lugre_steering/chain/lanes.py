@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Many parameter sets over one record: the baseline laws on SIMD lanes, one lane per set, blocks of lanes on threads."""
+"""Many parameter sets over one record: the baseline laws on SIMD lanes, blocks of lanes on threads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
-from lugre_steering.chain.compiled import law
 from lugre_steering.chain.contact import bristle, bristle_work, stribeck
 from lugre_steering.chain.heat import heat
 from lugre_steering.chain.layout import EFFECT_FIELDS
@@ -23,7 +22,8 @@ LANES = 64
 
 _PARAMETERS = (
     "static_torque", "coulomb_torque", "sigma_0", "damping_factor", "stribeck_speed", "heat_capacity", "cooling",
-    "air_temperature", "aligning_torque", "gravity_cos", "table_low", "table_step", "initial_bristle", "rubber_temperature",
+    "air_temperature", "aligning_torque", "gravity_cos", "table_low", "table_step", "initial_bristle",
+    "rubber_temperature",
 )  # fmt: skip
 # Rows of the block's one buffer, LANES numbers each. One buffer with constant row offsets is what lets LLVM prove that
 # the lanes are independent.
@@ -35,7 +35,7 @@ _PARAMETERS = (
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
 def _block(b, rubber, time, theta, omega, torque, first, count):
-    """Advance ``count`` <= LANES sets through the record; ``rubber`` (sets or 1, rows, 2); fills ``torque[:, first:]``."""
+    """Advance ``count`` <= LANES sets through the record; ``rubber`` (sets or 1, rows, 2); fills ``torque``."""
     last = rubber.shape[1] - 2
     for i in range(time.size):
         dt = time[i] - time[max(i - 1, 0)]
@@ -76,8 +76,8 @@ def _block(b, rubber, time, theta, omega, torque, first, count):
 def torque_sets(parameters: Records, rubber: Array, time: Array, theta: Array, omega: Array) -> Array:
     """Torque [N m] (n, sets) of one track for each parameter record of ``parameters`` (sets,).
 
-    ``rubber`` (rows, 2) for all sets or (sets, rows, 2). Same laws and numbers as ``torque_side`` to rounding. Records with
-    an effect or another Stribeck exponent than 2 go through ``torque_side``.
+    ``rubber`` (rows, 2) for all sets or (sets, rows, 2). Same laws and numbers as ``torque_side`` to rounding.
+    Records with an effect or another Stribeck exponent than 2 go through ``torque_side``.
     """
     sets = parameters.size
     tables = rubber[np.newaxis] if rubber.ndim == 2 else rubber

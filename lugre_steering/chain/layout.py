@@ -41,11 +41,12 @@ EFFECT_FIELDS = (
     "direction_asymmetry_asymmetry", "surface_patch_change", "surface_patch_angle_low", "surface_patch_angle_high",
     "surface_patch_time_start", "surface_patch_time_end", "wear_polishing_amount", "wear_polishing_slip_scale",
     "static_ageing_rate", "static_ageing_dwell", "static_ageing_slip_scale", "stress_relaxation_per_decade",
-    "stress_relaxation_onset", "payne_softening_amplitude", "payne_softening_angle", "mullins_softening_amplitude",
+    "stress_relaxation_onset",
+    "stress_relaxation_recovery_angle", "payne_softening_amplitude", "payne_softening_angle", "mullins_softening_amplitude",
     "viscous_friction_sigma_2", "distributed_contact_spread",
     # thermal
     "heat_partition_ground_share", "carcass_heat_sink_conductance", "carcass_heat_sink_capacity",
-    "flash_temperature_resistance", "flash_temperature_time_constant", "ambient_drift_rate",
+    "flash_temperature_resistance", "flash_temperature_saturation_power", "flash_temperature_time_constant", "ambient_drift_rate",
     # parallel torque
     "end_stop_engage_angle", "end_stop_stiffness", "end_stop_cubic_stiffness", "end_stop_loss", "end_stop_shift",
     "yaw_inertia_inertia", "kingpin_jacking_amplitude", "kingpin_jacking_second_harmonic", "slope_bias_torque",
@@ -77,7 +78,7 @@ STATE = np.dtype(
         ("ageing", np.float64),  # log-dwell memory of the static level
         ("relaxed", np.float64),  # relaxed share of the elastic torque
         ("direction", np.float64),  # sign of the last contact motion
-        ("z_reversal", np.float64),  # bristle deflection at the last reversal [rad]
+        ("since_reversal", np.float64),  # contact angle since the last reversal [rad]
         ("z_max", np.float64),  # largest |bristle deflection| so far [rad]
         ("stop_loading", np.float64),  # 1 end stop loading ... 0 unloading
         ("berm_left", np.float64),  # farthest push of the soil, positive side [rad]

@@ -17,7 +17,7 @@ from lugre_steering.chain.contact import (
     bristle_work,
     level_factor,
     relaxed_share,
-    stiffness_factor,
+    tangent_factor,
     stribeck,
 )
 from lugre_steering.chain.heat import advance_heat
@@ -27,6 +27,9 @@ from lugre_steering.chain.torque import aligning, hydraulic_limits, losses, para
 from lugre_steering.recording import Array
 
 Records = np.ndarray[Any, np.dtype[np.void]]
+
+REST_RATE_RAD_S = 3e-4
+"""Below this rate a track counts as standing (memories of dwell); noise-free creep of 0.05 deg/s is motion."""
 
 _NORMAL_QUANTILES = (-1.38299413, -0.67448975, -0.21042839, 0.21042839, 0.67448975, 1.38299413)
 
@@ -54,7 +57,6 @@ def begin(p, s, theta):
     s.theta = theta
     s.link_angle = theta
     s.z = p.initial_bristle
-    s.z_reversal = p.initial_bristle
     s.z_max = abs(p.initial_bristle)
     for i in range(ELEMENTS):
         s.elements[i] = p.initial_bristle
@@ -116,31 +118,33 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     d_theta = contact_increment(p, s, theta, stiffness, length, effects)
     turned = theta - s.theta
     s.theta = theta
+    resting = abs(omega) < REST_RATE_RAD_S
+    s.dwell = s.dwell + dt if resting else 0.0
     sign = 0.0 if d_theta == 0.0 else math.copysign(1.0, d_theta)
 
-    level, aged = friction_ratio, 0.0
+    level, aged, faster = friction_ratio, 0.0, 1.0
     if effects:
-        stiffness *= stiffness_factor(p, s, sign, length)
+        faster = tangent_factor(p, s, d_theta, sign, length)
         level *= level_factor(p, s, sign)
-        aged = aged_level(p, s, d_theta, dt)
+        aged = aged_level(p, s, d_theta, resting)
     g = stribeck(omega, p.static_torque, p.coulomb_torque, p.stribeck_speed, p.stribeck_exponent)
     g = level * (g + p.coulomb_torque * aged)
     z = s.z
     if effects and p.distributed_contact_spread != 0.0:
         elastic, z_next, work = distributed(s, d_theta, stiffness, g)
     else:
-        z_next = bristle(z, d_theta, stiffness, g)
-        work = bristle_work(z, z_next, d_theta, g)
+        z_next = bristle(z, faster * d_theta, stiffness, g)
+        work = bristle_work(z, z_next, faster * d_theta, g) / faster
         elastic = stiffness * z_next
     sigma_1 = p.damping_factor * math.sqrt(stiffness)
     rate = omega - abs(omega) * z_next * stiffness / g
     damping = sigma_1 * rate
     viscous = p.viscous_friction_sigma_2 * omega if effects else 0.0
     if effects:
-        elastic *= 1.0 - relaxed_share(p, s, d_theta, dt, length)
+        elastic *= 1.0 - relaxed_share(p, s, d_theta, resting)
 
     work += sigma_1 * omega * (z_next - z) + viscous * d_theta
-    dissipated = work - 0.5 * stiffness * (z_next * z_next - z * z)
+    dissipated = work - 0.5 * stiffness / faster * (z_next * z_next - z * z)
     s.work += work
     s.heat += max(dissipated, 0.0)
     s.non_passive += min(dissipated, 0.0)
@@ -149,7 +153,6 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     s.z = z_next
     s.z_max = max(s.z_max, abs(z_next))
     s.slip += abs(d_theta)
-    s.dwell = s.dwell + dt if turned == 0.0 else 0.0
     if sign != 0.0:
         s.direction = sign
 

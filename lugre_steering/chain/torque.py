@@ -10,7 +10,7 @@ from lugre_steering.chain.compiled import exp, law
 
 STOP_TRAVEL_RAD = 0.002
 """Travel over which an end stop changes between its loading and unloading branch."""
-REST_RATE_RAD_S = 2e-3
+SIGN_RATE_RAD_S = 2e-3
 """Rate at which losses that oppose motion are at 76 % of their level: an odd, smooth sign function."""
 SEAL_TRAVEL_RAD = 2e-3
 """Travel in which a cylinder seal changes sides."""
@@ -80,7 +80,7 @@ def losses(p, s, omega, d_theta, load):
     torque = p.cylinder_friction_viscous * omega + p.line_loss_linear_b * omega
     torque += p.line_loss_quadratic_c * omega * abs(omega)
     if p.cylinder_friction_coulomb != 0.0 or p.cylinder_friction_load_share != 0.0 or p.back_pressure_torque != 0.0:
-        moving = math.tanh(omega / REST_RATE_RAD_S)
+        moving = math.tanh(omega / SIGN_RATE_RAD_S)
         s.seal = max(-1.0, min(1.0, s.seal + d_theta / SEAL_TRAVEL_RAD))
         level = p.cylinder_friction_coulomb / p.sides + p.cylinder_friction_load_share * abs(load)
         bump = 1.0 + p.cylinder_friction_breakaway * exp(-((omega / 0.02) ** 2))

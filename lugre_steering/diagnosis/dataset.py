@@ -23,7 +23,8 @@ GAP_S = 0.25
 class Run:
     """One bag, resampled on a uniform clock of n samples; sides first, lines second, time last.
 
-    ``side_torque`` (sides, n) is each side's share of the measured torque, ``gains`` (sides, lines, n) torque per pressure,
+    ``side_torque`` (sides, n) is each side's share of the measured torque and ``side_slope`` its derivative by the angle at
+    constant pressures [N m/rad], ``gains`` (sides, lines, n) torque per pressure,
     ``sigma`` (n,) standard deviation of the measured torque from the sheet's pressure noise, ``valid`` (n,) false in gaps.
     """
 
@@ -35,6 +36,7 @@ class Run:
     gains: Array
     pressure: Array
     side_torque: Array
+    side_slope: Array
     measured: Array
     sigma: Array
     valid: np.ndarray[tuple[int], np.dtype[np.bool_]]
@@ -77,17 +79,19 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     if vehicle.hydraulics is not None:
         gains = line_gains(vehicle, theta)
         pressure = np.array([_at(time, present[f"pressure/{line}"]) for line in lines]) - gauge_offset(vehicle)
+        turned = line_gains(vehicle, theta + 1e-4)
         sigma = vehicle.sensors.pressure_noise_Pa * np.sqrt((gains.sum(axis=0) ** 2).sum(axis=0))
     else:
         assert vehicle.torque_sensor is not None
-        gains = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
+        gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
         pressure = _at(time, present["measured_torque"])[None, :]
         sigma = np.full(time.size, vehicle.torque_sensor.noise_Nm)
     side_torque = np.einsum("slt,lt->st", gains, pressure)
+    side_slope = np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure)
     floor = 1e-3 * float(np.std(side_torque.sum(axis=0))) + 1e-12
     return Run(
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
-        side_torque=side_torque, measured=side_torque.sum(axis=0), sigma=np.maximum(sigma, floor), valid=valid,
+        side_torque=side_torque, side_slope=side_slope, measured=side_torque.sum(axis=0), sigma=np.maximum(sigma, floor), valid=valid,
     )  # fmt: skip
 
 

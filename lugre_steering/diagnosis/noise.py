@@ -17,6 +17,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
+from lugre_steering.chain.step import REST_RATE_RAD_S
 from lugre_steering.diagnosis.dataset import Run, angle_noise, motion
 from lugre_steering.diagnosis.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.diagnosis.smoother import smooth_angle
@@ -46,7 +47,7 @@ class QuietNoise:
 def standstill(run: Run, minimum_s: float = 1.0) -> list[slice]:
     """Stretches in which no side moves, at least ``minimum_s`` long, without the first 0.3 s."""
     dt = run.time[1] - run.time[0]
-    still = (np.abs(run.omega).max(axis=0) < 1e-5) & run.valid
+    still = (np.abs(run.omega).max(axis=0) < REST_RATE_RAD_S) & run.valid
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     skip = round(0.3 / dt)
     return [slice(a + skip, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a - skip) * dt >= minimum_s]

@@ -176,6 +176,10 @@ class Problem:
         if name in ("pressure_offset", "pressure_drift"):
             gain = run.torque_per_line[self._lines.index(candidate.line)]
             return torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * run.time)
+        if name == "angle_offset":
+            return torque + values["offset"] * run.side_slope.sum(axis=0)
+        if name == "angle_scale":
+            return torque + values["scale"] * (run.theta * run.side_slope).sum(axis=0)
         if name == "moment_arm_error":
             factor = values.get("linear", 0.0) * run.theta + values.get("quadratic", 0.0) * run.theta**2
             return torque - (factor * run.side_torque).sum(axis=0)

@@ -10,6 +10,7 @@ least squares on a banded system (Whittaker 1923 for the quadratic case; Geman a
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from scipy.linalg import solveh_banded
 
 from lugre_steering.recording import Array
@@ -18,6 +19,8 @@ _DIFFERENCE = {1: (-1.0, 1.0), 3: (-1.0, 3.0, -3.0, 1.0)}
 _WEIGHT = {1: 0.1, 3: 0.3}
 _WIDTH_SIGMA = {1: 1e-3, 3: 3e-3}
 ITERATIONS = 15
+SETTLE_SIGMA = 0.02
+"""Half width of the final dead band in units of the sensor noise."""
 
 
 def smooth_angle(angle: Array, sigma: float) -> Array:
@@ -39,7 +42,18 @@ def smooth_angle(angle: Array, sigma: float) -> Array:
         for order in weights:
             step = np.diff(estimate, n=order)
             weights[order] = _WEIGHT[order] / ((_WIDTH_SIGMA[order] * sigma) ** 2 + step**2)
-    return np.asarray(estimate)
+    return _settled(np.asarray(estimate), SETTLE_SIGMA * sigma)
+
+
+@njit(cache=True)
+def _settled(angle: Array, half_width: float) -> Array:
+    """Play operator against the last traces of noise at standstill: what moves less than ``half_width`` [rad] does not move at all."""
+    out = np.empty_like(angle)
+    center = angle[0]
+    for i in range(angle.size):
+        center = min(max(center, angle[i] - half_width), angle[i] + half_width)
+        out[i] = center
+    return out
 
 
 def _add_penalty(band: Array, weight: Array, coefficients: tuple[float, ...]) -> None:

@@ -18,12 +18,14 @@ EFFECTS = (
     ),
     Effect(
         "flash_temperature", "thermal", 2, "Hot spots at the asperities while sliding",
-        "friction reads T + R P, P low-passed with tau",
+        "friction reads T + R P / sqrt(1 + P / saturation_power), low-passed with tau",
         "Persson, J. Phys.: Condens. Matter 18 (2006) 7789; Greenwood, Wear 150 (1991) 153",
         "plateaus fall with the power, within a second, and recover at once", "friction power",
         (
             Parameter("resistance", "K/W", "temperature rise per friction power of one track", 1e-3, 0.0, 0.1),
             Parameter("time_constant", "s", "of the flash", 0.5, 0.05, 20.0, (0.3, 3.0)),
+            Parameter("saturation_power", "W", "power beyond which it grows with the root (large Peclet number)", 500.0, 10.0, 1e7,
+                      (100.0, 1e5)),
         ),
         ("carcass_heat_sink", "wear_polishing"),
     ),
