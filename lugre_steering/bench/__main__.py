@@ -13,12 +13,12 @@ NAMES = ("kernel", "replay", "live")
 def main(arguments: list[str]) -> int:
     """Run the named benchmark with the remaining arguments; without a name, all of them."""
     if arguments and arguments[0] in NAMES:
-        chosen, rest = (arguments[0],), arguments[1:]
+        chosen, rest = arguments[:1], arguments[1:]
     elif arguments and not arguments[0].startswith("-"):
         print(f"bench: got '{arguments[0]}', expected one of {', '.join(NAMES)}", file=sys.stderr)
         return 2
     else:
-        chosen, rest = NAMES, arguments
+        chosen, rest = list(NAMES), arguments
     for name in chosen:
         importlib.import_module(f"lugre_steering.bench.{name}").run(rest)
     return 0

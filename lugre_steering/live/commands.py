@@ -1,0 +1,35 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Feed-forward commands without a stamp: what a controller behind them needs to be safe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class CommandRamp:
+    """Leads each command from the last one published to the wanted one, over a fixed time after every silence.
+
+    An effort controller may hold the last command it got; the topic therefore continues where it stopped. Before the
+    first command a controller has none: the ramp starts at zero.
+    """
+
+    def __init__(self, timeout_s: float, ramp_s: float, joints: int) -> None:
+        self._timeout_ns = round(timeout_s * 1e9)
+        self._ramp_ns = round(ramp_s * 1e9)
+        self._published = [0.0] * joints
+        self._start = self._published
+        self._start_ns = 0
+        self._last_ns: int | None = None
+
+    def __call__(self, now_ns: int, wanted: Sequence[float]) -> list[float]:
+        """The command [N m] of each joint to publish now."""
+        if self._last_ns is None or not 0 <= now_ns - self._last_ns <= self._timeout_ns:
+            self._start, self._start_ns = self._published, now_ns
+        self._last_ns = now_ns
+        since = now_ns - self._start_ns
+        weight = since / self._ramp_ns if since < self._ramp_ns else 1.0
+        self._published = [
+            a + weight * (b - a) if weight < 1.0 else b for a, b in zip(self._start, wanted, strict=True)
+        ]
+        return self._published

@@ -1,0 +1,178 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the node knows about its own health, and its /diagnostics messages (names after REP-107)."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from lugre_steering.recording import Kind
+from lugre_steering.vehicle import Vehicle
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+FAULT_HOLD_NS = 1_000_000_000
+RESIDUAL_SECONDS = 10
+
+
+class Window:
+    """The latest values of a duration [ns], in a ring of fixed size."""
+
+    def __init__(self, size: int) -> None:
+        self.values = np.zeros(size, np.int64)
+        self.count = 0
+        self.max_ns = 0
+
+    def add(self, value_ns: int) -> None:
+        self.values[self.count % self.values.size] = value_ns
+        self.count += 1
+        if value_ns > self.max_ns:
+            self.max_ns = value_ns
+
+    def percentiles_ms(self, *percent: float) -> list[float]:
+        """Percentiles [ms] of the values in the ring; NaN without any."""
+        if not self.count:
+            return [math.nan] * len(percent)
+        latest = self.values[: self.count]
+        return [float(value) * 1e-6 for value in np.percentile(latest, percent)]
+
+
+class Health:
+    """Arrivals, latencies, residual level and faults; all cheap to update in a callback."""
+
+    def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int) -> None:
+        self._node = "steering_torque_estimator"
+        self._hardware = vehicle.name
+        self._kinds = [channel.kind for channel in vehicle.channels]
+        self._topics: list[str] = [""] * len(self._kinds)
+        self._timeouts_s = [angle_timeout_s if kind is Kind.ANGLE else pressure_timeout_s for kind in self._kinds]
+        self.arrivals = [0] * len(self._kinds)
+        self.arrived_ns = [0] * len(self._kinds)  # ROS time of the last message
+        self.behind_ns = [0] * len(self._kinds)  # ROS time minus stamp of the last message
+        self.arrival_to_publish = Window(window)
+        self.stamp_to_publish = Window(window)
+        self.estimates = 0
+        self.residuals = 0
+        self.withheld: Counter[str] = Counter()  # outputs not published, by reason
+        self.unused: Counter[str] = Counter()  # messages that never reached the estimator, by reason
+        self.exceptions = 0
+        self.last_exception = ""
+        self._fault_ns = -FAULT_HOLD_NS
+        self._squares = 0.0
+        self._levels: deque[tuple[float, int]] = deque(maxlen=RESIDUAL_SECONDS)
+        self._then: Mapping[str, int] = {}
+        self._then_arrivals = list(self.arrivals)
+        self._then_residuals = 0
+        self._then_saturated = 0
+
+    def set_topics(self, topics: Sequence[str]) -> None:
+        """Full names of the input topics, in the order of the channels."""
+        self._topics = list(topics)
+
+    def fault(self, error: BaseException, monotonic_ns: int) -> None:
+        """Remember an exception; outputs are withheld until a second has passed without another."""
+        self.exceptions += 1
+        self.last_exception = f"{type(error).__name__}: {error}"
+        self._fault_ns = monotonic_ns
+
+    def faulty(self, monotonic_ns: int) -> bool:
+        return self.exceptions > 0 and monotonic_ns - self._fault_ns < FAULT_HOLD_NS
+
+    def add_residual(self, residual: float) -> None:
+        self.residuals += 1
+        self._squares += residual * residual
+
+    def statuses(
+        self,
+        now_ns: int,
+        monotonic_ns: int,
+        elapsed_s: float,
+        counters: Mapping[str, Mapping[str, int]],
+        saturated_steps: int,
+    ) -> list[DiagnosticStatus]:
+        """The status messages of the last ``elapsed_s`` seconds; ``counters`` as the estimator keeps them."""
+        return [
+            self._inputs(now_ns, elapsed_s, list(counters)),
+            self._rejected(counters),
+            self._latency(),
+            self._residual(saturated_steps),
+            self._outputs(monotonic_ns),
+        ]
+
+    def _status(self, component: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
+        pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
+        name = f"{self._node}: {component}"
+        return DiagnosticStatus(level=level, name=name, message=message, hardware_id=self._hardware, values=pairs)
+
+    def _inputs(self, now_ns: int, elapsed_s: float, labels: Sequence[str]) -> DiagnosticStatus:
+        level, troubles = OK, []
+        values: dict[str, object] = {}
+        for i, label in enumerate(labels):
+            age_s = (now_ns - self.arrived_ns[i]) * 1e-9 if self.arrivals[i] else math.inf
+            values[f"{label} topic"] = self._topics[i]
+            values[f"{label} rate [Hz]"] = (self.arrivals[i] - self._then_arrivals[i]) / elapsed_s
+            values[f"{label} age [s]"] = age_s
+            if self.arrivals[i]:
+                values[f"{label} stamp behind clock [s]"] = self.behind_ns[i] * 1e-9
+            if self._kinds[i] is Kind.AIR_TEMPERATURE:
+                continue  # optional and slow
+            if not 0.0 <= age_s <= self._timeouts_s[i]:
+                troubles.append(f"{label} missing" if not self.arrivals[i] else f"{label} stale")
+                level = max(level, ERROR if self._kinds[i] is Kind.ANGLE else WARN)
+            elif abs(self.behind_ns[i]) > self._timeouts_s[i] * 1e9:
+                troubles.append(f"{label} stamps are not close to the clock")
+                level = max(level, WARN)
+        self._then_arrivals = list(self.arrivals)
+        return self._status("inputs", level, "; ".join(troubles) or "all inputs arrive", values)
+
+    def _rejected(self, counters: Mapping[str, Mapping[str, int]]) -> DiagnosticStatus:
+        values = {f"{label} {reason}": n for label, counts in counters.items() for reason, n in counts.items()}
+        values.update(self.unused)
+        now = {key: n for key, n in values.items() if not key.endswith(" accepted")}
+        new = [key for key, n in now.items() if n > self._then.get(key, 0)]
+        self._then = now
+        message = f"new: {', '.join(new)}" if new else "nothing new rejected"
+        return self._status("rejected", WARN if new else OK, message, values)
+
+    def _latency(self) -> DiagnosticStatus:
+        values: dict[str, object] = {"torques published": self.estimates}
+        for name, window in (
+            ("arrival to publish", self.arrival_to_publish),
+            ("stamp to publish", self.stamp_to_publish),
+        ):
+            p50, p99 = window.percentiles_ms(50.0, 99.0)
+            values |= {f"{name} p50 [ms]": p50, f"{name} p99 [ms]": p99, f"{name} max [ms]": window.max_ns * 1e-6}
+        values["samples in window"] = min(self.stamp_to_publish.count, self.stamp_to_publish.values.size)
+        return self._status("latency", OK, "p50 and p99 of the window, max since start", values)
+
+    def _residual(self, saturated_steps: int) -> DiagnosticStatus:
+        self._levels.append((self._squares, self.residuals - self._then_residuals))
+        self._squares, self._then_residuals = 0.0, self.residuals
+        count = sum(n for _, n in self._levels)
+        rms = math.sqrt(sum(squares for squares, _ in self._levels) / count) if count else math.nan
+        saturated = saturated_steps > self._then_saturated
+        self._then_saturated = saturated_steps
+        message = "rubber temperature outside the rubber table" if saturated else ""
+        message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
+        values: dict[str, object] = {
+            f"RMS over {RESIDUAL_SECONDS} s [N m]": rms,
+            "residuals": self.residuals,
+            "steps outside rubber table": saturated_steps,
+        }
+        return self._status("residual", WARN if saturated or not count else OK, message, values)
+
+    def _outputs(self, monotonic_ns: int) -> DiagnosticStatus:
+        faulty = self.faulty(monotonic_ns)
+        level = ERROR if faulty else (WARN if self.exceptions else OK)
+        message = f"withheld after an exception: {self.last_exception}" if faulty else "running"
+        values: dict[str, object] = {"exceptions": self.exceptions, "last exception": self.last_exception}
+        values |= {f"withheld: {reason}": n for reason, n in self.withheld.items()}
+        return self._status("outputs", level, message, values)
+
+
+def _text(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

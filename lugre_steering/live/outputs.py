@@ -1,0 +1,117 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The node's output topics. Message objects are reused; every number is a Python float and finite before it leaves."""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState, Temperature
+from std_msgs.msg import Float64MultiArray
+
+from lugre_steering.chain.step import Records
+from lugre_steering.live.commands import CommandRamp
+from lugre_steering.live.parameters import Settings
+from lugre_steering.vehicle import Vehicle
+
+# Reliable, because ros2_control and most tools subscribe so; best-effort subscribers receive it as well.
+_QOS = QoSProfile(depth=50)
+
+
+class Outputs:
+    """Publishes what the estimator returns."""
+
+    def __init__(self, node: Node, vehicle: Vehicle, settings: Settings) -> None:
+        self._node = node
+        self._stamp = Time()
+        joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
+        self._sides = len(joints)
+        frame = settings.frame_id
+
+        def publisher(message: type, topic: str) -> Publisher:
+            return node.create_publisher(message, topic, _QOS)
+
+        self._torque = self._wrench(frame), publisher(WrenchStamped, "~/torque")
+        self._cylinder_torque = self._wrench(frame), publisher(WrenchStamped, "~/cylinder_torque")
+        self._residual = self._wrench(frame), publisher(WrenchStamped, "~/residual")
+        self._estimate = self._joint_state(frame, joints), publisher(JointState, "~/estimate")
+        self._feed_forward = self._joint_state(frame, joints), publisher(JointState, "~/feed_forward")
+        self._temperatures = []
+        if vehicle.rubber is not None:
+            for side in vehicle.sides:
+                message = Temperature()
+                message.header.frame_id = f"{side}_track"
+                message.header.stamp = self._stamp
+                self._temperatures.append((message, publisher(Temperature, f"~/rubber_temperature/{side}")))
+        self._commands: tuple[Float64MultiArray, Publisher] | None = None
+        if settings.publish_commands:
+            self._commands = Float64MultiArray(), publisher(Float64MultiArray, "~/feed_forward/commands")
+        self._ramp = CommandRamp(settings.angle_timeout_s, settings.recovery_ramp_s, self._sides)
+
+    def _wrench(self, frame: str) -> WrenchStamped:
+        message = WrenchStamped()
+        message.header.frame_id = frame
+        message.header.stamp = self._stamp
+        return message
+
+    def _joint_state(self, frame: str, joints: list[str]) -> JointState:
+        message = JointState(name=joints)
+        message.header.frame_id = frame
+        message.header.stamp = self._stamp
+        return message
+
+    def _set_stamp(self, stamp_ns: int) -> None:
+        self._stamp.sec, self._stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+
+    def torque(self, stamp_ns: int, torque: float) -> bool:
+        """Publish the total torque; False, and nothing published, if it is not a finite number."""
+        if not math.isfinite(torque):
+            return False
+        self._set_stamp(stamp_ns)
+        message, publisher = self._torque
+        message.wrench.torque.z = torque
+        publisher.publish(message)
+        return True
+
+    def estimate(self, stamp_ns: int, row: Records) -> bool:
+        """Publish angles, rates, torques, temperatures and feed-forward of each joint."""
+        n = self._sides
+        theta, omega, torque, temperature, feed_forward = (
+            row[name][:n].tolist() for name in ("theta", "omega", "torque", "temperature", "feed_forward")
+        )
+        if not math.isfinite(sum(theta) + sum(omega) + sum(torque) + sum(temperature) + sum(feed_forward)):
+            return False
+        self._set_stamp(stamp_ns)
+        message, publisher = self._estimate
+        message.position, message.velocity, message.effort = theta, omega, torque
+        publisher.publish(message)
+        message, publisher = self._feed_forward
+        message.effort = feed_forward
+        publisher.publish(message)
+        for (message, publisher), value in zip(self._temperatures, temperature, strict=False):
+            message.temperature = value
+            publisher.publish(message)
+        return True
+
+    def commands(self, now_ns: int, row: Records) -> None:
+        """Publish the feed-forward as commands, if the node is to; the caller sees to it that ``row`` is fresh."""
+        if self._commands is not None:
+            message, publisher = self._commands
+            message.data = self._ramp(now_ns, row["feed_forward"][: self._sides].tolist())
+            publisher.publish(message)
+
+    def residual(self, row: Records) -> bool:
+        """Publish cylinder torque and residual of one past stamp."""
+        measured, residual = float(row["measured_torque"]), float(row["residual"])
+        if not math.isfinite(measured + residual):
+            return False
+        self._set_stamp(int(row["stamp_ns"]))
+        for (message, publisher), value in ((self._cylinder_torque, measured), (self._residual, residual)):
+            message.wrench.torque.z = value
+            publisher.publish(message)
+        return True

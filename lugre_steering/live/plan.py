@@ -1,0 +1,44 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The feed-forward preview: a commanded trajectory as absolute times and angles."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lugre_steering.errors import DataError
+from lugre_steering.estimator import PLAN_POINTS
+from lugre_steering.recording import Array, IntArray
+
+if TYPE_CHECKING:  # replay reads the same messages without ROS
+    from trajectory_msgs.msg import JointTrajectory
+
+
+def planned_angles(message: JointTrajectory, joints: Sequence[str], latest_ns: int) -> tuple[IntArray, Array]:
+    """Times (n,) [ns] and angles (joints, n) [rad] of a trajectory; ``DataError`` says why one is of no use.
+
+    A zero header stamp means "from now on" (as ros2_control reads it): from ``latest_ns``, the newest angle's stamp.
+    """
+    missing = [joint for joint in joints if joint not in message.joint_names]
+    if missing:
+        raise DataError(f"no joint {', '.join(missing)} in it")
+    if len(message.points) > PLAN_POINTS:
+        raise DataError(f"{len(message.points)} points, more than {PLAN_POINTS}")
+    start_ns = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec or latest_ns
+    columns = [message.joint_names.index(joint) for joint in joints]
+    times, angles = [], []
+    for point in message.points:
+        if len(point.positions) != len(message.joint_names):
+            raise DataError(f"{len(point.positions)} positions for {len(message.joint_names)} joints")
+        times.append(start_ns + point.time_from_start.sec * 1_000_000_000 + point.time_from_start.nanosec)
+        angles.append([point.positions[column] for column in columns])
+    if any(not math.isfinite(angle) or abs(angle) > math.pi for row in angles for angle in row):
+        raise DataError("an angle that is not a number from -pi to pi")
+    if any(later <= earlier for earlier, later in itertools.pairwise(times)):
+        raise DataError("points that are not in order of time")
+    return np.array(times, np.int64), np.array(angles, np.float64).reshape(len(times), len(joints)).T

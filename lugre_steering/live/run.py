@@ -1,0 +1,75 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Process of the node: start, spin, stop."""
+
+from __future__ import annotations
+
+import gc
+import sys
+
+import rclpy
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.task import Future
+
+from lugre_steering.errors import LugreSteeringError
+from lugre_steering.live.estimator_node import SteeringTorqueEstimator
+
+_LONG_S = 1e5
+
+
+def run(args: list[str]) -> int:
+    """Run the node until the context is shut down; returns the exit code."""
+    try:
+        rclpy.init(args=args)
+    except Exception as error:  # rclpy raises several private types for arguments it cannot parse
+        return _refused(error)
+    try:
+        node = SteeringTorqueEstimator()
+        # What exists now lives until the end: a collection during a callback need not look at it.
+        gc.collect()
+        gc.freeze()
+        spin(node)
+    except LugreSteeringError as error:
+        return _refused(error)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+def _refused(error: BaseException) -> int:
+    print(f"estimator: {' '.join(str(error).split())}", file=sys.stderr)
+    return 2
+
+
+def spin(node: SteeringTorqueEstimator) -> None:
+    """Run callbacks until shutdown; an exception that the middleware raises between them does not end the node."""
+    executor = make_executor(node.settings.executor)
+    executor.add_node(node)
+    try:
+        while rclpy.ok():
+            _spin_some(executor, node)
+    except ExternalShutdownException:
+        pass
+    finally:
+        executor.shutdown()
+
+
+def _spin_some(executor: Executor, node: SteeringTorqueEstimator) -> None:
+    try:
+        # Not spin(): the one of EventsExecutor in rclpy 7.1 keeps a core busy and ignores SIGTERM.
+        executor.spin_until_future_complete(Future(), timeout_sec=_LONG_S)
+    except ExternalShutdownException:
+        raise
+    except Exception as error:
+        node.fault(error)
+
+
+def make_executor(kind: str) -> Executor:
+    """An executor by its parameter name."""
+    if kind == "single":
+        return SingleThreadedExecutor()
+    from rclpy.experimental.events_executor import EventsExecutor
+
+    return EventsExecutor()
