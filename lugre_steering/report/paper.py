@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +24,14 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 def draw_outcome(outcome: Outcome, file: Path) -> None:
-    """All panels one below the other; what was calibrated, what was checked and where it disagrees stands in the picture."""
+    """All panels one below the other; what was calibrated, what was checked and where it disagrees stands in the
+    picture."""
     with figure(len(outcome.panels), 1, outcome.caption, file) as axes:
         for ax, panel in zip(axes[:, 0], outcome.panels, strict=True):
             colours = iter(SERIES)
             for curve in panel.curves:
                 style = _STYLES[curve.style] or {"color": next(colours)}
-                marker = {"marker": "o", "markersize": 4} if curve.style == "series" and len(curve.x) < 10 else {}
+                marker = {"marker": "o", "markersize": 4} if 2 < len(curve.x) < 10 and curve.style != "points" else {}
                 ax.plot(curve.x, curve.y, label=curve.label, **style, **marker)
             ax.set_title(panel.title)
             ax.set_xlabel(panel.x_label)
@@ -56,15 +58,17 @@ def outcome_table(outcome: Outcome) -> Table:
     return table
 
 
-def checks_table(outcomes: list[Outcome]) -> Table:
+def checks_table(outcomes: Sequence[Outcome]) -> Table:
     """Pass or fail of every published statement."""
     table = Table(title="Published behaviour", title_justify="left", title_style="bold", show_lines=True)
-    for column in ("experiment", "statement", "published", "ours", ""):
+    table.add_column("experiment", no_wrap=True)
+    for column in ("statement", "published", "ours"):
         table.add_column(column, overflow="fold")
+    table.add_column("", no_wrap=True)
     for outcome in outcomes:
         for check in outcome.checks:
             verdict = "[green]pass[/green]" if check.passed else "[red]FAIL[/red]"
-            table.add_row(outcome.name, check.claim, check.published, check.ours, verdict)
+            table.add_row(outcome.name.removeprefix("paper-"), check.claim, check.published, check.ours, verdict)
     return table
 
 

@@ -23,7 +23,7 @@ def draw_simulation(run: Simulated, label: str, file: Path) -> None:
     pressures = {c.name: s for c, s in run.signals.items() if c.kind is Kind.PRESSURE}
     torques = [s for c, s in run.signals.items() if c.kind is Kind.TORQUE]
     effects = ", ".join(e.id for e in vehicle.effects) or "none"
-    caption = f"SYNTHETIC recording: {label}. Vehicle: {vehicle.name}. Effects added to the baseline: {effects}."
+    caption = f"SYNTHETIC recording: {label}. Effects added to the baseline: {effects}."
     with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9) as axes:
         rows = iter(axes[:, 0])
         ax = next(rows)
@@ -31,32 +31,30 @@ def draw_simulation(run: Simulated, label: str, file: Path) -> None:
             ax.plot(time, scale * theta, label=side)
         ax.set_title(f"{coordinate.name} (true)")
         ax.set_ylabel(unit)
-        ax.legend(ncols=2, loc="upper right")
 
         ax = next(rows)
         for signal in torques:
-            ax.plot(signal.time_s, signal.value, **MEASURED, label="sensor")
+            ax.plot(signal.time_s, signal.value * 1e-3, **MEASURED, label="sensor")
         ax.plot(time, truth.torque * 1e-3, **IMPROVED, label="all tracks")
         for side, track in zip(vehicle.sides, truth.tracks, strict=True):
             ax.plot(time, track["torque"] * 1e-3, linewidth=0.9, label=side)
         ax.set_title("torque that the actuators deliver (true)")
         ax.set_ylabel(f"k{coordinate.force_unit}")
-        ax.legend(ncols=4, loc="upper right")
 
         if pressures:
             ax = next(rows)
             for name, signal in pressures.items():
-                ax.plot(signal.time_s, signal.value * 1e-6, linewidth=0.8, label=name)
+                dashes = "--" if name.startswith("aux") else "-"  # both circuits share the load: their lines coincide
+                ax.plot(signal.time_s, signal.value * 1e-6, dashes, linewidth=1.0, label=name)
             ax.set_title(f"line pressures as recorded ({vehicle.sensors.pressure_reference})")
             ax.set_ylabel("MPa")
-            ax.legend(ncols=len(pressures), loc="upper right")
 
         ax = next(rows)
         for side, track in zip(vehicle.sides, truth.tracks, strict=True):
             ax.plot(time, track["temperature"], label=side)
         ax.set_title("tread rubber temperature (true)")
         ax.set_ylabel("degC")
-        ax.legend(ncols=2, loc="upper left")
         for ax in axes[:, 0]:
             ax.margins(x=0.0)
+            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes[-1, 0].set_xlabel("time (s)")

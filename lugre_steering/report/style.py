@@ -17,6 +17,7 @@ try:
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
+    from cycler import cycler
 except ImportError as error:
     raise LugreSteeringError("pictures need matplotlib: install 'lugre_steering[report]'") from error
 
@@ -28,7 +29,7 @@ ORIGINAL = {"color": "#1f4fb4", "linestyle": "-.", "linewidth": 1.4}
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
 """Colours for any other family of curves; told apart by readers with colour-deficient sight too (Okabe and Ito)."""
 
-RC: dict[str, Any] = {
+RC: Any = {
     "figure.dpi": 110,
     "savefig.dpi": 130,
     "font.size": 10,
@@ -41,7 +42,7 @@ RC: dict[str, Any] = {
     "grid.color": "#dddddd",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
-    "axes.prop_cycle": mpl.cycler(color=SERIES),
+    "axes.prop_cycle": cycler(color=SERIES),
     "legend.frameon": False,
     "legend.fontsize": 9,
     "lines.linewidth": 1.3,
@@ -52,8 +53,11 @@ _LINE_INCHES = 0.165
 
 
 @contextmanager
-def figure(rows: int, columns: int, caption: str, file: Path, row_inches: float = 3.0, width: float = 10.0) -> Iterator[Any]:
-    """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to ``file``.
+def figure(
+    rows: int, columns: int, caption: str, file: Path, row_inches: float = 3.0, width: float = 10.0
+) -> Iterator[Any]:
+    """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to
+    ``file``.
 
     The figure grows with its caption, so no line of it is ever cut off.
     """
@@ -65,7 +69,9 @@ def figure(rows: int, columns: int, caption: str, file: Path, row_inches: float 
         try:
             yield axes
             fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
-            fig.text(0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333")
+            fig.text(
+                0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333"
+            )
             fig.savefig(file, metadata={"Software": None})
         finally:
             plt.close(fig)

@@ -1,3 +1,4 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated recordings: manoeuvres, the modelled vehicle, its actuation and its sensors; and the published experiments."""
+"""Simulated recordings: manoeuvres, the modelled vehicle, its actuation and its sensors; and the published
+experiments."""

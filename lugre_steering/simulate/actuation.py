@@ -16,9 +16,11 @@ RETURN_PRESSURE_PA = 0.7e6
 
 
 def total_gains(vehicle: Vehicle, theta: Array) -> Array:
-    """Torque on the steering axis per pressure of each line [N m/Pa] (lines, n), both tracks together; theta (sides, n) [rad].
+    """Torque on the steering axis per pressure of each line [N m/Pa] (lines, n), both tracks together; theta (sides,
+    n) [rad].
 
-    With the effect moment_arm_error the true arms differ from the drawing by 1 + a theta + b theta**2, as diagnosis assumes.
+    With the effect moment_arm_error the true arms differ from the drawing by 1 + a theta + b theta**2, as diagnosis
+    assumes.
     """
     correction = sensor_correction(vehicle)
     factor = 1.0 + correction.arm_linear * theta + correction.arm_quadratic * theta * theta
@@ -29,7 +31,8 @@ def total_gains(vehicle: Vehicle, theta: Array) -> Array:
 def line_pressures(torque: Array, gains: Array, return_Pa: float = RETURN_PRESSURE_PA) -> Array:
     """Gauge pressures (lines, n) [Pa] whose cylinder torque equals ``torque`` (n,) [N m]: sum of gains * pressure.
 
-    Lines that push the wanted way share one supply pressure (main and auxiliary circuit carry the load together); the others
+    Lines that push the wanted way share one supply pressure (main and auxiliary circuit carry the load together); the
+    others
     stay at the return pressure.
     """
     missing = torque - gains.sum(axis=0) * return_Pa

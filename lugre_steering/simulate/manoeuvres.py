@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Manoeuvres as data, and the angles of both tracks that they ask for.
 
-A manoeuvre is a list of segments of the mean steering angle (the angle of a wheel in the middle of the axle); the Ackermann
+A manoeuvre is a list of segments of the mean steering angle (the angle of a wheel in the middle of the axle); the
+Ackermann
 relation gives the two track angles. A recorded bag or a CSV file may prescribe both tracks instead.
 """
 
@@ -24,9 +25,11 @@ from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import Axle, Vehicle
 
 STEP_S = 0.002
-"""Grid of the simulation; the bristle step is exact at constant rate, so this only has to resolve the corners of the motion."""
+"""Grid of the simulation; the bristle step is exact at constant rate, so this only has to resolve the corners of the
+motion."""
 SMOOTHING_S = 0.2
-"""Width of each of the two running means that round the corners: rates rise over 0.4 s, accelerations are continuous."""
+"""Width of each of the two running means that round the corners: rates rise over 0.4 s, accelerations are
+continuous."""
 LONGEST_S = 7200.0
 LARGEST_DEG = 60.0
 
@@ -49,7 +52,8 @@ class Hold:
 
 @dataclass(frozen=True)
 class Chirp:
-    """Oscillate about the present angle with a linearly changing frequency; the amplitude swells in and out over one second."""
+    """Oscillate about the present angle with a linearly changing frequency; the amplitude swells in and out over one
+    second."""
 
     amplitude_deg: float
     from_Hz: float
@@ -130,19 +134,34 @@ BUILT_IN = {
                 Hold(2.0),
             ),
         ),
-        Manoeuvre("chirp", "10 deg at 0.05 to 0.3 Hz: lag, delay, inertia", (Hold(2.0), Chirp(10.0, 0.05, 0.3, 60.0), Hold(2.0))),
+        Manoeuvre(
+            "chirp",
+            "10 deg at 0.05 to 0.3 Hz: lag, delay, inertia",
+            (Hold(2.0), Chirp(10.0, 0.05, 0.3, 60.0), Hold(2.0)),
+        ),
         Manoeuvre(
             "hold-and-rest",
             "a turn held for a minute half way and at the limit: relaxation, leakage, cooling",
-            (Hold(5.0), Sweep(14.0, 5.0, 60.0), Sweep(LIMIT_DEG, 5.0, 60.0), Sweep(-LIMIT_DEG, 5.0, 30.0), Sweep(0.0, 5.0, 30.0)),
+            (
+                Hold(5.0),
+                Sweep(14.0, 5.0, 60.0),
+                Sweep(LIMIT_DEG, 5.0, 60.0),
+                Sweep(-LIMIT_DEG, 5.0, 30.0),
+                Sweep(0.0, 5.0, 30.0),
+            ),
         ),
-        Manoeuvre("creep", "a full turn at 0.5 deg/s and back at 4 deg/s: Stribeck", (Hold(2.0), Sweep(14.0, 0.5, 2.0), Sweep(0.0, 4.0, 2.0))),
+        Manoeuvre(
+            "creep",
+            "a full turn at 0.5 deg/s and back at 4 deg/s: Stribeck",
+            (Hold(2.0), Sweep(14.0, 0.5, 2.0), Sweep(0.0, 4.0, 2.0)),
+        ),
     )
-}  # fmt: skip
+}
 
 
 def ackermann(mean: Array, axle: Axle) -> Array:
-    """Left and right track angle (2, n) [rad] for mean angles (n,) [rad]: cot(right) - cot(left) = b / L (b kingpin distance,
+    """Left and right track angle (2, n) [rad] for mean angles (n,) [rad]: cot(right) - cot(left) = b / L (b kingpin
+    distance,
     L wheelbase), the inner track turning more."""
     tangent = np.tan(mean)
     half = 0.5 * axle.kingpin_distance_m / axle.wheelbase_m * tangent
@@ -327,7 +346,8 @@ def from_recording(recording: Recording, vehicle: Vehicle) -> Motion:
 
 
 def _quiet(angle: Array, vehicle: Vehicle) -> Array:
-    """Recorded angles with a parked joint truly at rest: noise below four standard deviations is no motion (play operator)."""
+    """Recorded angles with a parked joint truly at rest: noise below four standard deviations is no motion (play
+    operator)."""
     sensors = vehicle.sensors
     sigma = math.radians(math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0)))
     return np.array(_play(angle.tolist(), 4.0 * sigma))

@@ -21,7 +21,8 @@ AIR_RATE_HZ = 1.0
 
 @dataclass(frozen=True)
 class Simulated:
-    """A synthetic recording: what the sensors saw (one signal per input channel of the vehicle) and the truth behind it."""
+    """A synthetic recording: what the sensors saw (one signal per input channel of the vehicle) and the truth behind
+    it."""
 
     vehicle: Vehicle
     truth: plant.Truth

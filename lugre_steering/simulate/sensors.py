@@ -72,7 +72,8 @@ def sense_angle(time: Array, theta: Array, sensing: Sensing, rng: np.random.Gene
 def sense_pressure(
     time: Array, pressure: Array, line: str, vehicle: Vehicle, sensing: Sensing, rng: np.random.Generator
 ) -> Signal:
-    """What the sensor of one line records of true gauge pressures (n,) [Pa]: lag, late stamps, offset and drift if the vehicle
+    """What the sensor of one line records of true gauge pressures (n,) [Pa]: lag, late stamps, offset and drift if
+    the vehicle
     has these effects, then noise and quantisation."""
     correction = sensor_correction(vehicle)
     seen = lagged(pressure, correction.lag_s)
@@ -83,7 +84,8 @@ def sense_pressure(
     limit = vehicle.sensors.pressure_range_Pa
     if float(value.max()) > limit:
         raise DataError(
-            f"line '{line}': the manoeuvre needs {value.max() / 1e6:.1f} MPa, beyond sensors.pressure_range_Pa ({limit / 1e6:.1f} MPa)"
+            f"line '{line}': the manoeuvre needs {value.max() / 1e6:.1f} MPa, beyond sensors.pressure_range_Pa "
+            f"({limit / 1e6:.1f} MPa)"
         )
     return Signal(at, quantised(value, sensing.pressure_resolution_Pa))
 

@@ -1,6 +1,7 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated recording as a rosbag2 folder, labelled synthetic in its name, its metadata, every header and a topic of its own."""
+"""A simulated recording as a rosbag2 folder, labelled synthetic in its name, its metadata, every header and a topic
+of its own."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ STORAGES = ("mcap", "sqlite3")
 
 
 def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", compress: bool = True) -> None:
-    """Write all inputs and the truth (at the stamps of the first track's angles) into a new rosbag2 folder, zstd-compressed."""
+    """Write all inputs and the truth (at the stamps of the first track's angles) into a new rosbag2 folder,
+    zstd-compressed."""
     topics = [*_inputs(run), *_truth(run)]
     stamps = np.concatenate([stamp for _, _, stamp, _ in topics])
     topic = np.repeat(np.arange(len(topics)), [stamp.size for _, _, stamp, _ in topics])

@@ -24,7 +24,8 @@ MOVING_RAD_S = 1e-3
 
 @dataclass(frozen=True)
 class Bench:
-    """A vehicle whose friction level and heat capacity were fitted to the published extremes, with the fitted values."""
+    """A vehicle whose friction level and heat capacity were fitted to the published extremes, with the fitted
+    values."""
 
     vehicle: Vehicle
     calibrated: Mapping[str, float]
@@ -44,7 +45,9 @@ def scaled(vehicle: Vehicle, friction_level: float, heat_capacity: float) -> Veh
     """Both friction coefficients, and the heat capacity (through the specific heat), times a factor."""
     friction, rubber = vehicle.friction, vehicle.rubber
     if friction is None or friction.static is None or friction.coulomb is None or rubber is None:
-        raise DataError(f"vehicle '{vehicle.name}': the published experiments need axle, track, friction and rubber sections")
+        raise DataError(
+            f"vehicle '{vehicle.name}': the published experiments need axle, track, friction and rubber sections"
+        )
     return vehicle.replace(
         friction=dataclasses.replace(
             friction, static=friction.static * friction_level, coulomb=friction.coulomb * friction_level
@@ -61,7 +64,7 @@ def build(vehicle: Vehicle) -> Bench:
     published = np.array(PUBLISHED_EXTREMES_NM)
 
     def misfit(factors: Array) -> Array:
-        return extremes(plant.run(scaled(vehicle, *factors), motion)) / published - 1.0
+        return np.asarray(extremes(plant.run(scaled(vehicle, *factors), motion)) / published - 1.0)
 
     fit = least_squares(misfit, [1.0, 1.0], bounds=([0.2, 0.1], [5.0, 10.0]))
     level, capacity = map(float, fit.x)
@@ -101,7 +104,8 @@ def extremes(truth: plant.Truth) -> Array:
 
 
 def largest(truth: plant.Truth) -> Array:
-    """Largest torque [N m] in the direction of travel of each sweep; what is left of the last sweep's does not count."""
+    """Largest torque [N m] in the direction of travel of each sweep; what is left of the last sweep's does not
+    count."""
     return np.array([(direction(truth.motion, s) * truth.torque[s]).max() for s in sweeps(truth.motion)])
 
 

@@ -5,13 +5,23 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 
 from lugre_steering.recording import Array
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, motion_of
-from lugre_steering.simulate.paper.bench import Bench, arrivals, at_temperature, direction, extremes, full_cycles, largest, sweeps
+from lugre_steering.simulate.paper.bench import (
+    Bench,
+    arrivals,
+    at_temperature,
+    direction,
+    extremes,
+    full_cycles,
+    largest,
+    sweeps,
+)
 from lugre_steering.simulate.paper.outcome import Check, Curve, Outcome, Panel
 from lugre_steering.vehicle import pavements
 
@@ -53,7 +63,9 @@ def ambient(bench: Bench) -> Outcome:
             "steering torque of the double steering cycle",
             "time (s)",
             "torque (kN m)",
-            tuple(Curve(f"{t:g} degC", motion.time, run.torque * 1e-3) for t, run in zip(AMBIENT_DEGC, runs, strict=True)),
+            tuple(
+                Curve(f"{t:g} degC", motion.time, run.torque * 1e-3) for t, run in zip(AMBIENT_DEGC, runs, strict=True)
+            ),
         ),
         Panel(
             "rubber temperature, left track",
@@ -67,12 +79,16 @@ def ambient(bench: Bench) -> Outcome:
     )
     ratio = float(table[0, 0] / table[AMBIENT_DEGC.index(20.0), 0])
     notes = (
-        f"at -20 degC the model asks for {ratio:.1f} times the torque of 20 degC, because friction follows E''/|E| of the rubber "
-        "at the DMA frequency down to near its glass transition; the paper's own size of this is lost with its figure 11.",
+        f"at -20 degC the model asks for {ratio:.1f} times the torque of 20 degC, because friction follows E''/|E| "
+        f"of the rubber "
+        "at the DMA frequency down to near its glass transition; the paper's own size of this is lost with its "
+        "figure 11.",
     )
     rows = tuple((t, *map(float, row), float(end)) for t, row, end in zip(AMBIENT_DEGC, table, final, strict=True))
     columns = ("ambient (degC)", *(f"extreme {i} (N m)" for i in (1, 2, 3, 4)), "rubber at the end (degC)")
-    return Outcome("paper-ambient", "Influence of ambient temperature", columns, rows, checks, panels, bench.calibrated, notes)
+    return Outcome(
+        "paper-ambient", "Influence of ambient temperature", columns, rows, checks, panels, bench.calibrated, notes
+    )
 
 
 def _at_angle(run: plant.Truth, sweep: slice, angle_deg: float) -> float:
@@ -90,6 +106,9 @@ def rate(bench: Bench) -> Outcome:
     )
     residual = np.array([abs(run.torque[-1]) for run in runs])
     early = np.array([_at_angle(run, sweeps(run.motion)[3], AFTER_REVERSAL_DEG - LIMIT_DEG) for run in runs])
+    grid = np.linspace(1.0, 2.0 * LIMIT_DEG - 1.0, 200)
+    swept = np.array([[_at_angle(run, sweeps(run.motion)[3], a - LIMIT_DEG) for a in grid] for run in runs])
+    difference = (swept - swept[-1]) * 1e-3
     checks = (
         Check(
             "faster = less torque at the same angle (neutral and beyond, each full sweep)",
@@ -115,31 +134,38 @@ def rate(bench: Bench) -> Outcome:
             ),
         ),
         Panel(
-            "last full sweep, enlarged",
+            "last full sweep: torque above that at 10 deg/s",
             "angle since the start of the sweep (deg)",
-            "size of the torque (kN m)",
-            tuple(Curve(f"{r:g} deg/s", *_last_sweep(run)) for r, run in zip(RATES_DEG_S, runs, strict=True)),
+            "difference (kN m)",
+            tuple(Curve(f"{r:g} deg/s", grid, above) for r, above in zip(RATES_DEG_S, difference, strict=True)),
+        ),
+        Panel(
+            "over the steering rate, last full sweep",
+            "mean steering rate (deg/s)",
+            "torque (kN m)",
+            (
+                Curve("at 20 deg", np.array(RATES_DEG_S), table[:, -1] * 1e-3),
+                Curve("residual at neutral", np.array(RATES_DEG_S), residual * 1e-3),
+            ),
         ),
     )
     fall = table[:, -1]
     notes = (
-        f"{100 * float((fall[0] - fall[1]) / (fall[0] - fall[-1])):.0f} % of the fall from 2 to 10 deg/s lies between 2 and 4 deg/s and comes "
+        f"{100 * float((fall[0] - fall[1]) / (fall[0] - fall[-1])):.0f} % of the fall from 2 to 10 deg/s lies "
+        f"between 2 and 4 deg/s and comes "
         "from the Stribeck curve; the heating that the paper names as the cause gives the rest (less time to cool).",
         f"soon after a reversal the order is the other way round between 4 and 10 deg/s ({_list(early[1:])} N m "
-        f"{AFTER_REVERSAL_DEG:g} deg after it): presliding damping grows with the rate. The published text makes no such exception.",
+        f"{AFTER_REVERSAL_DEG:g} deg after it): presliding damping grows with the rate. The published text makes no "
+        f"such exception.",
         "the residual torque at neutral stays near the full torque, since LuGre keeps its bristles deflected at rest.",
     )
-    rows = tuple((r, *map(float, row[-3:]), float(rest)) for r, row, rest in zip(RATES_DEG_S, table, residual, strict=True))
+    rows = tuple(
+        (r, *map(float, row[-3:]), float(rest)) for r, row, rest in zip(RATES_DEG_S, table, residual, strict=True)
+    )
     columns = ("rate (deg/s)", *(f"torque at {a:g} deg (N m)" for a in PAST_NEUTRAL_DEG), "residual at neutral (N m)")
-    return Outcome("paper-rate", "Influence of the steering rate", columns, rows, checks, panels, bench.calibrated, notes)
-
-
-def _last_sweep(run: plant.Truth) -> tuple[Array, Array]:
-    sweep = sweeps(run.motion)[3]
-    mean = np.degrees(run.motion.theta[:, sweep].mean(axis=0))
-    torque = np.abs(run.torque[sweep]) * 1e-3
-    late = np.abs(mean - mean[0]) > 0.3 * LIMIT_DEG
-    return np.abs(mean - mean[0])[late], torque[late]
+    return Outcome(
+        "paper-rate", "Influence of the steering rate", columns, rows, checks, panels, bench.calibrated, notes
+    )
 
 
 def six_cycles(bench: Bench) -> Outcome:
@@ -165,13 +191,27 @@ def six_cycles(bench: Bench) -> Outcome:
     temperature = run.tracks["temperature"].mean(axis=0)
     ends = [s.stop - 1 for s in sweeps(motion)][1:12:2]
     panels = (
-        Panel("steering torque", "time (s)", "torque (kN m)", (Curve("improved LuGre", motion.time, run.torque * 1e-3, "improved"),)),
         Panel(
-            "torque at the limits", "cycle", "size of the torque (kN m)",
-            tuple(Curve(label, np.arange(1.0, 7.0), arrived[:, i] * 1e-3) for i, label in enumerate(("+limit", "-limit"))),
+            "steering torque",
+            "time (s)",
+            "torque (kN m)",
+            (Curve("improved LuGre", motion.time, run.torque * 1e-3, "improved"),),
         ),
-        Panel("rubber temperature, mean of both tracks", "time (s)", "temperature (degC)", (Curve("rubber", motion.time, temperature),)),
-    )  # fmt: skip
+        Panel(
+            "torque at the limits",
+            "cycle",
+            "size of the torque (kN m)",
+            tuple(
+                Curve(label, np.arange(1.0, 7.0), arrived[:, i] * 1e-3) for i, label in enumerate(("+limit", "-limit"))
+            ),
+        ),
+        Panel(
+            "rubber temperature, mean of both tracks",
+            "time (s)",
+            "temperature (degC)",
+            (Curve("rubber", motion.time, temperature),),
+        ),
+    )
     notes = (
         "compared on arrival at the limits, the same angle in each cycle. The largest torque of each cycle also falls "
         f"({_list(largest(run)[:12:2])} N m).",
@@ -193,9 +233,7 @@ def pavement(bench: Bench) -> Outcome:
         )
         runs[name] = plant.run(bench.vehicle.replace(friction=friction), motion)
     peaks = {name: extremes(run) for name, run in runs.items()}
-    ranked = all(
-        bool(np.all(peaks[a] > peaks[b])) for upper, lower in zip(RANKING, RANKING[1:], strict=False) for a in upper for b in lower
-    )
+    ranked = all(bool(np.all(peaks[a] > peaks[b])) for upper, lower in pairwise(RANKING) for a in upper for b in lower)
     order = sorted(peaks, key=lambda name: -float(peaks[name][0]))
     falling = all(bool(np.all(np.diff(p) < 0.0)) for p in peaks.values())
     checks = (
@@ -205,7 +243,12 @@ def pavement(bench: Bench) -> Outcome:
             " > ".join(f"{name.replace('_', ' ')} {peaks[name][0] * 1e-3:.1f}" for name in order) + " kN m",
             ranked,
         ),
-        Check("the torque falls in the course of steering on each", "decreases gradually", "all six" if falling else "no", falling),
+        Check(
+            "the torque falls in the course of steering on each",
+            "decreases gradually",
+            "all six" if falling else "no",
+            falling,
+        ),
     )
     shown = [name for name in runs if name != "dry_asphalt"]
     panels = (
@@ -218,14 +261,24 @@ def pavement(bench: Bench) -> Outcome:
     )
     assumed = ", ".join(name.replace("_", " ") for name in runs if table[name]["source"] == "assumed")
     notes = (
-        f"the paper's table of friction coefficients is lost; {assumed} are assumed inside published ranges so as to give this ranking "
-        "(Wong's own table ranks wet concrete above wet asphalt). The ranking is therefore an input here, not a finding.",
+        f"the paper's table of friction coefficients is lost; {assumed} are assumed inside published ranges so as "
+        f"to give this ranking "
+        "(Wong's own table ranks wet concrete above wet asphalt). The ranking is therefore an input here, not a "
+        "finding.",
         "section 4.7 of the paper puts gravel last, its conclusion (5) dry dirt; Wong's values agree with section 4.7.",
         "dry asphalt has the same coefficients as dry concrete and is not drawn.",
     )
     rows = tuple(
-        (name.replace("_", " "), table[name]["static"], table[name]["coulomb"], table[name]["source"], *map(float, peaks[name]))
+        (
+            name.replace("_", " "),
+            table[name]["static"],
+            table[name]["coulomb"],
+            table[name]["source"],
+            *map(float, peaks[name]),
+        )
         for name in runs
     )
     columns = ("pavement", "static", "Coulomb", "source", *(f"extreme {i} (N m)" for i in (1, 2, 3, 4)))
-    return Outcome("paper-pavements", "Influence of the pavement", columns, rows, checks, panels, bench.calibrated, notes)
+    return Outcome(
+        "paper-pavements", "Influence of the pavement", columns, rows, checks, panels, bench.calibrated, notes
+    )

@@ -1,6 +1,7 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What every published experiment gives: a table, checks against the published behaviour, curves to draw, honest notes."""
+"""What every published experiment gives: a table, checks against the published behaviour, curves to draw, honest
+notes."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ Cell = str | float
 
 @dataclass(frozen=True)
 class Curve:
-    """One line of a panel; ``test``, ``improved`` and ``original`` are the paper's black, red dashed and blue dash-dot."""
+    """One line of a panel; ``test``, ``improved`` and ``original`` are the paper's black, red dashed and blue
+    dash-dot."""
 
     label: str
     x: Array
@@ -46,7 +48,8 @@ class Check:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of one experiment. ``calibrated`` names every parameter that was fitted and its value; ``notes`` say where our
+    """Result of one experiment. ``calibrated`` names every parameter that was fitted and its value; ``notes`` say
+    where our
     curves and the published text disagree and what had to be assumed."""
 
     name: str
@@ -67,7 +70,10 @@ class Outcome:
         """Text under the figure: what it is, what was calibrated, what was checked, where it disagrees."""
         fitted = ", ".join(f"{name} = {value:.5g}" for name, value in self.calibrated.items())
         lines = [f"{self.title}. Simulated (synthetic). Calibrated to the four published extremes: {fitted}."]
-        lines += [f"{'PASS' if c.passed else 'FAIL'}: {c.claim} (published: {c.published}; ours: {c.ours})." for c in self.checks]
+        lines += [
+            f"{'PASS' if c.passed else 'FAIL'}: {c.claim} (published: {c.published}; ours: {c.ours})."
+            for c in self.checks
+        ]
         return "\n".join(lines + [f"Note: {note}" for note in self.notes])
 
     def to_json(self) -> dict[str, Any]:

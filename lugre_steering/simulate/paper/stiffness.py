@@ -1,6 +1,7 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Stiffness identification: slow load to below break-away, held; torque over the sum of both angles (the paper's figure 8c)."""
+"""Stiffness identification: slow load to below break-away, held; torque over the sum of both angles (the paper's
+figure 8c)."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ TOLERANCE = 0.01
 def presliding_angle(torque: Array, stiffness: float, static: float) -> Array:
     """Angle [rad] of one track under a slowly rising torque [N m] below break-away.
 
-    LuGre without rate effects, dz/dtheta = 1 - sigma_0 z / Ms, integrated from rest: theta = -(Ms / sigma_0) ln(1 - M / Ms).
+    LuGre without rate effects, dz/dtheta = 1 - sigma_0 z / Ms, integrated from rest: theta = -(Ms / sigma_0) ln(1 - M
+    / Ms).
     """
     return np.asarray(-(static / stiffness) * np.log1p(-torque / static))
 
@@ -49,9 +51,9 @@ def stiffness(bench: Bench) -> Outcome:
     shares = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5, LOAD_SHARE * 0.999])
     at = np.searchsorted(torque[~held], shares * break_away)
     rows = tuple(
-        (100.0 * float(share), float(torque[i]), float(angle[i]), float(torque[i] / angle[i]), 100.0 * (float(torque[i] / angle[i]) / true - 1.0))
-        for share, i in zip(shares, at, strict=True)
-    )  # fmt: skip
+        (100.0 * s, float(m), float(a), float(m / a), 100.0 * (float(m / a) / true - 1.0))
+        for s, m, a in zip(shares.tolist(), torque[at], angle[at], strict=True)
+    )
     steady = float(np.ptp(torque[held]) / torque[-1])
     published = f"{PUBLISHED_NM_PER_DEG:g} N m per unit of angle (unit lost; deg by size)"
     checks = (
@@ -64,7 +66,8 @@ def stiffness(bench: Bench) -> Outcome:
         Check(
             "the load is held for more than 10 s without turning",
             "over 10 s, the angle changes slightly",
-            f"{HOLD_S:g} s at {torque[-1] * 1e-3:.1f} kN m ({100 * LOAD_SHARE:g} % of break-away), torque steady to {100 * steady:.2f} %",
+            f"{HOLD_S:g} s at {torque[-1] * 1e-3:.1f} kN m ({100 * LOAD_SHARE:g} % of break-away), torque steady to "
+            f"{100 * steady:.2f} %",
             HOLD_S > 10.0 and steady < 0.01 and float(torque.max()) < break_away,
         ),
     )
@@ -76,20 +79,31 @@ def stiffness(bench: Bench) -> Outcome:
             (
                 Curve("slow loading and hold", angle, torque * 1e-3, "test"),
                 Curve("initial slope", *_line(slope, angle, torque), "improved"),
-                Curve("torque / angle at the held load", np.array([0.0, angle[-1]]), np.array([0.0, torque[-1] * 1e-3]), "original"),
+                Curve(
+                    "torque / angle at the held load",
+                    np.array([0.0, angle[-1]]),
+                    np.array([0.0, torque[-1] * 1e-3]),
+                    "original",
+                ),
             ),
         ),
         Panel("load", "time (s)", "torque (kN m)", (Curve("torque", time, torque * 1e-3, "test"),)),
     )
     notes = (
-        f"the paper divides the held load by the angle. A LuGre contact softens towards break-away, so at {100 * LOAD_SHARE:g} % this "
-        f"quotient is {secant:.0f} N m/deg, {100 * (1 - secant / true):.0f} % below the bristle stiffness; only the slope at small load gives it. "
-        f"If the published {PUBLISHED_NM_PER_DEG:g} is such a quotient, the true bristle stiffness is higher (by a factor "
+        f"the paper divides the held load by the angle. A LuGre contact softens towards break-away, so at "
+        f"{100 * LOAD_SHARE:g} % this "
+        f"quotient is {secant:.0f} N m/deg, {100 * (1 - secant / true):.0f} % below the bristle stiffness; only the "
+        f"slope at small load gives it. "
+        f"If the published {PUBLISHED_NM_PER_DEG:g} is such a quotient, the true bristle stiffness is higher (by a "
+        f"factor "
         f"{true / secant:.2f} at this load). The parameter is kept at the published number.",
-        "LuGre does not creep under constant load; the slight change of angle that the paper saw during the hold is not in the model.",
+        "LuGre does not creep under constant load; the slight change of angle that the paper saw during the hold is "
+        "not in the model.",
     )
     columns = ("load (% of break-away)", "torque (N m)", "angle sum (deg)", "torque / angle (N m/deg)", "error (%)")
-    return Outcome("paper-stiffness", "Stiffness identification", columns, rows, checks, panels, bench.calibrated, notes)
+    return Outcome(
+        "paper-stiffness", "Stiffness identification", columns, rows, checks, panels, bench.calibrated, notes
+    )
 
 
 def _line(slope: float, angle: Array, torque: Array) -> tuple[Array, Array]:
