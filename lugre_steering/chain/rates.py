@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causal motion estimate: angle, rate and acceleration of one joint from noisy, quantised samples.
 
-The bristle integrates |d theta|, so noise that looks like motion destroys it. A play operator of half width r = 4 sigma
+The bristle integrates |d theta|, so noise that looks like motion destroys it. A play operator of half width r = 5 sigma
 (sigma: noise of one angle sample) freezes a parked vehicle exactly. While the joint moves, a plain play lags by r less
 the expected excess of a running maximum over the mean, sigma b(kappa), kappa = travel per sample / sigma; that lag is
 known and is added back gradually, always in the direction of travel, so the output never reverses before the joint
@@ -16,7 +16,8 @@ import math
 import numpy as np
 from numba import njit
 
-WIDTH_SIGMA = 4.0
+WIDTH_SIGMA = 5.0
+"""Narrower, and chance alone moves a parked vehicle at 500 Hz: by 0.4 % of its torque a minute with 4."""
 RATE_TIME_CONSTANT_S = 0.04
 PROGRESS_TIME_CONSTANT_S = 0.05
 GIVE_BACK = 0.5
