@@ -37,6 +37,7 @@ setup(
         "numba>=0.58",
         "pyyaml>=6.0",
         "rosbags>=0.10",
+        "lz4>=4.0",
         "typer>=0.9",
         "rich>=13.0",
     ],

@@ -1,18 +1,21 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Command line: a thin shell. Each command parses arguments, calls one function of the package and prints what it returns."""
+"""Command line: a thin shell. Each command parses arguments, calls one function of the package and prints what it
+returns."""
 
 from __future__ import annotations
 
 import functools
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 from rich.console import Console
+from rich.progress import Progress, TaskID
 
 from lugre_steering.errors import DataError, LugreSteeringError
 
@@ -36,6 +39,20 @@ def console() -> Console:
     return Console(stderr=True)
 
 
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, int, int | None], None]]:
+    """A bar per task on a terminal, nothing in a pipe: call it with a name, how much is done, and of how much."""
+    with Progress(console=console(), disable=not sys.stderr.isatty()) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: int, total: int | None) -> None:
+            if name not in tasks:
+                tasks[name] = bar.add_task(name)
+            bar.update(tasks[name], completed=done, total=total)
+
+        yield show
+
+
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
     print(json.dumps(result, indent=2, allow_nan=False))
@@ -57,12 +74,41 @@ def command(function: F) -> F:
 
 
 @command
+def replay(
+    bags: Bags,
+    vehicle: VehicleFile,
+    out: OutFolder,
+    horizon: Annotated[float, typer.Option(min=0.0, max=5.0, help="feed-forward this far ahead [s]")] = 0.0,
+    as_json: Json = False,
+) -> None:
+    """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
+    from lugre_steering.estimator import Options
+    from lugre_steering.replay import describe
+    from lugre_steering.replay import replay as run
+
+    with progress_bar() as progress:
+        result = run(bags, vehicle, out, Options(feed_forward_horizon_s=horizon), progress)
+    for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
+        print(f"lugre-steering: {note}", file=sys.stderr)
+    if as_json:
+        print_json(result)
+    else:
+        print("\n".join([*describe(result), f"results in {out}"]))
+
+
+@command
 def simulate(
-    what: Annotated[str, typer.Argument(help="manoeuvre, published experiment, YAML or CSV file, or bag; see --list")] = "",
-    vehicle: Annotated[Path | None, typer.Option(help="vehicle file (YAML); the shipped test vehicle if left out")] = None,
+    what: Annotated[
+        str, typer.Argument(help="manoeuvre, published experiment, YAML or CSV file, or bag; see --list")
+    ] = "",
+    vehicle: Annotated[
+        Path | None, typer.Option(help="vehicle file (YAML); the shipped test vehicle if left out")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="folder for the results")] = None,
     show_list: Annotated[bool, typer.Option("--list", help="show manoeuvres and experiments")] = False,
-    effect: Annotated[list[str] | None, typer.Option(help="add physics, id:parameter=value,... (SI); repeatable")] = None,
+    effect: Annotated[
+        list[str] | None, typer.Option(help="add physics, id:parameter=value,... (SI); repeatable")
+    ] = None,
     storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
     rate: Annotated[float | None, typer.Option(help="angle samples per second [100]")] = None,
     pressure_rate: Annotated[float | None, typer.Option(help="pressure samples per second [as --rate]")] = None,
@@ -74,14 +120,17 @@ def simulate(
     seed: Annotated[int | None, typer.Option(help="seed of noise and jitter [0]")] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a manoeuvre into a bag labelled synthetic, or reproduce the published experiments (exit code 1 if one fails)."""
+    """Simulate a manoeuvre into a bag labelled synthetic, or reproduce the published experiments (exit code 1 if one
+    fails)."""
     from lugre_steering.simulate import command as simulation
 
     if show_list:
         simulation.show_catalogue(Console())
         return
     if not what or out is None:
-        raise DataError("simulate: needs what to simulate and --out DIR; 'lugre-steering simulate --list' shows what there is")
+        raise DataError(
+            "simulate: needs a name or file and --out DIR; 'lugre-steering simulate --list' shows what there is"
+        )
     chosen = simulation.load_vehicle(vehicle, effect or [])
     if simulation.is_experiment(what):
         outcomes = simulation.run_experiments(what, chosen)

@@ -236,7 +236,7 @@ class Bag:
         """
         result: dict[Channel, str] = {}
         for channel in channels:
-            topic = self._topic(channel.topic)
+            topic = self.find_topic(channel.topic)
             if topic is not None:
                 self._check_type(topic, MESSAGE_TYPE[channel.kind])
                 result[channel] = topic
@@ -247,7 +247,8 @@ class Bag:
             result[channel] = topic
         return result
 
-    def _topic(self, name: str) -> str | None:
+    def find_topic(self, name: str) -> str | None:
+        """The recorded topic that a relative name means; None if there is none."""
         relative = name.lstrip("/")
         topics = list(self.topics)
         candidates = [t for t in topics if t.lstrip("/") == relative] or [

@@ -1,0 +1,158 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Statistics, time axis and curves of data that stream by: bounded memory, however long the recording."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.recording import Array, IntArray
+
+BINS = 2048  # columns of a curve: more than a picture has pixels
+FIRST_BIN_S = 1e-3
+
+
+@dataclass
+class Range:
+    """Smallest and largest value seen, and when."""
+
+    low: float = math.inf
+    low_s: float = 0.0
+    high: float = -math.inf
+    high_s: float = 0.0
+
+    def add(self, time_s: Array, value: Array) -> None:
+        """``time_s`` (n,), ``value`` (n,), n > 0."""
+        i, j = int(value.argmin()), int(value.argmax())
+        self.merge(Range(float(value[i]), float(time_s[i]), float(value[j]), float(time_s[j])))
+
+    def merge(self, other: Range) -> None:
+        """Take in what another one saw."""
+        if other.low < self.low:
+            self.low, self.low_s = other.low, other.low_s
+        if other.high > self.high:
+            self.high, self.high_s = other.high, other.high_s
+
+
+@dataclass
+class Fit:
+    """How well estimates agree with measured torque [N m].
+
+    Mean and variance are merged from batches after Chan, Golub and LeVeque (1983), The American Statistician 37(3),
+    which loses no digits to a large mean, unlike sums of squares.
+    """
+
+    count: int = 0
+    mean: float = 0.0  # of the measured torque
+    spread: float = 0.0  # sum of (measured - mean)^2
+    error: float = 0.0  # sum of residuals
+    squares: float = 0.0  # sum of residual^2
+    measured: Range = field(default_factory=Range)
+    estimate: Range = field(default_factory=Range)
+
+    def add(self, time_s: Array, measured: Array, residual: Array) -> None:
+        """n samples at ``time_s`` (n,); residual = measured - estimate."""
+        if not measured.size:
+            return
+        mean = float(measured.mean())
+        batch = Fit(
+            measured.size,
+            mean,
+            float(((measured - mean) ** 2).sum()),
+            float(residual.sum()),
+            float((residual**2).sum()),
+        )
+        batch.measured.add(time_s, measured)
+        batch.estimate.add(time_s, measured - residual)
+        self.merge(batch)
+
+    def merge(self, other: Fit) -> None:
+        """Take in the samples of another one."""
+        if not other.count:
+            return
+        count = self.count + other.count
+        apart = other.mean - self.mean
+        self.spread += other.spread + apart * apart * self.count * other.count / count
+        self.mean += apart * other.count / count
+        self.count = count
+        self.error += other.error
+        self.squares += other.squares
+        self.measured.merge(other.measured)
+        self.estimate.merge(other.estimate)
+
+    def result(self) -> dict[str, Any] | None:
+        """RMSE, R2 (None where the measured torque never changes), bias and peaks; None without samples."""
+        if not self.count:
+            return None
+
+        def peaks(seen: Range) -> dict[str, float]:
+            return {"max_Nm": seen.high, "max_at_s": seen.high_s, "min_Nm": seen.low, "min_at_s": seen.low_s}
+
+        return {
+            "samples": self.count,
+            "rmse_Nm": math.sqrt(self.squares / self.count),
+            "r2": 1.0 - self.squares / self.spread if self.spread > 0.0 else None,
+            "bias_Nm": self.error / self.count,
+            "peaks": {"cylinder_torque": peaks(self.measured), "estimate": peaks(self.estimate)},
+        }
+
+
+class Timeline:
+    """Stamps as seconds since a start that never run backward: where a clock was set back, time goes on."""
+
+    def __init__(self, start_ns: int) -> None:
+        self._origin_ns = start_ns
+        self._last_ns = start_ns
+        self.set_back = 0
+
+    def __call__(self, stamp_ns: IntArray) -> Array:
+        """Seconds (n,) of the next stamps (n,) [ns]."""
+        step = np.diff(stamp_ns, prepend=self._last_ns)
+        if stamp_ns.size:
+            self._last_ns = int(stamp_ns[-1])
+        back = np.minimum(step, 0).cumsum()
+        self.set_back += int((step < 0).sum())
+        seconds: Array = (stamp_ns - back - self._origin_ns) * 1e-9
+        if stamp_ns.size:
+            self._origin_ns += int(back[-1])
+        return seconds
+
+
+class Curves:
+    """Curves over one time axis, reduced on the fly to the smallest and largest value per bin, so that peaks survive.
+
+    When time outgrows the bins, neighbours are merged and the bins become twice as wide.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.bin_s = FIRST_BIN_S
+        self._low = np.full((count, BINS), np.inf)
+        self._high = np.full((count, BINS), -np.inf)
+
+    def add(self, time_s: Array, values: Array) -> None:
+        """``time_s`` (n,) seconds, not negative, never falling; ``values`` (curves, n)."""
+        if not time_s.size:
+            return
+        while time_s[-1] >= BINS * self.bin_s:
+            self._widen()
+        column = (time_s / self.bin_s).astype(np.int64)
+        first = np.flatnonzero(np.diff(column, prepend=-1))
+        at = column[first]
+        self._low[:, at] = np.minimum(self._low[:, at], np.minimum.reduceat(values, first, axis=1))
+        self._high[:, at] = np.maximum(self._high[:, at], np.maximum.reduceat(values, first, axis=1))
+
+    def _widen(self) -> None:
+        self.bin_s *= 2.0
+        for edge, reduce, empty in ((self._low, np.minimum, np.inf), (self._high, np.maximum, -np.inf)):
+            edge[:, : BINS // 2] = reduce(edge[:, ::2], edge[:, 1::2])
+            edge[:, BINS // 2 :] = empty
+
+    def bins(self) -> tuple[Array, Array, Array]:
+        """Middle of each filled bin (m,) [s], smallest and largest values (curves, m)."""
+        filled = np.flatnonzero(np.isfinite(self._low).any(axis=0))
+        middle: Array = (filled + 0.5) * self.bin_s
+        return middle, self._low[:, filled], self._high[:, filled]

@@ -1,0 +1,369 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator over recorded bags: the same messages in, the same topics out as the live node, plus a summary.
+
+A bag streams through in blocks; memory does not grow with its length.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import json
+import os
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
+from lugre_steering.bag.load import STRAY_NS
+from lugre_steering.bag.writer import copied
+from lugre_steering.chain.step import Records
+from lugre_steering.errors import BagError, DataError
+from lugre_steering.estimator import Estimator, Options
+from lugre_steering.live.plan import planned_angles
+from lugre_steering.online import Curves, Fit, Timeline
+from lugre_steering.recording import Channel, Finding, IntArray, Kind
+from lugre_steering.vehicle import Vehicle, load
+
+SCHEMA = "lugre_steering/replay/1"
+PREFIX = "/steering_torque_estimator"
+FRAME = "base_link"
+COMMAND = "steering/command"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+MARK = {"lugre_steering": "replay"}
+"""In metadata.yaml of every bag written here: only such a bag is ever replaced."""
+NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun")
+"""Counters of the estimator about samples that it did use."""
+
+Progress = Callable[[str, int, "int | None"], None]
+"""Called with the name of a bag, messages done, and messages in all (None where not known)."""
+
+
+def replay(
+    bags: Sequence[Path],
+    vehicle_file: Path,
+    out: Path,
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Run the estimator over each bag anew; write bags, pictures and summary.json into ``out``.
+
+    Returns the summary. Raises ``BagError`` or ``VehicleFileError`` for input that is of no use.
+    """
+    vehicle = load(vehicle_file)
+    names = _names(bags, out)
+    summary: dict[str, Any] = {"schema": SCHEMA, "vehicle": str(vehicle_file), "bags": []}
+    overall = Fit()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for path, name in zip(bags, names, strict=True):
+            run = _Run(path, name, vehicle, options or Options())
+            summary["bags"].append(run.write(out, progress))
+            overall.merge(run.fit)
+            summary["overall"] = overall.result()
+            text = json.dumps(summary, indent=2, allow_nan=False)
+            (out / "summary.json").write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise BagError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
+    return summary
+
+
+def describe(summary: Mapping[str, Any]) -> Iterator[str]:
+    """The summary in a few lines of text."""
+    for bag in summary["bags"]:
+        yield f"{bag['name']}: {bag['estimates']} torques from {bag['messages']} messages in {bag['duration_s']:.1f} s"
+        fit = bag["fit"]
+        if fit is None:
+            yield f"  {bag['fit_note']}"
+        else:
+            r2 = "" if fit["r2"] is None else f", R2 {fit['r2']:.4f}"
+            yield f"  against cylinder torque: RMSE {fit['rmse_Nm']:.1f} N m{r2}, bias {fit['bias_Nm']:+.1f} N m"
+        for label, counts in bag["samples"].items():
+            if counts["rejected"]:
+                reasons = ", ".join(f"{count} {reason}" for reason, count in counts["rejected"].items())
+                yield f"  {label}: {counts['used']} used; rejected: {reasons}"
+        for finding in bag["findings"]:
+            yield f"  {finding['finding']}: {finding['topic']} {finding['statement']}".replace(":  ", ": ")
+
+
+# ------------------------------------------------------------------ files
+
+
+def _names(bags: Sequence[Path], out: Path) -> list[str]:
+    """A name for the result of each bag; refuses to touch an input or anything that is not an earlier result."""
+    names: list[str] = []
+    for path in bags:
+        # Not resolved: a link is known by its own name.
+        absolute = Path(os.path.abspath(path))
+        if not absolute.exists():
+            raise BagError(f"{path}: no such file or folder")
+        stem = absolute.name if absolute.is_dir() else absolute.name.split(".")[0]
+        candidates = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+        names.append(next(name for name in candidates if name not in names))
+    for name in names:
+        result = (out / name).resolve()
+        for path in bags:
+            source = path.resolve()
+            if source == result or source in result.parents or result in source.parents:
+                raise BagError(f"{path}: the result {out / name} would touch this bag; choose another --out")
+        if result.exists() and not _is_result(result):
+            raise BagError(f"{out / name}: exists and is not an earlier result of replay; choose another --out")
+    return names
+
+
+def _is_result(folder: Path) -> bool:
+    try:
+        content = yaml.safe_load((folder / "metadata.yaml").read_bytes())
+        return bool(content["rosbag2_bagfile_information"]["custom_data"] == MARK)
+    except (OSError, yaml.YAMLError, KeyError, TypeError):
+        return False
+
+
+# -------------------------------------------------------------- one bag
+
+
+class _Run:
+    """One bag through a new estimator."""
+
+    def __init__(self, path: Path, name: str, vehicle: Vehicle, options: Options) -> None:
+        self.path, self.name, self.vehicle = path, name, vehicle
+        self.estimator = Estimator(vehicle, options)
+        self.fit = Fit()
+        self.motion = Curves(2 * len(vehicle.sides) + 1)  # angles, temperatures, torque
+        self.check = Curves(2)  # cylinder torque, residual
+        self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
+        self._counts: Counter[str] = Counter()
+        self._commands: Counter[str] = Counter()  # feed-forward plans that could not be used, by reason
+        self._found: list[Finding] = []
+        self._clocks: tuple[Timeline, Timeline] | None = None  # of estimates and of residuals
+        self._log_ns = (0, 0)
+
+    def write(self, out: Path, progress: Progress | None) -> dict[str, Any]:
+        """Write the bag and the picture; returns the summary of this bag."""
+        with Bag(self.path) as bag, tempfile.TemporaryDirectory(prefix=".replay_", dir=out) as folder:
+            topics = bag.match(self.vehicle.channels)
+            for channel in self.vehicle.channels:
+                if channel.kind is Kind.ANGLE and channel not in topics:
+                    found = ", ".join(sorted(bag.topics)) or "none"
+                    raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
+            result = Path(folder) / self.name
+            with BagWriter(result, custom_data=MARK) as writer:
+                self._stream(bag, writer, progress)
+            samples = self._samples(bag, topics)
+            if not self._counts["estimates"]:
+                raise BagError(f"{self.path}: no torque could be estimated ({_counted(samples, Kind.ANGLE)})")
+            if (out / self.name).exists():
+                shutil.rmtree(out / self.name)
+            result.rename(out / self.name)
+            findings = [*bag.findings, *self._found, *self._last_findings()]
+        fit = self.fit.result()
+        summary: dict[str, Any] = {
+            "bag": str(self.path),
+            "name": self.name,
+            "duration_s": (self._log_ns[1] - self._log_ns[0]) * 1e-9,
+            "messages": self._counts["messages"],
+            "estimates": self._counts["estimates"],
+            "fit": fit,
+            "fit_note": None if fit else f"residual not available ({_counted(samples, Kind.PRESSURE, Kind.TORQUE)})",
+            "samples": samples,
+            "saturated_rubber_table_steps": self.estimator.saturated_steps,
+            "findings": [asdict(finding) for finding in findings],
+        }
+        return summary | self._picture(out / f"{self.name}.png", fit)
+
+    def _stream(self, bag: Bag, writer: BagWriter, progress: Progress | None) -> None:
+        """All messages through the estimator and, with what comes of them, into the output."""
+        outputs = _Outputs(writer, self.vehicle)
+        if old := sorted(outputs.topics & set(bag.topics)):
+            statement = f"{', '.join(old)}: recorded before; replaced in the output by the results of this replay"
+            self._found.append(Finding("replaced_topics", "", statement))
+        command = bag.find_topic(COMMAND)
+        for block in bag.blocks(self.vehicle.channels, all_messages=True):
+            if not len(block.messages):
+                continue
+            # Connections may still be added while a damaged file is read.
+            number = [-1 if c.topic in outputs.topics else writer.add_connection(c) for c in bag.connections]
+            estimates, residuals = self._push(block, bag, command)
+            self._learn(block, estimates, residuals)
+            first = self._counts["rows"]
+            writer.write(
+                [
+                    *copied(block.messages, np.array(number, np.int32)),
+                    *outputs.of_estimates(estimates, block.log_ns[estimates["message"] - first]),
+                    *outputs.of_residuals(residuals, block.log_ns[residuals["message"] - first]),
+                ]
+            )
+            self._counts.update(rows=block.channel.size, messages=len(block.messages), estimates=len(estimates))
+            self._log_ns = (self._log_ns[0] or int(block.messages.log_ns[0]), int(block.messages.log_ns[-1]))
+            if progress is not None:
+                progress(self.name, self._counts["messages"], bag.message_count)
+
+    def _push(self, block: Block, bag: Bag, command: str | None) -> tuple[Records, Records]:
+        """One block through the estimator; each plan takes effect at its place among the samples, as in the node."""
+        commands = [k for k, c in enumerate(bag.connections) if c.topic == command]
+        plans = np.flatnonzero(np.isin(block.messages.connection, commands))
+        channel, begin, parts = block.channel.astype(np.int64), 0, []
+        for plan, end in zip([*plans, None], [*np.searchsorted(block.message, plans), channel.size], strict=True):
+            rows = slice(begin, end)
+            parts.append(
+                self.estimator.push_block(channel[rows], block.stamp_ns[rows], block.value[rows], block.rate[rows])
+            )
+            if plan is not None:
+                self._plan(block.messages.bytes_of(int(plan)))
+            begin = end
+        estimates, residuals = (np.concatenate(tables) for tables in zip(*parts, strict=True))
+        return self._finite(estimates, "total"), self._finite(residuals, "residual")
+
+    def _finite(self, rows: Records, field: str) -> Records:
+        """Rows whose torque is a finite number; the node publishes no other either."""
+        finite = np.isfinite(rows[field])
+        self._counts["withheld"] += int((~finite).sum())
+        return np.asarray(rows[finite])
+
+    def _plan(self, raw: bytes) -> None:
+        latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
+        try:
+            message = _types().deserialize_cdr(raw, TRAJECTORY)
+        except Exception:  # flipped bytes may raise anything
+            self._commands["malformed"] += 1
+            return
+        try:
+            self.estimator.set_plan(*planned_angles(message, self._joints, latest_ns))
+            self._commands["accepted"] += 1
+        except DataError as error:
+            self._commands[str(error)] += 1
+
+    def _learn(self, block: Block, estimates: Records, residuals: Records) -> None:
+        """Statistics and curves."""
+        if self._clocks is None:
+            if not block.stamp_ns.size:
+                return
+            start_ns = _first_stamp(block)
+            self._clocks = Timeline(start_ns), Timeline(start_ns)
+        sides = len(self.vehicle.sides)
+        time_s = self._clocks[0](estimates["stamp_ns"])
+        columns = estimates["theta"][:, :sides], estimates["temperature"][:, :sides], estimates["total"][:, None]
+        self.motion.add(time_s, np.concatenate(columns, axis=1).T)
+        time_s = self._clocks[1](residuals["stamp_ns"])
+        self.check.add(time_s, np.stack([residuals["measured_torque"], residuals["residual"]]))
+        self.fit.add(time_s, residuals["measured_torque"], residuals["residual"])
+
+    def _samples(self, bag: Bag, topics: Mapping[Channel, str]) -> dict[str, dict[str, Any]]:
+        """Per input: the recorded topic, samples used, rejected by reason, and what is worth a note about used ones."""
+        table: dict[str, dict[str, Any]] = {}
+        for channel, (label, counts) in zip(self.vehicle.channels, self.estimator.counters.items(), strict=True):
+            rejected = {reason: n for reason, n in counts.items() if reason not in NOT_REJECTED}
+            if channel in topics and bag.malformed[topics[channel]]:
+                rejected["malformed"] = bag.malformed[topics[channel]]
+            table[label] = {
+                "topic": topics.get(channel),
+                "used": counts["accepted"],
+                "rejected": rejected,
+                "noted": {reason: counts[reason] for reason in NOT_REJECTED[1:] if reason in counts},
+            }
+        if self._commands:
+            used = self._commands.pop("accepted", 0)
+            table["command"] = {
+                "topic": bag.find_topic(COMMAND), "used": used, "rejected": dict(self._commands), "noted": {}
+            }  # fmt: skip
+        return table
+
+    def _last_findings(self) -> Iterator[Finding]:
+        set_back = self._clocks[0].set_back if self._clocks else 0
+        if set_back:
+            yield Finding(
+                "clock_set_back", "", f"stamps jumped back {set_back} times; the estimator began anew each time"
+            )
+        if self._counts["withheld"]:
+            statement = f"{self._counts['withheld']} results were no finite numbers and are left out"
+            yield Finding("withheld", "", statement)
+        if self.estimator.saturated_steps:
+            statement = "steps with a temperature outside the rubber table, whose edge was used"
+            yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
+
+    def _picture(self, file: Path, fit: Mapping[str, Any] | None) -> dict[str, str | None]:
+        if importlib.util.find_spec("matplotlib") is None:
+            file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
+            note = "no picture: matplotlib is not installed (pip install 'lugre_steering[report]')"
+            return {"picture": None, "picture_note": note}
+        from lugre_steering.report.replay_figure import draw_replay
+
+        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
+        return {"picture": file.name, "picture_note": None}
+
+
+def _first_stamp(block: Block) -> int:
+    """First header stamp [ns] that belongs to this recording: not zero, not far from where the log clock puts it."""
+    offset = block.stamp_ns - block.log_ns
+    near = np.abs(offset - np.median(offset)) <= STRAY_NS
+    return int(block.stamp_ns[near].min())
+
+
+def _counted(samples: Mapping[str, Mapping[str, Any]], *kinds: Kind) -> str:
+    """What came on the inputs of some kinds, in words."""
+    words = []
+    for label, counts in samples.items():
+        if label.split("/")[0].upper() not in [kind.name for kind in kinds]:
+            continue
+        if counts["topic"] is None:
+            words.append(f"{label}: topic missing")
+        else:
+            reasons = [f"{n} {reason}" for part in ("rejected", "noted") for reason, n in counts[part].items()]
+            words.append(", ".join([f"{label}: {counts['used']} samples used", *reasons]))
+    return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
+
+
+@lru_cache(maxsize=1)
+def _types() -> Typestore:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+class _Outputs:
+    """The node's output topics as columns, with the content the node would publish."""
+
+    def __init__(self, writer: BagWriter, vehicle: Vehicle) -> None:
+        self._sides = vehicle.sides
+        self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
+        types = {
+            "torque": cdr.WRENCH_STAMPED,
+            "estimate": cdr.JOINT_STATE,
+            "feed_forward": cdr.JOINT_STATE,
+            **({f"rubber_temperature/{side}": cdr.TEMPERATURE for side in vehicle.sides} if vehicle.rubber else {}),
+            "cylinder_torque": cdr.WRENCH_STAMPED,
+            "residual": cdr.WRENCH_STAMPED,
+        }
+        self._number = {name: writer.add_topic(f"{PREFIX}/{name}", kind) for name, kind in types.items()}
+        self.topics = {f"{PREFIX}/{name}" for name in types}
+
+    def of_estimates(self, rows: Records, cause_ns: IntArray) -> Iterator[Part]:
+        """Torque, joint states and temperatures; logged right after the message that caused them."""
+        log_ns = cause_ns + 1
+        yield Part(self._number["torque"], log_ns, cdr.encode_wrench(rows["stamp_ns"], FRAME, rows["total"]))
+        n = len(self._sides)
+        columns = [rows[name][:, :n] for name in ("theta", "omega", "torque", "temperature", "feed_forward")]
+        whole = np.isfinite(np.concatenate(columns, axis=1)).all(axis=1)
+        stamp, log_ns = rows["stamp_ns"][whole], log_ns[whole]
+        theta, omega, torque, temperature, feed_forward = (column[whole] for column in columns)
+        state = cdr.encode_joint_state(stamp, FRAME, self._joints, theta, omega, torque)
+        yield Part(self._number["estimate"], log_ns, state)
+        state = cdr.encode_joint_state(stamp, FRAME, self._joints, effort=feed_forward)
+        yield Part(self._number["feed_forward"], log_ns, state)
+        for i, side in enumerate(self._sides):
+            if (number := self._number.get(f"rubber_temperature/{side}")) is not None:
+                yield Part(number, log_ns, cdr.encode_temperature(stamp, f"{side}_track", temperature[:, i]))
+
+    def of_residuals(self, rows: Records, cause_ns: IntArray) -> Iterator[Part]:
+        """Cylinder torque and residual."""
+        for name, field in (("cylinder_torque", "measured_torque"), ("residual", "residual")):
+            yield Part(self._number[name], cause_ns + 1, cdr.encode_wrench(rows["stamp_ns"], FRAME, rows[field]))

@@ -1,0 +1,91 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Picture of one replay: angles, both torques, residual, rubber temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.online import Curves
+from lugre_steering.recording import Array
+from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, figure
+from lugre_steering.vehicle import Vehicle
+
+GAP_S = 0.5
+"""A curve is broken where nothing came for longer than this."""
+SHOWN = {"rad": (180.0 / np.pi, "deg"), "m": (1000.0, "mm")}
+
+
+def draw_replay(
+    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Mapping[str, Any] | None, file: Path
+) -> None:
+    """Write the picture as PNG.
+
+    ``motion``: angle of each side, temperature of each side, estimated torque; ``check``: cylinder torque, residual.
+    """
+    sides, coordinate = vehicle.sides, vehicle.coordinate
+    scale, unit = SHOWN.get(coordinate.unit, (1.0, coordinate.unit))
+    time, lines = _lines(motion)
+    check_time, checked = _lines(check)
+    measured = "sensor torque" if vehicle.torque_sensor is not None else "cylinder torque"
+    with figure(4 if vehicle.rubber else 3, 1, _caption(name, vehicle, fit), file, row_inches=1.9) as axes:
+        rows = iter(axes[:, 0])
+        ax = next(rows)
+        for i, side in enumerate(sides):
+            ax.plot(time, scale * lines[i], label=side, color=SERIES[i])
+        ax.set_title(coordinate.name)
+        ax.set_ylabel(unit)
+
+        ax = next(rows)
+        if check_time.size:
+            ax.plot(check_time, checked[0] * 1e-3, **MEASURED, label=measured)
+        ax.plot(time, lines[-1] * 1e-3, **IMPROVED, label="estimate")
+        ax.set_title("torque that the actuators deliver")
+        ax.set_ylabel(f"k{coordinate.force_unit}")
+
+        ax = next(rows)
+        if check_time.size:
+            ax.plot(check_time, checked[1] * 1e-3, color=SERIES[2], label=f"{measured} minus estimate")
+        else:
+            ax.text(0.5, 0.5, "not available", transform=ax.transAxes, ha="center", color="#777777")
+        ax.set_title("residual")
+        ax.set_ylabel(f"k{coordinate.force_unit}")
+
+        if vehicle.rubber:
+            ax = next(rows)
+            for i, side in enumerate(sides):
+                ax.plot(time, lines[len(sides) + i], label=side, color=SERIES[i])
+            ax.set_title("tread rubber temperature (estimate)")
+            ax.set_ylabel("degC")
+        for ax in axes[:, 0]:
+            ax.set_xlim(0.0, float(time[~np.isnan(time)][-1]) or 1.0)
+            if ax.get_legend_handles_labels()[0]:
+                ax.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+        axes[-1, 0].set_xlabel("time since the first stamp (s)")
+
+
+def _lines(curves: Curves) -> tuple[Array, Array]:
+    """Time (m,) and curves (k, m) that go through the smallest and largest value of every bin; NaN breaks them."""
+    middle, low, high = curves.bins()
+    both = np.stack([low, high], axis=-1).reshape(len(low), -1)
+    time = np.repeat(middle, 2)
+    breaks = 2 * (np.flatnonzero(np.diff(middle) > max(GAP_S, 2.0 * curves.bin_s)) + 1)
+    return np.insert(time, breaks, np.nan), np.insert(both, breaks, np.nan, axis=1)
+
+
+def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
+    text = f"Bag {name}. Vehicle: {vehicle.name}. "
+    if vehicle.effects:
+        text += f"Effects added to the baseline: {', '.join(effect.id for effect in vehicle.effects)}. "
+    if fit is None:
+        return text + "No residual: the torque was not measured."
+    unit = vehicle.coordinate.force_unit
+    r2 = "" if fit["r2"] is None else f", R² {fit['r2']:.4f}"
+    return text + (
+        f"Residual over {fit['samples']} samples: RMSE {fit['rmse_Nm']:.1f} {unit}{r2}, bias {fit['bias_Nm']:+.1f} "
+        f"{unit}."
+    )
