@@ -151,9 +151,14 @@ BUILT_IN = {
             ),
         ),
         Manoeuvre(
-            "creep",
-            "a full turn at 0.5 deg/s and back at 4 deg/s: Stribeck",
-            (Hold(2.0), Sweep(14.0, 0.5, 2.0), Sweep(0.0, 4.0, 2.0)),
+            "slow-sweeps",
+            "half sweeps at 0.5, 1, 4 and 2 deg/s: static against sliding friction, Stribeck speed",
+            (Hold(2.0), Sweep(14.0, 0.5, 2.0), Sweep(-14.0, 1.0, 2.0), Sweep(14.0, 4.0, 2.0), Sweep(0.0, 2.0, 2.0)),
+        ),
+        Manoeuvre(
+            "heat-and-rest",
+            "four cycles at 8 deg/s, three minutes parked, one more cycle: heat capacity, cooling",
+            (*cycles(LIMIT_DEG, 8.0, 4, 1.0), Hold(180.0), *cycles(LIMIT_DEG, 8.0, 1, 1.0)),
         ),
     )
 }
