@@ -52,7 +52,7 @@ def swing(
 def double_cycle(
     rate_Hz: float, speed_deg_s: float = 6.0, limit_deg: float = 26.0, hold_s: float = 2.0
 ) -> tuple[Array, Array]:
-    """Double steering cycle 0, +limit, -limit, +limit, -limit, 0 with holds: time [s], angle [rad]; 0.3 s to full rate."""
+    """Double steering cycle 0, +limit, -limit, +limit, -limit, 0 with holds: time [s], angle [rad]."""
     fine = 1e-3
     rate = [np.zeros(2000)]
     angle = 0.0

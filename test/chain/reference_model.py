@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The baseline as a plain-Python page, equation by equation, without the package's chain: the oracle of its tests.
 
-It reads a vehicle file by itself (YAML and CSV) and takes angles of both tracks; everything is SI, temperatures in degC.
+It reads a vehicle file by itself (YAML and CSV) and takes angles of both tracks; SI, temperatures in degC.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def test_creep_is_followed(rate_Hz: float) -> None:
     truth = true_torque(time, both(theta))
     total = estimated_torque(time, encoder(both(theta), 4))
     late = time > 25.0  # a degree of travel
-    assert np.abs(total - truth)[late].max() < 0.02 * truth.max() + 120.0
+    assert np.abs(total - truth)[late].max() < 0.015 * truth.max()
     slope = np.polyfit(time[late], total[late], 1)[0] / np.polyfit(time[late], truth[late], 1)[0]
     assert slope == pytest.approx(1.0, abs=0.03)
 
