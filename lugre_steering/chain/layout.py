@@ -48,12 +48,14 @@ EFFECT_FIELDS = (
     "heat_partition_ground_share", "carcass_heat_sink_conductance", "carcass_heat_sink_capacity",
     "flash_temperature_resistance", "flash_temperature_saturation_power", "flash_temperature_time_constant", "ambient_drift_rate",
     # parallel torque
-    "end_stop_engage_angle", "end_stop_stiffness", "end_stop_cubic_stiffness", "end_stop_loss", "end_stop_shift",
+    "end_stop_engage_angle", "end_stop_stiffness", "end_stop_cubic_stiffness", "end_stop_loss",
+    "end_stop_damping", "end_stop_shift",
     "yaw_inertia_inertia", "kingpin_jacking_amplitude", "kingpin_jacking_second_harmonic", "slope_bias_torque",
     "soil_shear_torque", "soil_shear_span", "soil_shear_growth",
     # measurement: torque the actuators must deliver on top
     "cylinder_friction_coulomb", "cylinder_friction_load_share", "cylinder_friction_viscous",
-    "cylinder_friction_holding", "cylinder_friction_breakaway", "line_loss_linear_b", "line_loss_quadratic_c",
+    "cylinder_friction_holding", "cylinder_friction_breakaway",
+    "cylinder_friction_rate_scale", "line_loss_linear_b", "line_loss_quadratic_c",
     "back_pressure_torque", "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
 )  # fmt: skip
 

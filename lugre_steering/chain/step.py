@@ -157,7 +157,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
         s.direction = sign
 
     conservative = aligning(theta, p.aligning_torque, p.gravity_cos)
-    parallel = parallel_torque(p, s, turned, alpha) if effects else 0.0
+    parallel = parallel_torque(p, s, turned, omega, alpha) if effects else 0.0
     load = elastic + damping + viscous + conservative + parallel
     s.torque = hydraulic_limits(p, s, load + losses(p, s, omega, turned, load)) if effects else load
 

@@ -23,24 +23,24 @@ def aligning(theta: float, amplitude: float, gravity_cos: float) -> float:
 
 
 @law
-def parallel_torque(p, s, d_theta, alpha):
+def parallel_torque(p, s, d_theta, omega, alpha):
     """Effects that act beside the contact [N m]: end_stop, soil_shear, yaw_inertia, kingpin_jacking, slope_bias."""
     torque = p.slope_bias_torque / p.sides + p.yaw_inertia_inertia * alpha
     if p.kingpin_jacking_amplitude != 0.0 or p.kingpin_jacking_second_harmonic != 0.0:
         sine = math.sin(s.theta)
         torque += sine * (p.kingpin_jacking_amplitude + p.kingpin_jacking_second_harmonic * 2.0 * math.cos(s.theta))
     if p.end_stop_stiffness != 0.0 or p.end_stop_cubic_stiffness != 0.0:
-        torque += end_stop(p, s, d_theta)
+        torque += end_stop(p, s, d_theta, omega)
     if p.soil_shear_torque != 0.0:
         torque += soil_shear(p, s)
     return torque
 
 
 @law
-def end_stop(p, s, d_theta):
-    """Elastic limit device: sgn(theta) (k1 x + k3 x**3), x = |theta| - engage_angle > 0; unloading lower by ``loss``.
+def end_stop(p, s, d_theta, omega):
+    """Elastic limit device: sgn(theta) (k1 x + k3 x**3 + c x'), x = |theta| - engage_angle > 0; unloading lower by ``loss``.
 
-    ``shift`` moves the knee of negative angles only. Compare the translational hard stop of multibody libraries;
+    The damping c acts while the stop is driven in (x' > 0). ``shift`` moves the knee of negative angles only. Compare the translational hard stop of multibody libraries;
     hysteresis as a share of the loading branch (rubber buffers: 0.15 ... 0.4).
     """
     engage = p.end_stop_engage_angle + (p.end_stop_shift if s.theta < 0.0 else 0.0)
@@ -51,7 +51,9 @@ def end_stop(p, s, d_theta):
     travel = d_theta if s.theta > 0.0 else -d_theta
     s.stop_loading = max(0.0, min(1.0, s.stop_loading + travel / STOP_TRAVEL_RAD))
     torque = p.end_stop_stiffness * x + p.end_stop_cubic_stiffness * x * x * x
-    return math.copysign(torque * (1.0 - p.end_stop_loss * (1.0 - s.stop_loading)), s.theta)
+    torque *= 1.0 - p.end_stop_loss * (1.0 - s.stop_loading)
+    torque += p.end_stop_damping * max(0.0, math.copysign(omega, omega * s.theta))
+    return math.copysign(torque, s.theta)
 
 
 @law
@@ -74,13 +76,14 @@ def losses(p, s, omega, d_theta, load):
     """Torque lost between cylinder pressures and steering axis [N m]; each entry is zero when neutral.
 
     cylinder_friction: (coulomb + load_share |load|) times a direction function, half of it (``holding``) kept at rest
-    by the seal, raised by ``breakaway`` at low speed (Stribeck), plus viscous omega. line_loss: b omega and c omega
+    by the seal, raised by ``breakaway`` at low speed (Stribeck), plus viscous omega; the sign changes over ``rate_scale``.
+    line_loss: b omega and c omega
     |omega|. back_pressure: constant, opposes motion, vanishes at rest.
     """
     torque = p.cylinder_friction_viscous * omega + p.line_loss_linear_b * omega
     torque += p.line_loss_quadratic_c * omega * abs(omega)
     if p.cylinder_friction_coulomb != 0.0 or p.cylinder_friction_load_share != 0.0 or p.back_pressure_torque != 0.0:
-        moving = math.tanh(omega / SIGN_RATE_RAD_S)
+        moving = math.tanh(omega / (SIGN_RATE_RAD_S + p.cylinder_friction_rate_scale))
         s.seal = max(-1.0, min(1.0, s.seal + d_theta / SEAL_TRAVEL_RAD))
         level = p.cylinder_friction_coulomb / p.sides + p.cylinder_friction_load_share * abs(load)
         bump = 1.0 + p.cylinder_friction_breakaway * exp(-((omega / 0.02) ** 2))

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
 from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, Values, in_threads
 from lugre_steering.effects.catalogue import CATALOGUE
@@ -27,16 +28,29 @@ CEILINGS = (0.8, 0.88, 0.94, 0.98)
 class Score:
     """A candidate against a residual: energy it explains, share of the residual's energy, masked share, linear values.
 
-    ``explained`` and ``null_explained`` are in units of the noise variance; ``coefficients`` multiply the parameter scales.
+    ``explained`` and ``null_explained`` are in units of the noise variance; ``coefficients`` multiply the parameter scales;
+    ``visible`` is the energy that the signature at its scale would show.
     """
 
     candidate: Candidate
     explained: float
     share: float
     masked_share: float
+    visible: float
     coefficients: tuple[float, ...]
     null_explained: Array
     trials: int = 1
+
+    @property
+    def p_value(self) -> float:
+        """Chance that noise alone explains as much, for the best of all tried variants of this effect.
+
+        A gamma distribution with the mean and variance of the null draws (a scaled chi-square under coloured noise).
+        """
+        mean, variance = float(np.mean(self.null_explained)), float(np.var(self.null_explained, ddof=1))
+        shape = min(mean**2 / max(variance, 1e-12), 0.5 * max(len(self.candidate.free), 1))
+        single = float(stats.gamma.sf(self.explained, shape, scale=max(mean, 1e-12) / shape))
+        return min(1.0, max(single * self.trials, 1e-300))
 
     @property
     def values(self) -> dict[str, float]:
@@ -186,7 +200,7 @@ def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals:
             values[active] = coefficients
         return Score(
             candidate, explained, explained / max(energy, 1e-30), 1.0 - float(np.sum(visible**2)) / total,
-            tuple(float(v) for v in values), np.sum(along[1:] ** 2, axis=1),
+            float(np.sum(visible**2)), tuple(float(v) for v in values), np.sum(along[1:] ** 2, axis=1),
         )  # fmt: skip
     return None
 

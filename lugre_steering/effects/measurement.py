@@ -16,6 +16,7 @@ EFFECTS = (
             Parameter("viscous", "N m s/rad", "of one track", 1e3, 0.0, 2e5, optional=True),
             Parameter("holding", "1", "share kept at standstill by the seals", 0.5, 0.0, 1.0, (0.0, 1.0)),
             Parameter("breakaway", "1", "raise at low rate (Stribeck)", 0.3, 0.0, 3.0, optional=True),
+            Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.3, optional=True),
         ),
         ("back_pressure", "line_loss_linear"),
     ),

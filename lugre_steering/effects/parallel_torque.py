@@ -7,7 +7,7 @@ from lugre_steering.effects.entry import Effect, Parameter
 EFFECTS = (
     Effect(
         "end_stop", "parallel_torque", 1, "Elastic end stop of the steering",
-        "M = sgn(theta) (k1 x + k3 x^3), x = |theta| - engage_angle > 0; unloading branch lower by loss",
+        "M = sgn(theta) (k1 x + k3 x^3 + c x'), x = |theta| - engage_angle > 0; unloading branch lower by loss",
         "limit device named by Liang et al. 2022; Hunt and Crossley, J. Appl. Mech. 42 (1975) 440 for contact with loss",
         "torque beyond a knee in the angle, holds included", "steering angle",
         (
@@ -16,6 +16,7 @@ EFFECTS = (
                       (0.55, 0.65, 0.75, 0.82, 0.88, 0.94), "max_angle"),
             Parameter("cubic_stiffness", "N m/rad^3", "k3 of one track", 1e7, 0.0, 1e10, optional=True),
             Parameter("loss", "1", "share of the torque lost on unloading", 0.2, 0.0, 0.95, optional=True),
+            Parameter("damping", "N m s/rad", "while the stop is driven in", 1e4, 0.0, 1e6, optional=True),
             Parameter("shift", "rad", "later engagement of negative angles", 0.01, -0.3, 0.3, optional=True),
         ),
         ("soil_shear", "moment_arm_error"),

@@ -1,0 +1,197 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Naming: refit what the screen suggests inside the simulator, build up effects one at a time, keep rivals that cannot be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from lugre_steering.diagnosis.fingerprint import Score, screen
+from lugre_steering.diagnosis.noise import Noise
+from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
+from lugre_steering.diagnosis.split import Split
+from lugre_steering.recording import Array
+
+MAX_EFFECTS = 3
+SHORTLIST = 7
+FALSE_DISCOVERY_RATE = 0.01
+OWN_ERROR = 0.04
+"""Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
+WHOLE = 0.75
+"""Share of the excess that named physics must explain together; below, the physics is unlisted."""
+LAST = 0.5
+"""Share of what was left that the last accepted effect must explain."""
+TIE_T = 2.5
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A screened candidate after its joint fit."""
+
+    score: Score
+    fit: Fit
+    cost: float
+
+    @property
+    def candidate(self) -> Candidate:
+        return self.fit.effects[-1][0]
+
+
+@dataclass(frozen=True)
+class Found:
+    """An accepted effect: its screen score, its rivals that fit as well, and the cost before it."""
+
+    score: Score
+    rivals: tuple[str, ...]
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the search came to. ``evidence`` lists every trial of the first round for the report."""
+
+    baseline: Fit
+    final: Fit
+    found: tuple[Found, ...]
+    excess: float
+    explained: float
+    listed: bool
+    first_scores: tuple[Score, ...]
+    trials: tuple[Trial, ...]
+
+
+def cost(problem: Problem, result: Fit, weight: Array) -> float:
+    """Weighted sum of squared errors over the samples with weight, in noise variances."""
+    return float(np.sum(((problem.measured - result.prediction) * weight) ** 2))
+
+
+def search(
+    problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None
+) -> Search:
+    """Add effects while they are significant, larger than our own error, and explain what is left."""
+    weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
+    samples = float(split.fit.sum())
+    start_cost = cost(problem, baseline, weight)
+    excess = start_cost - samples
+    steps: list[tuple[Fit, Found, float]] = []
+    current, first_scores, all_trials = baseline, (), []
+    for _ in range(MAX_EFFECTS):
+        progress("fingerprints")
+        taken = [candidate.effect.id for candidate, _ in current.effects]
+        scores = screen(problem, current, weight, noise.draws, taken)
+        if not steps:
+            first_scores = tuple(scores)
+        shortlist = choose(scores, samples)
+        if not shortlist:
+            break
+        trials = []
+        for score in shortlist:
+            progress(f"fitting {score.candidate.label}")
+            trials.append(try_effect(problem, weight, current, score))
+        trials.sort(key=lambda trial: trial.cost)
+        trials = [refine(problem, weight, trial) for trial in trials[:3]] + trials[3:]
+        trials.sort(key=lambda trial: trial.cost)
+        best, before = trials[0], cost(problem, current, weight)
+        all_trials += trials
+        if before - best.cost < OWN_ERROR * samples:
+            break
+        rivals = tied(problem, weight, split, best, trials[1:], before, samples)
+        gained = (before - best.cost) / max(before - samples, before - best.cost)
+        steps.append((best.fit, Found(best.score, rivals, tuple(trials)), gained))
+        current = best.fit
+        if best.cost - samples < OWN_ERROR * samples:
+            break
+    kept = _keep(steps, problem, weight, start_cost, samples)
+    final = steps[kept - 1][0] if kept else baseline
+    explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
+    return Search(
+        baseline, final, tuple(found for _, found, _ in steps[:kept]), excess / samples, float(np.clip(explained, 0.0, 1.0)),
+        kept > 0 or not steps, first_scores, tuple(all_trials),
+    )  # fmt: skip
+
+
+def _keep(steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float) -> int:
+    """How many steps of the build-up stand: the fewest that explain the whole, unless the next explains most of the rest."""
+    kept = 0
+    for i, (result, _, gained) in enumerate(steps):
+        after = cost(problem, result, weight)
+        whole = (start - after) / max(start - samples * (1.0 + OWN_ERROR), start - after, 1e-9)
+        if whole >= WHOLE and gained >= LAST:
+            kept = i + 1
+    return kept
+
+
+def choose(scores: Sequence[Score], samples: float) -> list[Score]:
+    """Shortlist: the best variant of each effect and line that is significant across the catalogue and not negligible."""
+    best: dict[str, Score] = {}
+    for score in scores:
+        label = score.candidate.label
+        if label not in best or score.explained > best[label].explained * _parsimony(score, best[label]):
+            best[label] = score
+    if not best:
+        return []
+    labels = list(best)
+    adjusted = stats.false_discovery_control([best[label].p_value for label in labels], method="by")
+    significant = [
+        best[label] for label, p in zip(labels, adjusted, strict=True)
+        if p < FALSE_DISCOVERY_RATE and best[label].explained > 0.5 * OWN_ERROR * samples
+    ]  # fmt: skip
+    significant.sort(key=lambda score: -score.explained)
+    per_effect: dict[str, int] = {}
+    chosen = []
+    for score in significant:
+        name = score.candidate.effect.id
+        if per_effect.get(name, 0) < 1:
+            chosen.append(score)
+            per_effect[name] = per_effect.get(name, 0) + 1
+    return [score for score in chosen if score.explained > 0.08 * chosen[0].explained][:SHORTLIST]
+
+
+def _parsimony(new: Score, old: Score) -> float:
+    """An effect in one bag only must beat the same effect in all bags clearly."""
+    return 1.1 if new.candidate.bags is not None and old.candidate.bags is None else 1.0
+
+
+def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
+    """Joint fit of calibration, earlier effects and this candidate, its shapes set free as well."""
+    candidate = score.candidate
+    free = tuple(p.name for p in candidate.effect.parameters if p.name in candidate.free or p.name in dict(candidate.shapes))
+    effects = [*current.effects, (replace(candidate, free=free), score.values)]
+    result = fit(problem, weight, effects, current.x, evaluations=8)
+    return Trial(score, result, cost(problem, result, weight))
+
+
+def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
+    """Let the effect have the optional parts of its family, if they earn their place."""
+    candidate, values = trial.fit.effects[-1]
+    optional = tuple(p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free)
+    evaluations = 8
+    if not optional:
+        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=evaluations)
+    else:
+        richer = replace(candidate, free=candidate.free + optional)
+        start = {**values, **{name: 0.2 * richer.parameter(name).scale for name in optional}}
+        result = fit(problem, weight, [*trial.fit.effects[:-1], (richer, start)], trial.fit.x, evaluations=evaluations + 4)
+    better = cost(problem, result, weight)
+    return Trial(trial.score, result, better) if better < trial.cost - 10.0 * max(len(optional), 1) else trial
+
+
+def tied(
+    problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float, samples: float
+) -> tuple[str, ...]:
+    """Rivals that this data cannot tell from the best: no clear difference block by block (Vuong), or none beyond our misfit."""
+    found = []
+    error = ((problem.measured - best.fit.prediction) * weight) ** 2
+    misfit = max(best.cost - samples, 0.0)
+    for other in others:
+        if other.candidate.effect.id == best.candidate.effect.id or before - other.cost < 0.5 * (before - best.cost):
+            continue
+        difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
+        t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
+        if t < TIE_T or other.cost - best.cost < 0.1 * misfit + 10.0:
+            found.append(other.candidate.label.split("[")[0])
+    return tuple(dict.fromkeys(found))[:6]

@@ -1,0 +1,55 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which samples may fit, and which are kept to judge: alternating blocks with gaps longer than the friction memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lugre_steering.diagnosis.problem import Problem
+
+Mask = NDArray[np.bool_]
+
+BLOCK_S = 8.0
+GAP_S = 1.0
+CYCLE = 3
+"""One block in so many is held out."""
+CLUSTER_S = 2.0
+"""Errors closer than this count as one for intervals and tests."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """``fit``, ``held`` (n,): disjoint, with gaps between; ``cluster`` (n,) numbers stretches of CLUSTER_S."""
+
+    fit: Mask
+    held: Mask
+    cluster: NDArray[np.int64]
+
+
+def split(problem: Problem) -> Split:
+    """Blocks of 8 s (shorter in short bags), every third held out, gaps of 1 s at both sides of each change of role."""
+    fit, held = np.zeros(problem.valid.size, bool), np.zeros(problem.valid.size, bool)
+    cluster = np.zeros(problem.valid.size, np.int64)
+    first = 0
+    for bag, run in enumerate(problem.runs):
+        part = slice(problem.edges[bag], problem.edges[bag + 1])
+        elapsed = run.time - run.time[0]
+        block = min(BLOCK_S, max(2.0, elapsed[-1] / 9.0))
+        gap = min(GAP_S, 0.15 * block)
+        index = (elapsed / block).astype(int)
+        role = (index + bag) % CYCLE == CYCLE - 1
+        within = elapsed - index * block
+        edge = np.zeros(run.time.size, bool)
+        for step in (-1, 1):
+            neighbour = (index + step + bag) % CYCLE == CYCLE - 1
+            near = within < gap if step < 0 else within > block - gap
+            edge |= near & (neighbour != role)
+        held[part] = role & ~edge & run.valid
+        fit[part] = ~role & ~edge & run.valid
+        cluster[part] = first + (elapsed / CLUSTER_S).astype(int)
+        first = int(cluster[part][-1]) + 1
+    return Split(fit, held, cluster)
