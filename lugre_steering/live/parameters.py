@@ -79,7 +79,12 @@ class _Parameter:
 
 _TABLE = (
     _Parameter("vehicle_file", "", "vehicle file (YAML); required"),
-    _Parameter("executor", "events", "rclpy executor that runs the callbacks", choices=EXECUTORS),
+    _Parameter(
+        "executor",
+        "events",
+        "rclpy executor; only events keeps the order of arrival across topics under load",
+        choices=EXECUTORS,
+    ),
     _Parameter("frame_id", "base_link", "frame of the published torques (z up)"),
     _Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000),
     _Parameter("angle_timeout_s", 0.2, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),

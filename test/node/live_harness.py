@@ -1,0 +1,253 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The node as its own process, and the systems around it (sensors, listeners) in this one, over real DDS."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import FluidPressure, JointState, Temperature
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
+
+from lugre_steering.estimator import Estimator
+from lugre_steering.recording import Kind
+from lugre_steering.vehicle import Vehicle, load
+
+PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+VEHICLE = PACKAGE_ROOT / "config" / "test_vehicle.yaml"
+DOMAIN = 1 + os.getpid() % 100
+START_TIMEOUT_S = 240.0  # a first start compiles
+NAME = "/steering_torque_estimator"
+SECOND = 1_000_000_000
+T0 = 1_700_000_000 * SECOND
+
+OUTPUTS = {
+    "torque": WrenchStamped,
+    "cylinder_torque": WrenchStamped,
+    "residual": WrenchStamped,
+    "estimate": JointState,
+    "feed_forward": JointState,
+    "rubber_temperature/left": Temperature,
+    "rubber_temperature/right": Temperature,
+    "feed_forward/commands": Float64MultiArray,
+}
+
+
+class Sample(NamedTuple):
+    channel: int
+    stamp_ns: int
+    value: float
+    rate: float = math.nan
+
+
+def to_time(stamp_ns: int) -> Time:
+    seconds, nanoseconds = divmod(stamp_ns, SECOND)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def to_ns(stamp: Time) -> int:
+    return stamp.sec * SECOND + stamp.nanosec
+
+
+def environment() -> dict[str, str]:
+    paths = [str(PACKAGE_ROOT), os.environ.get("PYTHONPATH", "")]
+    return {
+        **os.environ,
+        "ROS_DOMAIN_ID": str(DOMAIN),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "PYTHONPATH": os.pathsep.join(path for path in paths if path),
+    }
+
+
+class LiveNode:
+    """The node in its own process; use as a context manager."""
+
+    def __init__(self, *ros_args: str, command: Sequence[str] = ("-m", "lugre_steering.node"), vehicle: Path = VEHICLE):
+        self.log = Path(tempfile.mkstemp(prefix="live_node_", suffix=".log")[1])
+        arguments = ["--ros-args", "-p", f"vehicle_file:={vehicle}", *ros_args]
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, *command, *arguments], stdout=log, stderr=subprocess.STDOUT, env=environment()
+            )
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while " ready" not in self.output:
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                self.process.kill()
+                raise AssertionError(f"the node did not start: {self.output}")
+            time.sleep(0.05)
+
+    @property
+    def output(self) -> str:
+        return self.log.read_text()
+
+    def stop(self, number: int) -> tuple[int, float]:
+        """Exit code, and seconds it took."""
+        begin = time.monotonic()
+        self.process.send_signal(number)
+        return self.process.wait(timeout=20.0), time.monotonic() - begin
+
+    def __enter__(self) -> LiveNode:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.wait(timeout=20.0)
+        self.log.unlink()
+
+
+class World:
+    """Sensors that publish and listeners that keep what they hear."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle | None = None,
+        *,
+        namespace: str = "",
+        remaps: Mapping[str, str] | None = None,
+        outputs: Sequence[str] = tuple(OUTPUTS),
+    ) -> None:
+        self.vehicle = vehicle or load(VEHICLE)
+        self.context = rclpy.Context()
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        rclpy.init(context=self.context, domain_id=DOMAIN, args=[])
+        self.node = rclpy.create_node("world", context=self.context, namespace=namespace)
+        self.heard: dict[str, list[Any]] = defaultdict(list)
+        self.arrived: dict[str, list[float]] = defaultdict(list)
+        prefix = f"/{namespace}{NAME}" if namespace else NAME
+        for topic in outputs:
+            self._listen(OUTPUTS[topic], f"{prefix}/{topic}", topic)
+        self._listen(DiagnosticArray, "/diagnostics", "diagnostics")
+        kinds = {Kind.ANGLE: JointState, Kind.PRESSURE: FluidPressure, Kind.AIR_TEMPERATURE: Temperature}
+        kinds[Kind.TORQUE] = WrenchStamped
+        self._publishers: dict[str, Any] = {}
+        self._topics = []
+        for channel in self.vehicle.channels:
+            topic = (remaps or {}).get(channel.topic, channel.topic)
+            self._topics.append(topic)
+            if topic not in self._publishers:
+                publisher = self.node.create_publisher(kinds[channel.kind], topic, qos_profile_sensor_data)
+                self._publishers[topic] = publisher
+        self.command = self.node.create_publisher(JointTrajectory, "steering/command", QoSProfile(depth=10))
+        self.clock = self.node.create_publisher(Clock, "/clock", QoSProfile(depth=10))
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        matched = [*self._publishers.values(), self.command]
+        self.wait(lambda: all(publisher.get_subscription_count() for publisher in matched), 20.0)
+        self.wait(lambda: bool(self.heard["diagnostics"]), 20.0)  # the way back works as well
+        time.sleep(0.2)
+
+    def _spin(self) -> None:
+        with suppress(ExternalShutdownException):
+            self._executor.spin()
+
+    def _listen(self, message: type, topic: str, name: str) -> None:
+        def keep(received: Any) -> None:
+            self.heard[name].append(received)
+            self.arrived[name].append(time.monotonic())
+
+        self.node.create_subscription(message, topic, keep, QoSProfile(depth=10_000))
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown()
+        rclpy.shutdown(context=self.context)
+        self._thread.join(5.0)
+
+    def wait(self, condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < deadline, "waited in vain"
+            time.sleep(0.01)
+
+    def send(self, sample: Sample) -> None:
+        """Publish one sample as the message that its channel arrives in."""
+        channel = self.vehicle.channels[sample.channel]
+        if channel.kind is Kind.ANGLE:
+            message: Any = JointState(name=[channel.joint], position=[sample.value])
+            message.velocity = [] if math.isnan(sample.rate) else [sample.rate]
+        elif channel.kind is Kind.PRESSURE:
+            message = FluidPressure(fluid_pressure=sample.value)
+        elif channel.kind is Kind.AIR_TEMPERATURE:
+            message = Temperature(temperature=sample.value)
+        else:
+            message = WrenchStamped()
+            message.wrench.torque.z = sample.value
+        self.publish(sample.channel, sample.stamp_ns, message)
+
+    def publish(self, channel: int, stamp_ns: int, message: Any) -> None:
+        message.header.stamp = to_time(stamp_ns)
+        self._publishers[self._topics[channel]].publish(message)
+
+    def play(self, samples: Sequence[Sample], speed: float = 1.0) -> None:
+        """Publish samples in order, paced by their stamps."""
+        begin, first = time.monotonic(), samples[0].stamp_ns
+        for sample in samples:
+            wait = begin + (sample.stamp_ns - first) / SECOND / speed - time.monotonic()
+            if wait > 0.0:
+                time.sleep(wait)
+            self.send(sample)
+
+    def stamps(self, topic: str) -> list[int]:
+        return [to_ns(message.header.stamp) for message in self.heard[topic]]
+
+    def status(self, component: str, timeout_s: float = 5.0) -> tuple[bytes, str, dict[str, str]]:
+        """Level, message and values of a component from the next diagnostics message."""
+        seen = len(self.heard["diagnostics"])
+        self.wait(lambda: len(self.heard["diagnostics"]) > seen, timeout_s)
+        status = next(s for s in self.heard["diagnostics"][-1].status if s.name == f"{NAME[1:]}: {component}")
+        return status.level, status.message, {pair.key: pair.value for pair in status.values}
+
+
+def motion(vehicle: Vehicle, seconds: float, *, start_ns: int = T0, rate_Hz: float = 100.0) -> list[Sample]:
+    """A smooth made-up steering motion with jittering pressures at the same rate, and ambient air now and then."""
+    samples = []
+    for i in range(round(seconds * rate_Hz)):
+        t = i / rate_Hz
+        stamp_ns = start_ns + round(t * SECOND)
+        for index, channel in enumerate(vehicle.channels):
+            late_ns = 500_000 * index + 137_000 * (i % 5)
+            if channel.kind is Kind.ANGLE:
+                sign = 1.0 if channel.name == "left" else 0.97
+                rate = 0.4 * math.cos(2.0 * t) if i % 3 else math.nan
+                samples.append(Sample(index, stamp_ns, sign * 0.2 * math.sin(2.0 * t), rate))
+            elif channel.kind is Kind.PRESSURE:
+                samples.append(Sample(index, stamp_ns + late_ns, 5e6 + 1e6 * index * math.sin(2.0 * t + index)))
+            elif channel.kind is Kind.TORQUE:
+                samples.append(Sample(index, stamp_ns + late_ns, 300.0 * math.sin(2.0 * t)))
+            elif i % 100 == 50:
+                samples.append(Sample(index, stamp_ns + late_ns, 20.0 + 0.1 * i))
+    return sorted(samples, key=lambda sample: sample.stamp_ns)
+
+
+def direct(estimator: Estimator, samples: Sequence[Sample]) -> tuple[list[Any], list[Any]]:
+    """Estimates and residuals of the same samples pushed without ROS."""
+    estimates, residuals = [], []
+    for sample in samples:
+        new_estimates, new_residuals = estimator.push(*sample)
+        estimates += [row.copy() for row in new_estimates]
+        residuals += [row.copy() for row in new_residuals]
+    return estimates, residuals

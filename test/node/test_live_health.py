@@ -1,0 +1,210 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Stale, missing and wrong inputs: reported, never invented, never fatal."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from builtin_interfaces.msg import Time
+from live_harness import SECOND, T0, VEHICLE, LiveNode, Sample, World, motion, to_time
+from rosgraph_msgs.msg import Clock
+
+from lugre_steering.vehicle import load
+
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+
+FAILING_NODE = """
+import sys
+from lugre_steering.estimator import Estimator
+from lugre_steering.live import run
+
+push, failures = Estimator.push, iter(range(3))
+
+def failing(self, channel, stamp_ns, value, rate=float("nan")):
+    if value == 0.1255 and next(failures, None) is not None:
+        raise ZeroDivisionError("made to fail")
+    return push(self, channel, stamp_ns, value, rate)
+
+Estimator.push = failing
+sys.exit(run.run(sys.argv))
+"""
+
+
+def now_sample(channel: int, value: float) -> Sample:
+    return Sample(channel, time.time_ns(), value)
+
+
+def test_stale_pressures_stop_the_residual_and_a_missing_angle_the_torque() -> None:
+    vehicle = load(VEHICLE)
+    samples = motion(vehicle, 4.0)
+    whole = [s for s in samples if s.stamp_ns < T0 + SECOND]
+    no_pressure = [s for s in samples if T0 + SECOND <= s.stamp_ns < T0 + 3 * SECOND and s.channel in (0, 1)]
+    no_right = [s for s in samples if T0 + 3 * SECOND <= s.stamp_ns and s.channel != 1]
+    with LiveNode(), World(vehicle) as world:
+        torque, residual = world.heard["torque"], world.heard["residual"]
+        world.play(whole)
+        world.wait(lambda: len(torque) == 100)
+        assert 90 < len(residual) <= 100
+        formed = len(residual)
+
+        world.play(no_pressure)
+        _, message, _ = world.status("inputs")
+        for line in ("main_a", "main_b", "aux_a", "aux_b"):
+            assert f"pressure/{line} stale" in message
+        assert len(torque) == 300
+        assert len(residual) == formed
+
+        world.play(no_right)
+        level, message, values = world.status("inputs")
+        assert level == ERROR
+        assert "angle/right stale" in message
+        assert float(values["angle/right age [s]"]) > 0.9
+        assert len(torque) == 300
+
+
+def test_every_rejection_is_counted_by_channel_and_reason() -> None:
+    vehicle = load(VEHICLE)
+    ms = 1_000_000
+    samples = [Sample(c, T0 + i * 10 * ms, 0.0) for i in range(20) for c in (0, 1)]
+    last = T0 + 190 * ms
+    samples += [
+        Sample(0, last, 0.0),  # duplicate
+        Sample(0, last - 50 * ms, 0.0),  # backward
+        Sample(1, 0, 0.0),  # zero stamp
+        Sample(1, last + 10 * ms, math.nan),
+        Sample(1, last + 10 * ms, math.inf),
+        Sample(0, last + 10 * ms, 3.0),  # spike
+        Sample(0, last + 10 * ms, 9.0),  # absurd
+        Sample(2, last, 1e15),  # absurd
+        Sample(0, last + 20 * ms, 0.0),
+        Sample(1, last + 20 * ms, 0.0),
+    ]
+    with LiveNode(), World(vehicle) as world:
+        for sample in samples:
+            world.send(sample)
+            time.sleep(0.001)
+        world.wait(lambda: len(world.heard["torque"]) == 21)
+        world.wait(lambda: len(world.heard["diagnostics"]) > 2)
+        level, message, values = world.status("rejected")
+        levels = [s.level for d in world.heard["diagnostics"] for s in d.status if s.name.endswith("rejected")]
+        assert WARN in levels  # while they were new
+        expected = {
+            "angle/left duplicate": "1",
+            "angle/left backward": "1",
+            "angle/left spike": "1",
+            "angle/left absurd": "1",
+            "angle/right zero_stamp": "1",
+            "angle/right not_finite": "2",
+            "pressure/main_a absurd": "1",
+            "angle/left accepted": "21",
+            "angle/right accepted": "21",
+        }
+        assert expected.items() <= values.items()
+        for topic in ("torque", "estimate"):
+            assert world.stamps(topic) == [*(T0 + i * 10 * ms for i in range(20)), last + 20 * ms]
+
+
+def test_an_exception_in_a_callback_withholds_the_torque_and_passes(tmp_path: Path) -> None:
+    script = tmp_path / "failing_node.py"
+    script.write_text(FAILING_NODE)
+    vehicle = load(VEHICLE)
+    with LiveNode(command=[str(script)]) as node, World(vehicle) as world:
+
+        def steer(seconds: float, value: float) -> None:
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                stamp_ns = time.time_ns()
+                world.send(Sample(0, stamp_ns, value))
+                world.send(Sample(1, stamp_ns, value))
+                time.sleep(0.01)
+
+        steer(0.3, 0.0)
+        assert len(world.heard["torque"]) > 20
+        for channel in (0, 1, 0):
+            world.send(now_sample(channel, 0.1255))
+        steer(0.1, 0.0)
+        before = len(world.heard["torque"])
+        steer(0.4, 0.0)
+        assert len(world.heard["torque"]) == before
+        steer(1.5, 0.0)
+        assert len(world.heard["torque"]) > before + 20
+        level, _, values = world.status("outputs")
+        levels = [s.level for d in world.heard["diagnostics"] for s in d.status if s.name.endswith("outputs")]
+        assert ERROR in levels
+        assert level == WARN  # over, but not forgotten
+        assert values["exceptions"] == "3"
+        assert values["last exception"] == "ZeroDivisionError: made to fail"
+        assert int(values["withheld: after an exception"]) > 20
+        assert node.process.poll() is None
+
+
+def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> None:
+    vehicle = load(VEHICLE)
+    with LiveNode("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5"), World(vehicle) as world:
+        commands = world.heard["feed_forward/commands"]
+
+        def steer(seconds: float, value: float, age_ns: int = 0) -> None:
+            for i in range(round(seconds * 100)):
+                stamp_ns = time.time_ns() - age_ns
+                for channel in (0, 1):
+                    world.send(Sample(channel, stamp_ns, value + 1e-4 * i))
+                time.sleep(0.01)
+
+        steer(1.2, 0.0)
+        world.wait(lambda: len(commands) == 120)
+        assert commands[0].data[0] == 0.0
+        assert list(commands[-1].data) == list(world.heard["feed_forward"][-1].effort)
+        assert len(commands[-1].data) == 2
+
+        time.sleep(1.0)  # nothing comes in: nothing goes out
+        assert len(commands) == 120
+
+        last = list(commands[-1].data)
+        steer(1.0, 0.25)
+        world.wait(lambda: len(commands) == 220)
+        wanted = [list(m.effort) for m in world.heard["feed_forward"][120:]]
+        assert list(commands[120].data) == last
+        assert abs(wanted[0][0] - last[0]) > 500.0  # or this test would show nothing
+        steps = [abs(b.data[0] - a.data[0]) for a, b in zip(commands[119:], commands[120:], strict=False)]
+        assert max(steps) < 0.2 * abs(wanted[0][0] - last[0])
+        assert list(commands[-1].data) == wanted[-1]
+
+        n_torque = len(world.heard["torque"])
+        time.sleep(0.7)
+        steer(0.3, 0.3, age_ns=SECOND // 2)  # half a second old on arrival: an estimate, but nothing to act upon
+        world.wait(lambda: len(world.heard["torque"]) == n_torque + 30)
+        assert len(commands) == 220
+        _, _, values = world.status("outputs")
+        assert values["withheld: commands: stamps are not close to the clock"] == "30"
+
+
+def test_simulated_time() -> None:
+    vehicle = load(VEHICLE)
+    arguments = ("-p", "use_sim_time:=true", "-p", "publish_commands:=true")
+    with LiveNode(*arguments), World(vehicle) as world:
+        world.clock.publish(Clock(clock=Time(sec=100)))
+        world.wait(lambda: bool(world.heard["diagnostics"]) and world.heard["diagnostics"][-1].header.stamp.sec == 100)
+        for i in range(100):
+            stamp_ns = 100 * SECOND + i * 10_000_000
+            world.clock.publish(Clock(clock=to_time(stamp_ns)))
+            time.sleep(0.005)
+            world.send(Sample(0, stamp_ns, 0.0))
+            world.send(Sample(1, stamp_ns, 0.0))
+            time.sleep(0.005)
+        world.wait(lambda: len(world.heard["torque"]) == 100)
+        _, _, latency = world.status("latency")
+        assert 0.0 <= float(latency["stamp to publish p50 [ms]"]) <= 10.0
+        assert float(latency["arrival to publish p50 [ms]"]) < 10.0
+        assert len(world.heard["feed_forward/commands"]) == 100
+        # Time stands still, so the inputs do not grow old; health is reported all the same.
+        time.sleep(1.0)
+        level, message, values = world.status("inputs")
+        assert "angle" not in message
+        assert float(values["angle/left age [s]"]) < 0.2

@@ -1,0 +1,125 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Start, refusal and stop of the node's process."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+pytest.importorskip("rclpy")
+
+from live_harness import PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+
+CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"
+
+
+def start_refused(*ros_args: str) -> str:
+    command = [sys.executable, "-m", "lugre_steering.node", "--ros-args", *ros_args]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(), check=False)
+    assert done.returncode == 2, done.stderr
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("[ERROR]")]  # rcl's own
+    assert len(lines) == 1, done.stderr
+    assert lines[0].startswith("estimator: ")
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [
+        ("max_gap_s:=.nan", ("max_gap_s", "nan", "0.001 to 60")),
+        ("max_gap_s:=1", ("max_gap_s", "1", "decimal point")),
+        ("executor:=multi", ("executor", "multi", "events, single")),
+    ],
+)
+def test_bad_parameters_are_refused(argument: str, said: tuple[str, ...]) -> None:
+    message = start_refused("-p", f"vehicle_file:={VEHICLE}", "-p", argument)
+    assert all(text in message for text in said), message
+
+
+def test_bad_vehicle_files_are_refused(tmp_path: Path) -> None:
+    assert "vehicle_file" in start_refused()
+    missing = tmp_path / "none.yaml"
+    assert str(missing) in start_refused("-p", f"vehicle_file:={missing}")
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(VEHICLE.read_text().replace("width_m: 0.45", "width_m: -0.45"))
+    wrong.with_name("rubber_dma_10hz.csv").write_text(VEHICLE.with_name("rubber_dma_10hz.csv").read_text())
+    message = start_refused("-p", f"vehicle_file:={wrong}")
+    assert all(text in message for text in (str(wrong), "track.width_m", "-0.45"))
+
+
+@pytest.mark.parametrize(
+    ("executor", "number"), [("events", signal.SIGINT), ("events", signal.SIGTERM), ("single", signal.SIGTERM)]
+)
+def test_stops_cleanly(executor: str, number: int) -> None:
+    with LiveNode("-p", f"executor:={executor}") as node:
+        code, seconds = node.stop(number)
+        assert code == 0, node.output
+        assert seconds < 3.0
+        assert "Traceback" not in node.output
+
+
+def test_parameters_are_described_ranged_and_fixed() -> None:
+    shipped = yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"]
+    with LiveNode("--params-file", str(CONFIG), "-p", "no_such:=1") as node, World() as world:
+        assert "no_such" in node.output
+
+        def call(service: type, name: str, request: object) -> object:
+            client = world.node.create_client(service, f"/steering_torque_estimator/{name}")
+            assert client.wait_for_service(10.0)
+            future = client.call_async(request)
+            world.wait(future.done)
+            return future.result()
+
+        names = [*shipped, "vehicle_file"]
+        described = call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names))
+        for name, item in zip(names, described.descriptors, strict=True):
+            assert item.description
+            assert item.read_only
+            if item.type == ParameterType.PARAMETER_DOUBLE:
+                bounds = item.floating_point_range[0]
+                assert bounds.from_value <= shipped[name] <= bounds.to_value
+            if item.type == ParameterType.PARAMETER_INTEGER:
+                assert item.integer_range[0].from_value <= shipped[name] <= item.integer_range[0].to_value
+        got = call(GetParameters, "get_parameters", GetParameters.Request(names=["max_gap_s"]))
+        assert got.values[0].double_value == shipped["max_gap_s"]
+        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.5)
+        request = SetParameters.Request(parameters=[Parameter(name="max_gap_s", value=value)])
+        assert not call(SetParameters, "set_parameters", request).results[0].successful
+
+
+def test_the_shipped_parameters_are_the_defaults() -> None:
+    from lugre_steering.live import parameters
+
+    shipped = yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"]
+    declared = {p.name: p.default for p in (*parameters._TABLE, *parameters._OPTION_TABLE) if p.name != "vehicle_file"}
+    assert shipped == declared
+
+
+def test_the_node_imports_no_plotting_bags_or_command_line() -> None:
+    code = (
+        "import sys, lugre_steering.node, lugre_steering.live.run\n"
+        "heavy = {'matplotlib', 'plotly', 'rosbags', 'pandas', 'typer', 'rich', 'scipy.stats'}\n"
+        "print(','.join(sorted(heavy & set(sys.modules))))"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(), check=True)
+    assert done.stdout.strip() == ""
+
+
+def test_launch_file() -> None:
+    file = PACKAGE_ROOT / "launch" / "estimator.launch.py"
+    code = compile(file.read_text(), str(file), "exec")
+    pytest.importorskip("launch")
+    pytest.importorskip("launch_ros")
+    namespace: dict[str, object] = {}
+    exec(code, namespace)
+    if not any("lugre_steering" in path for path in sys.path):
+        pytest.skip("package not installed in an ament prefix")

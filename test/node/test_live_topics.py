@@ -1,0 +1,183 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the node publishes, against the estimator called directly with the same samples."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from builtin_interfaces.msg import Duration
+from live_harness import SECOND, T0, VEHICLE, LiveNode, Sample, World, direct, motion, to_ns, to_time
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from lugre_steering.estimator import Estimator, Options
+from lugre_steering.vehicle import load
+
+EXACT = {"rtol": 1e-9, "atol": 0.0}
+
+
+def column(messages: list[Any], field: str) -> np.ndarray[Any, Any]:
+    def value(message: Any) -> Any:
+        for name in field.split("."):
+            message = getattr(message, name)
+        return message
+
+    return np.array([value(message) for message in messages])
+
+
+def assert_topics_equal(world: World, estimates: list[Any], residuals: list[Any]) -> None:
+    heard, sides = world.heard, len(world.vehicle.sides)
+    assert world.stamps("torque") == [int(row["stamp_ns"]) for row in estimates]
+    np.testing.assert_allclose(column(heard["torque"], "wrench.torque.z"), [row["total"] for row in estimates], **EXACT)
+    for topic, field, source in (
+        ("estimate", "position", "theta"),
+        ("estimate", "velocity", "omega"),
+        ("estimate", "effort", "torque"),
+        ("feed_forward", "effort", "feed_forward"),
+    ):
+        expected = np.array([row[source][:sides] for row in estimates])
+        assert world.stamps(topic) == world.stamps("torque")
+        np.testing.assert_allclose(column(heard[topic], field), expected, **EXACT)
+    if world.vehicle.rubber is not None:
+        for i, side in enumerate(world.vehicle.sides):
+            messages = heard[f"rubber_temperature/{side}"]
+            expected = np.array([row["temperature"][i] for row in estimates])
+            np.testing.assert_allclose(column(messages, "temperature"), expected, **EXACT)
+    for topic, source in (("cylinder_torque", "measured_torque"), ("residual", "residual")):
+        assert world.stamps(topic) == [int(row["stamp_ns"]) for row in residuals]
+        values = column(heard[topic], "wrench.torque.z")
+        np.testing.assert_allclose(values, [row[source] for row in residuals], **EXACT)
+
+
+def test_live_equals_direct_on_every_topic() -> None:
+    vehicle = load(VEHICLE)
+    samples = motion(vehicle, 5.0)
+    estimates, residuals = direct(Estimator(vehicle), samples)
+    assert len(estimates) == 500
+    assert len(residuals) > 490
+    with LiveNode(), World(vehicle) as world:
+        world.play(samples, speed=2.0)
+        world.wait(lambda: len(world.heard["residual"]) >= len(residuals))
+        _, _, inputs = world.status("inputs")
+        _, _, latency = world.status("latency")
+        assert_topics_equal(world, estimates, residuals)
+        torque, estimate = world.heard["torque"][0], world.heard["estimate"][0]
+        assert torque.header.frame_id == "base_link"
+        assert estimate.name == ["left_track_steer_joint", "right_track_steer_joint"]
+        assert world.heard["rubber_temperature/left"][0].header.frame_id == "left_track"
+        assert not world.heard["feed_forward/commands"]  # off by default
+        assert inputs["angle/left topic"] == "/steering/left/joint_state"
+        assert latency["torques published"] == "500"
+        names = [status.name for status in world.heard["diagnostics"][-1].status]
+        components = ("inputs", "rejected", "latency", "residual", "outputs")
+        assert names == [f"steering_torque_estimator: {component}" for component in components]
+
+
+def test_both_joints_on_one_topic_in_a_namespace() -> None:
+    vehicle = load(VEHICLE)
+    one = {topic: "/joint_states" for topic in ("steering/left/joint_state", "steering/right/joint_state")}
+    remaps = [text for topic, target in one.items() for text in ("-r", f"{topic}:={target}")]
+    estimator = Estimator(vehicle)
+    expected = []
+    with LiveNode("-r", "__ns:=/truck", *remaps), World(vehicle, namespace="truck", remaps=one) as world:
+        for i in range(100):
+            stamp_ns = T0 + i * 10_000_000
+            left, right = 0.1 * math.sin(0.03 * i), 0.09 * math.sin(0.03 * i)
+            names = ["boom", "right_track_steer_joint", "left_track_steer_joint"]
+            world.publish(0, stamp_ns, JointState(name=names, position=[9.0, right, left], velocity=[9.0, 0.2, 0.3]))
+            if i % 10 == 0:  # others may publish joints there too
+                world.publish(0, stamp_ns, JointState(name=["boom"], position=[9.0]))
+            for channel, value, rate in ((0, left, 0.3), (1, right, 0.2)):
+                expected += [float(row["total"]) for row in estimator.push(channel, stamp_ns, value, rate)[0]]
+        world.wait(lambda: len(world.heard["torque"]) >= 100)
+        np.testing.assert_allclose(column(world.heard["torque"], "wrench.torque.z"), expected, **EXACT)
+        _, _, inputs = world.status("rejected")
+        assert inputs["/joint_states without a wanted joint"] == "10"
+
+
+def test_late_pressures_give_the_residual_later_in_stamp_order() -> None:
+    vehicle = load(VEHICLE)
+    samples = motion(vehicle, 1.0)
+    angles = [sample for sample in samples if sample.channel < 2]
+    rest = [sample for sample in samples if sample.channel >= 2]
+    estimates, residuals = direct(Estimator(vehicle), [*angles, *rest])
+    with LiveNode(), World(vehicle) as world:
+        world.play(angles)
+        world.wait(lambda: len(world.heard["torque"]) == len(estimates))
+        assert not world.heard["residual"]
+        world.play(rest)
+        world.wait(lambda: len(world.heard["residual"]) == len(residuals))
+        assert_topics_equal(world, estimates, residuals)
+
+
+def test_one_joint_with_a_torque_sensor(tmp_path: Path) -> None:
+    file = tmp_path / "joint.yaml"
+    file.write_text(
+        "schema: lugre_steering/vehicle/1\nname: single joint\nsides: [left]\n"
+        "contact: {static_torque_Nm: 900.0, coulomb_torque_Nm: 700.0, stiffness_Nm_per_deg: 800.0, "
+        "stribeck_speed_deg_s: 1.0}\n"
+        "torque_sensor: {topic: steering/measured_torque}\n"
+    )
+    vehicle = load(file)
+    samples = motion(vehicle, 1.0)
+    estimates, residuals = direct(Estimator(vehicle), samples)
+    assert len(residuals) > 90
+    with LiveNode(vehicle=file), World(vehicle) as world:
+        world.play(samples)
+        world.wait(lambda: len(world.heard["residual"]) == len(residuals))
+        assert_topics_equal(world, estimates, residuals)
+        assert world.heard["estimate"][0].name == ["left_track_steer_joint"]
+        assert not world.heard["rubber_temperature/left"]  # the vehicle has no rubber: nothing is invented
+
+
+def trajectory(joints: list[str], start_ns: int, points: list[tuple[float, list[float]]]) -> JointTrajectory:
+    message = JointTrajectory(joint_names=joints)
+    message.header.stamp = to_time(start_ns)
+    for seconds, positions in points:
+        duration = Duration(sec=int(seconds), nanosec=round((seconds % 1) * SECOND))
+        message.points.append(JointTrajectoryPoint(positions=positions, time_from_start=duration))
+    return message
+
+
+def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
+    vehicle = load(VEHICLE)
+    options = Options(feed_forward_horizon_s=0.3)
+    joints = ["right_track_steer_joint", "left_track_steer_joint"]
+    bad = [
+        trajectory(joints[:1], T0, [(1.0, [0.1])]),
+        trajectory(joints, T0, [(1.0, [0.1, 0.1]), (0.5, [0.2, 0.2])]),
+        trajectory(joints, T0, [(1.0, [0.1, math.nan])]),
+        trajectory(joints, T0, [(1.0, [0.1])]),
+    ]
+    good = trajectory(joints, T0 + SECOND // 2, [(0.0, [0.0, 0.0]), (1.5, [0.2, 0.3])])
+    estimator = Estimator(vehicle, options)
+    still = [Sample(channel, T0 + i * 10_000_000, 0.0) for i in range(100) for channel in (0, 1)]
+    estimates = direct(estimator, still[:50])[0]
+    points_ns = [T0 + SECOND // 2, T0 + 2 * SECOND]
+    estimator.set_plan(np.array(points_ns, np.int64), np.array([[0.0, 0.3], [0.0, 0.2]]))
+    estimates += direct(estimator, still[50:])[0]
+    with LiveNode("-p", "feed_forward_horizon_s:=0.3"), World(vehicle) as world:
+        world.play(still[:50])
+        for message in (good, *bad):
+            world.command.publish(message)
+        _, _, rejected = world.status("rejected")
+        world.play(still[50:])
+        world.wait(lambda: len(world.heard["feed_forward"]) == 100)
+        assert_topics_equal(world, estimates, [])
+        effort = column(world.heard["feed_forward"], "effort")
+        torque = column(world.heard["estimate"], "effort")
+        # While the vehicle stands, its torque stays; the planned turn needs torque, in the direction of the turn.
+        assert np.all(np.abs(effort[:25] - torque[:25]) < 1e-6)
+        assert np.all(effort[60:] > torque[60:] + 1000.0)
+        assert to_ns(good.header.stamp) == points_ns[0]
+        refused = {key: n for key, n in rejected.items() if key.startswith("steering/command")}
+        assert sum(int(n) for n in refused.values()) == 4
+        assert len(refused) == 4
