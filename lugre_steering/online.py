@@ -154,5 +154,5 @@ class Curves:
     def bins(self) -> tuple[Array, Array, Array]:
         """Middle of each filled bin (m,) [s], smallest and largest values (curves, m)."""
         filled = np.flatnonzero(np.isfinite(self._low).any(axis=0))
-        middle: Array = (filled + 0.5) * self.bin_s
+        middle: Array = (filled + 0.5).astype(np.float64) * self.bin_s
         return middle, self._low[:, filled], self._high[:, filled]
