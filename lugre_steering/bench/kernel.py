@@ -32,7 +32,7 @@ _PLACED = {
     "end_stop_engage_angle": 0.3,
     "surface_patch_angle_low": 0.0,
     "surface_patch_angle_high": 0.2,
-    "surface_patch_time_start": 1.0,
+    "surface_patch_time_start": 5.0,
     "surface_patch_time_end": 30.0,
     "relief_saturation_ceiling": 35_000.0,
 }

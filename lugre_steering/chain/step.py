@@ -17,8 +17,8 @@ from lugre_steering.chain.contact import (
     bristle_work,
     level_factor,
     relaxed_share,
-    tangent_factor,
     stribeck,
+    tangent_factor,
 )
 from lugre_steering.chain.heat import advance_heat
 from lugre_steering.chain.layout import EFFECT_FIELDS, ELEMENTS, OUTPUT, PARAMETERS, STATE
@@ -56,6 +56,7 @@ def begin(p, s, theta):
     s.started = 1.0
     s.theta = theta
     s.link_angle = theta
+    s.gap = 0.5 * p.backlash_width * p.backlash_start
     s.z = p.initial_bristle
     s.z_max = abs(p.initial_bristle)
     for i in range(ELEMENTS):
@@ -178,9 +179,8 @@ def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):
 
 
 @njit(nogil=True, cache=True)
-def _run(p, s, rubber, time, theta, omega, alpha, out):
+def _run(p, s, rubber, time, theta, omega, alpha, out, previous):
     effects = has_effects(p[0])
-    previous = time[0]
     for i in range(time.size):
         step(p[0], s[0], rubber, out[i], time[i] - previous, theta[i], omega[i], alpha[i], effects)
         previous = time[i]
@@ -207,11 +207,22 @@ def new_parameters() -> Records:
 
 
 def run_side(
-    p: Records, rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array, state: Records | None = None
+    p: Records,
+    rubber: Array,
+    time: Array,
+    theta: Array,
+    omega: Array,
+    alpha: Array,
+    state: Records | None = None,
+    previous_time: float | None = None,
 ) -> Records:
-    """Whole record of one track -> OUTPUT records (n,). ``time`` [s] increases; a given ``state`` is advanced."""
+    """Whole record of one track -> OUTPUT records (n,); ``time`` [s] increases.
+
+    A given ``state`` is advanced in place; ``previous_time`` is the stamp of the sample it stands at, if it has one.
+    """
     out = np.zeros(time.size, OUTPUT)
-    _run(p, new_state() if state is None else state, rubber, time, theta, omega, alpha, out)
+    previous = float(time[0]) if previous_time is None else previous_time
+    _run(p, new_state() if state is None else state, rubber, time, theta, omega, alpha, out, previous)
     return out
 
 
