@@ -14,16 +14,17 @@ from lugre_steering.vehicle import Vehicle
 
 
 def apply_calibration(vehicle: Vehicle, problem: Problem, x: Array) -> Vehicle:
-    """``vehicle`` (that of ``problem``, perhaps with effects added) with the calibration part of ``x`` written into its keys.
+    """``vehicle`` (that of ``problem``, perhaps with effects added) with the calibration part of ``x`` in its keys.
 
-    A model built from the result has the parameters that ``problem.fields(x)`` names; only a static friction fitted below
-    the sliding one, which a vehicle file refuses, is raised to it. The initial bristles in ``x`` have no key.
+    A model built from the result has the parameters that ``problem.fields(x)`` names; only a static friction fitted
+    below the sliding one, which a vehicle file refuses, is raised to it. The initial bristles in ``x`` have no key.
     """
     record = problem.model.parameters[0][0]
     ratio = {field: value / float(record[field]) for field, value in problem.fields(x).items() if record[field] != 0.0}
     coulomb, static = ratio.get("coulomb_torque", 1.0), ratio.get("static_torque", 1.0)
     stiffness, stribeck = ratio.get("sigma_0", 1.0), ratio.get("stribeck_speed", 1.0)
-    changed = vehicle
+    sensors = replace(vehicle.sensors, pressure_gain=problem.gain(x) * vehicle.sensors.pressure_gain)
+    changed = vehicle.replace(sensors=sensors)
     if (friction := vehicle.friction) is not None:
         assert friction.coulomb is not None
         assert friction.static is not None

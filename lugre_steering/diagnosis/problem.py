@@ -21,6 +21,9 @@ from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
+ROBUST = 3.0
+"""Standard deviations beyond which the robust fit counts an error linearly."""
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -55,6 +58,9 @@ STIFFNESS = Calibration("stiffness", ("sigma_0",), 0.15, -0.6, 0.6)
 STRIBECK = Calibration("stribeck_speed", ("stribeck_speed",), 0.15, -0.7, 0.7)
 CAPACITY = Calibration("heat_capacity", ("heat_capacity",), 0.15, -0.6, 0.6)
 COOLING = Calibration("cooling", ("cooling",), 0.15, -0.6, 0.6)
+KINGPIN = Calibration("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
+GAIN = Calibration("pressure_gain", (), 0.03, -0.3, 0.3)
+"""Scales the torque that the pressures show, no field of the chain."""
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
 
 
@@ -135,6 +141,10 @@ class Problem:
             values["static_torque"] = max(values["static_torque"], 0.3 * values["coulomb_torque"])
         return values
 
+    def gain(self, x: Array) -> float:
+        """Factor on the sheet's pressure gain."""
+        return float(np.exp(sum(x[i] for i, c in enumerate(self.calibrations) if c.name == GAIN.name)))
+
     def torque(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
     ) -> Array:
@@ -164,7 +174,7 @@ class Problem:
         for candidate, values in effects:
             if candidate.active_in(bag):
                 torque = self._through_sensor(run, candidate, values, torque)
-        return torque
+        return torque / self.gain(x)
 
     def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array) -> Array:
         """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
@@ -224,11 +234,12 @@ def fit(
     *,
     evaluations: int = 12,
     robust: bool = False,
+    priors: bool = True,
 ) -> Fit:
     """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
-    ``robust`` bounds the influence of samples beyond 3 sigma (soft L1).
+    ``robust`` bounds the influence of samples beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
     x0 = problem.start() if start is None else start
     low, high = problem.bounds()
@@ -238,7 +249,7 @@ def fit(
     p0 = np.concatenate([x0, [values0[i].get(n, 0.0) for i, n in free]]) / scale
     low = np.concatenate([low, [effects[i][0].parameter(n).low for i, n in free]]) / scale
     high = np.concatenate([high, [effects[i][0].parameter(n).high for i, n in free]]) / scale
-    prior = np.array([1.0] * len(problem.calibrations) + [0.3] * len(problem.runs) + [0.0] * len(free))
+    prior = np.array([float(priors)] * len(problem.calibrations) + [0.3] * len(problem.runs) + [0.0] * len(free))
     n = problem.nuisances
 
     def unpack(p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:
@@ -260,7 +271,7 @@ def fit(
 
     solution = least_squares(
         residual, np.clip(p0, low + 1e-9, high - 1e-9), jac=jacobian, bounds=(low, high), max_nfev=evaluations,
-        loss="soft_l1" if robust else "linear", f_scale=3.0, xtol=1e-5, ftol=1e-7, gtol=1e-8,
+        loss="soft_l1" if robust else "linear", f_scale=ROBUST, xtol=1e-5, ftol=1e-7, gtol=1e-8,
     )  # fmt: skip
     x, fitted = unpack(solution.x)
     final = jacobian(solution.x)
