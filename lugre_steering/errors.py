@@ -11,6 +11,10 @@ class VehicleFileError(LugreSteeringError):
     """A vehicle file, or a table it points to, cannot be used as it is."""
 
 
+class MapFileError(LugreSteeringError):
+    """An import map, or the table it describes, cannot be used as it is."""
+
+
 class BagError(LugreSteeringError):
     """A recording cannot be read, or lacks what the task needs."""
 

@@ -9,50 +9,23 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
-import re
-import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
 
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.recording import Channel, Kind
 from lugre_steering.resources import config_folder
+from lugre_steering.schema import Reader, positive, quantity
 
 SCHEMA = "lugre_steering/vehicle/1"
 SIDES = ("left", "right")
-
-T = TypeVar("T")
-
-
-class _Loader(yaml.SafeLoader):
-    """SafeLoader that also reads 25.0e6 and 1e4 as numbers (YAML 1.2), as every engineer means them."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
-)
-
-
-def quantity(
-    low: float = -math.inf, high: float = math.inf, *, open_low: bool = False, default: Any = dataclasses.MISSING
-) -> Any:
-    """A dataclass field whose numbers must lie in [low, high] (``open_low``: low itself excluded)."""
-    metadata = {"low": low, "high": high, "open_low": open_low}
-    if default is dataclasses.MISSING:
-        return field(metadata=metadata)
-    return field(default=default, metadata=metadata)
-
-
-def positive(high: float = math.inf, *, default: Any = dataclasses.MISSING) -> Any:
-    return quantity(0.0, high, open_low=True, default=default)
 
 
 @dataclass(frozen=True)
@@ -297,96 +270,15 @@ class Vehicle:
         return dataclasses.replace(self, **changes)
 
 
-class _Reader:
-    """Builds dataclasses from plain YAML data; remembers the file for its messages."""
-
-    def __init__(self, file: Path) -> None:
-        self.file = file
-
-    def fail(self, key: str, value: object, expected: str) -> VehicleFileError:
-        return VehicleFileError(f"{self.file}: key '{key}': got {_short(value)}, expected {expected}")
-
-    def build(self, cls: type[T], data: object, key: str) -> T:
-        if not isinstance(data, Mapping):
-            raise self.fail(key or "(top level)", data, "a mapping")
-        hints = typing.get_type_hints(cls)
-        fields = {item.name: item for item in dataclasses.fields(cls)}  # type: ignore[arg-type]
-        for name in data:
-            if name not in fields:
-                near = difflib.get_close_matches(str(name), fields, n=1, cutoff=0.5)
-                hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(sorted(fields))}"
-                raise self.fail(_join(key, name), data[name], f"no such key; {hint}")
-        values: dict[str, Any] = {}
-        for name, item in fields.items():
-            path = _join(key, name)
-            if name in data and data[name] is not None:
-                values[name] = self.convert(hints[name], data[name], path, item.metadata)
-            elif item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING:
-                raise self.fail(path, None, f"this key ({_type_name(hints[name])})")
-        return cls(**values)
-
-    def convert(self, hint: Any, value: Any, key: str, bounds: Mapping[str, Any]) -> Any:
-        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-        if origin in (typing.Union, types.UnionType):
-            return self.convert(next(a for a in arguments if a is not type(None)), value, key, bounds)
-        if dataclasses.is_dataclass(hint):
-            return self.build(typing.cast(type, hint), value, key)
-        if origin is tuple:
-            if isinstance(value, str) or not isinstance(value, Sequence):
-                raise self.fail(key, value, "a list")
-            return tuple(self.convert(arguments[0], item, f"{key}[{i}]", bounds) for i, item in enumerate(value))
-        if origin is dict:
-            if not isinstance(value, Mapping):
-                raise self.fail(key, value, "a mapping")
-            return {str(k): self.convert(arguments[1], v, _join(key, k), bounds) for k, v in value.items()}
-        if hint is float:
-            return self.number(value, key, bounds)
-        if hint is str:
-            if not isinstance(value, str) or not value:
-                raise self.fail(key, value, "a text")
-            return value
-        return value
-
-    def number(self, value: Any, key: str, bounds: Mapping[str, Any]) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.fail(key, value, "a plain number in the unit the key ends in")
-        number = float(value)
-        low, high, open_low = bounds.get("low", -math.inf), bounds.get("high", math.inf), bounds.get("open_low", False)
-        if not math.isfinite(number) or number < low or number > high or (open_low and number == low):
-            raise self.fail(key, value, f"a finite number {'above' if open_low else 'from'} {low:g} to {high:g}")
-        return number
-
-
-def _join(key: str, name: object) -> str:
-    return f"{key}.{name}" if key else str(name)
-
-
-def _short(value: object) -> str:
-    if value is None:
-        return "nothing"
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _type_name(hint: Any) -> str:
-    return {float: "a number", str: "a text"}.get(hint, "a list" if typing.get_origin(hint) is tuple else "a mapping")
-
-
 def load(path: str | Path) -> Vehicle:
     """Read and check a vehicle file; relative paths in it are relative to the file."""
     file = Path(path)
-    try:
-        data = yaml.load(file.read_text(encoding="utf-8"), Loader=_Loader)
-    except OSError as error:
-        raise VehicleFileError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise VehicleFileError(f"{file}: is not valid YAML: {' '.join(str(error).split())}") from error
-    return from_mapping(data, file)
+    return from_mapping(Reader(file, VehicleFileError).load(), file)
 
 
 def from_mapping(data: object, file: Path) -> Vehicle:
     """Build a vehicle from plain data as read from ``file`` (named in errors, base of relative paths)."""
-    reader = _Reader(file)
+    reader = Reader(file, VehicleFileError)
     if not isinstance(data, Mapping):
         raise reader.fail("(top level)", data, "a mapping with the keys of a vehicle file")
     if data.get("schema") != SCHEMA:
@@ -428,7 +320,7 @@ _TABLES = {
 }
 
 
-def _embed_tables(data: Mapping[str, Any], reader: _Reader) -> Mapping[str, Any]:
+def _embed_tables(data: Mapping[str, Any], reader: Reader) -> Mapping[str, Any]:
     """Replace ``rubber.dma_csv`` and ``rubber.master_curve_csv`` by the tables they point to."""
     rubber = data.get("rubber")
     if not isinstance(rubber, Mapping):
@@ -442,7 +334,7 @@ def _embed_tables(data: Mapping[str, Any], reader: _Reader) -> Mapping[str, Any]
     return {**data, "rubber": rubber}
 
 
-def _read_table(reader: _Reader, key: str, name: object, columns: tuple[str, ...]) -> dict[str, list[float]]:
+def _read_table(reader: Reader, key: str, name: object, columns: tuple[str, ...]) -> dict[str, list[float]]:
     if not isinstance(name, str):
         raise reader.fail(key, name, "the path of a CSV file")
     path = reader.file.parent / name
@@ -462,14 +354,14 @@ def _read_table(reader: _Reader, key: str, name: object, columns: tuple[str, ...
     return table
 
 
-def _cell(reader: _Reader, key: str, cells: list[str], index: int, place: str) -> float:
+def _cell(reader: Reader, key: str, cells: list[str], index: int, place: str) -> float:
     try:
         return float(cells[index])
     except (ValueError, IndexError) as error:
         raise reader.fail(key, ",".join(cells), f"a number in column {index + 1} of {place}") from error
 
 
-def _check(vehicle: Vehicle, reader: _Reader) -> None:
+def _check(vehicle: Vehicle, reader: Reader) -> None:
     """What single fields cannot say: sections that belong together, sums, orders, names that must exist."""
     fail = reader.fail
     if (
@@ -503,7 +395,7 @@ def _check(vehicle: Vehicle, reader: _Reader) -> None:
         _check_hydraulics(vehicle, vehicle.hydraulics, reader)
 
 
-def _check_track(vehicle: Vehicle, reader: _Reader) -> None:
+def _check_track(vehicle: Vehicle, reader: Reader) -> None:
     assert vehicle.track is not None
     assert vehicle.friction is not None
     rollers, fail = vehicle.track.rollers, reader.fail
@@ -530,7 +422,7 @@ def _check_track(vehicle: Vehicle, reader: _Reader) -> None:
         raise fail("friction.static", static, f"at least friction.coulomb ({coulomb:g})")
 
 
-def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: _Reader) -> None:
+def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: Reader) -> None:
     fail = reader.fail
     if (rubber.dma is None) == (rubber.master_curve is None):
         raise fail("rubber", None, "exactly one of dma_csv, dma, master_curve_csv, master_curve")
@@ -557,7 +449,7 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: _Reader) -> None:
             )
 
 
-def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: _Reader) -> None:
+def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: Reader) -> None:
     fail = reader.fail
     if not hydraulics.lines or len(set(hydraulics.lines)) != len(hydraulics.lines):
         raise fail("hydraulics.lines", list(hydraulics.lines), "a list of distinct line names")
@@ -588,7 +480,7 @@ def pavements() -> dict[str, dict[str, Any]]:
     return table
 
 
-def _with_pavement(vehicle: Vehicle, reader: _Reader) -> Vehicle:
+def _with_pavement(vehicle: Vehicle, reader: Reader) -> Vehicle:
     """Fill friction levels that the file leaves to the named pavement."""
     friction = vehicle.friction
     if friction is None or (friction.static is not None and friction.coulomb is not None):
