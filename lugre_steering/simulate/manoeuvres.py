@@ -313,9 +313,12 @@ def _csv_rows(file: Path) -> tuple[list[str], Array]:
     for i, (number, line) in enumerate(kept[1:]):
         cells = line.split(",")
         try:
-            rows[i] = [float(cell) for cell in cells]
+            values = [float(cell) for cell in cells]
         except ValueError:
-            raise DataError(f"{file}: line {number}: got '{line}', expected {len(header)} numbers") from None
+            values = []
+        if len(values) != len(header):
+            raise DataError(f"{file}: line {number}: got '{line}', expected {len(header)} numbers")
+        rows[i] = values
         if not np.isfinite(rows[i]).all():
             raise DataError(f"{file}: line {number}: got '{line}', expected finite numbers")
     return header, rows

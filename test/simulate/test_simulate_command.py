@@ -1,0 +1,104 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line of the simulation: results and exit codes; bad input ends with one line and exit code 2."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from lugre_steering import cli
+from lugre_steering.simulate import command, examples
+from lugre_steering.simulate.paper import EXPERIMENTS
+from lugre_steering.simulate.paper.outcome import Check, Outcome
+
+
+def invoke(*arguments: str) -> tuple[int, str, str]:
+    """Run the program; exit code, stdout, stderr. An exception that would be a traceback fails the test."""
+    result = CliRunner().invoke(cli.app, ["simulate", *arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_the_list_names_everything() -> None:
+    code, out, _ = invoke("--list")
+    assert code == 0
+    for name in ("double-cycle", "varied-rates", "paper-limit-stop", "FILE.csv", "BAG"):
+        assert name in out
+
+
+def test_a_manoeuvre_and_the_angles_of_its_own_bag(tmp_path: Path) -> None:
+    own = tmp_path / "mine.yaml"
+    own.write_text("segments: [{sweep: {to_deg: 10, rate_deg_s: 8, hold_s: 1}}]", encoding="utf-8")
+    code, out, err = invoke(str(own), "--out", str(tmp_path / "a"), "--seed", "3", "--rate", "50", "--json")
+    assert code == 0, err
+    first = json.loads(out)
+    assert first["synthetic"] is True
+    assert Path(first["picture"]).is_file()
+    effect = ("--effect", "slope_bias:torque=1000", "--storage", "sqlite3")
+    code, out, err = invoke(first["bag"], "--out", str(tmp_path / "b"), *effect, "--json")
+    assert code == 0, err
+    second = json.loads(out)
+    assert second["largest_angle_deg"] == pytest.approx(first["largest_angle_deg"], abs=0.2)
+    assert second["largest_torque_Nm"] == pytest.approx(first["largest_torque_Nm"] + 1000.0, rel=0.01)
+    code, _, err = invoke(str(own), "--out", str(tmp_path / "a"))
+    assert code == 2
+    assert "exists" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        ((), "--out"),
+        (("double-cycle",), "--out"),
+        (("dubble-cycle", "--out", "{tmp}"), "dubble-cycle"),
+        (("double-cycle", "--out", "{tmp}", "--vehicle", "{tmp}/none.yaml"), "none.yaml"),
+        (("double-cycle", "--out", "{tmp}/file"), "file"),
+        (("double-cycle", "--out", "{tmp}", "--storage", "zip"), "zip"),
+        (("double-cycle", "--out", "{tmp}", "--rate", "-1"), "angle_rate_Hz"),
+        (("double-cycle", "--out", "{tmp}", "--jitter", "nan"), "jitter_s"),
+        (("double-cycle", "--out", "{tmp}", "--effect", "gremlins:x=1"), "gremlins"),
+        (("{tmp}/bad.csv", "--out", "{tmp}"), "bad.csv"),
+        (("{tmp}/bad.yaml", "--out", "{tmp}"), "bad.yaml"),
+        (("{tmp}/empty", "--out", "{tmp}/x"), "empty"),
+        (("paper-rate", "--out", "{tmp}/file"), "file"),
+        (("paper-rate", "--out", "{tmp}", "--vehicle", "{tmp}/bad.yaml"), "bad.yaml"),
+    ],
+)
+def test_bad_input_ends_with_one_line(tmp_path: Path, arguments: tuple[str, ...], wanted: str) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file").write_text("not a folder", encoding="utf-8")
+    (tmp_path / "bad.csv").write_text("time_s,angle_deg\n0,a\n1,2\n", encoding="utf-8")
+    (tmp_path / "bad.yaml").write_text("segments: 3", encoding="utf-8")
+    code, _, err = invoke(*(a.format(tmp=tmp_path) for a in arguments))
+    assert code == 2
+    assert err.count("\n") == 1
+    assert wanted in err
+
+
+def test_an_experiment_that_fails_gives_exit_code_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code, out, _ = invoke("paper-pavements", "--out", str(tmp_path), "--json")
+    assert code == 0
+    assert json.loads(out)["passed"] is True
+    failed = Outcome("paper-pavements", "t", ("a",), ((1.0,),), (Check("c", "p", "o", False),), ())
+    monkeypatch.setitem(EXPERIMENTS, "paper-pavements", ("", lambda _: failed))
+    monkeypatch.setattr(command, "write_outcomes", lambda _what, outcomes, _out: {"passed": outcomes[0].passed})
+    assert invoke("paper-pavements", "--out", str(tmp_path))[0] == 1
+
+
+def test_the_examples_are_written_with_equal_bytes(tmp_path: Path) -> None:
+    example = examples.EXAMPLES[0]
+    for name in ("one", "two"):
+        examples.write_example(example, tmp_path / name)
+    for path in (tmp_path / "one" / example.name).iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / example.name / path.name).read_bytes()
+
+
+def test_the_shipped_examples_are_small_and_labelled() -> None:
+    folder = Path(__file__).resolve().parents[2] / "bags"
+    assert sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) < 6_000_000
+    for example in examples.EXAMPLES:
+        assert "synthetic" in (folder / example.name / "metadata.yaml").read_text(encoding="utf-8")

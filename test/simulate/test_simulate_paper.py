@@ -1,0 +1,105 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The published experiments pass on the shipped vehicle, and fail when the physics that they show is taken away."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.errors import DataError
+from lugre_steering.resources import config_folder
+from lugre_steering.simulate.command import write_outcomes
+from lugre_steering.simulate.paper import EXPERIMENTS, bench, conditions, double_cycle, stiffness
+from lugre_steering.vehicle import pavements
+
+VEHICLE = vehicle_file.load(config_folder() / "test_vehicle.yaml")
+
+
+@pytest.fixture(scope="module")
+def prepared() -> bench.Bench:
+    return bench.build(VEHICLE)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_each_experiment_passes(name: str, prepared: bench.Bench) -> None:
+    outcome = EXPERIMENTS[name][1](prepared)
+    assert outcome.name == name
+    assert outcome.passed, outcome.caption
+    assert all(len(row) == len(outcome.columns) for row in outcome.rows)
+
+
+def test_calibration_moves_only_friction_level_and_heat_capacity(prepared: bench.Bench) -> None:
+    level, capacity = (prepared.calibrated[f"{name} factor"] for name in ("friction level", "heat capacity"))
+    assert prepared.vehicle == bench.scaled(VEHICLE.replace(effects=()), level, capacity)
+    assert 0.8 < level < 1.2
+    assert 0.5 < capacity < 1.5
+
+
+def test_published_extremes_are_the_papers() -> None:
+    assert bench.PUBLISHED_EXTREMES_NM == (49980.0, 48740.0, 48580.0, 46510.0)
+
+
+def test_without_heating_nothing_declines(prepared: bench.Bench) -> None:
+    cold = bench.Bench(bench.scaled(prepared.vehicle, 1.0, 1e6), prepared.calibrated)
+    assert not double_cycle.double_cycle(cold).checks[0].passed
+    assert not conditions.six_cycles(cold).passed
+    assert not conditions.ambient(cold).checks[1].passed
+
+
+def test_friction_that_does_not_know_temperature_fails_the_ambient_sweep(prepared: bench.Bench) -> None:
+    with pytest.raises(DataError, match="rubber"):
+        bench.build(VEHICLE.replace(rubber=None))
+    assert not conditions.ambient(bench.Bench(bench.original(prepared.vehicle), prepared.calibrated)).passed
+
+
+def test_without_heat_and_stribeck_curve_the_rate_makes_no_difference(prepared: bench.Bench) -> None:
+    assert prepared.vehicle.friction is not None
+    flat = dataclasses.replace(prepared.vehicle.friction, static=prepared.vehicle.friction.coulomb)
+    vehicle = bench.original(prepared.vehicle.replace(friction=flat))
+    assert not conditions.rate(bench.Bench(vehicle, prepared.calibrated)).passed
+
+
+def test_a_wrong_pavement_table_fails_the_ranking(prepared: bench.Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = {name: dict(row) for name, row in pavements().items()}
+    table["gravel"], table["dry_earth"] = table["dry_earth"], table["gravel"]
+    monkeypatch.setattr(conditions, "pavements", lambda: table)
+    assert not conditions.pavement(prepared).checks[0].passed
+
+
+def test_no_stop_no_rise(prepared: bench.Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    parameters = {**double_cycle.END_STOP.parameters, "stiffness": 0.0, "cubic_stiffness": 0.0}
+    monkeypatch.setattr(double_cycle, "END_STOP", dataclasses.replace(double_cycle.END_STOP, parameters=parameters))
+    assert not double_cycle.limit_stop(prepared).passed
+
+
+def test_presliding_angle_solves_the_bristle_equation() -> None:
+    sigma, static = 3.1e5, 2.8e4
+    angle = float(stiffness.presliding_angle(np.array([0.6 * static]), sigma, static)[0])
+    solved = solve_ivp(lambda _, z: 1.0 - sigma * z / static, (0.0, angle), [0.0], rtol=1e-10, atol=1e-14)
+    assert sigma * solved.y[0, -1] == pytest.approx(0.6 * static, rel=1e-8)
+
+
+def test_a_softer_contact_fails_the_stiffness(prepared: bench.Bench) -> None:
+    assert prepared.vehicle.friction is not None
+    soft = dataclasses.replace(prepared.vehicle.friction, stiffness_Nm_per_deg=5200.0)
+    assert not stiffness.stiffness(bench.Bench(prepared.vehicle.replace(friction=soft), prepared.calibrated)).passed
+
+
+def test_results_are_written(prepared: bench.Bench, tmp_path: Path) -> None:
+    outcome = stiffness.stiffness(prepared)
+    write_outcomes("paper-stiffness", [outcome], tmp_path)
+    result = json.loads((tmp_path / "paper-stiffness.json").read_text(encoding="utf-8"))
+    assert result["synthetic"] is True
+    assert result["passed"] is True
+    assert result["calibrated"]["heat capacity factor"] == prepared.calibrated["heat capacity factor"]
+    # F / theta of the exact LuGre presliding curve at 60 % of break-away: 0.6 / -ln(0.4) = 0.655 of the stiffness.
+    assert "34 % below" in result["caption"]
+    assert (tmp_path / "paper-stiffness.csv").read_text(encoding="utf-8").count("\n") == len(outcome.rows) + 1
+    assert (tmp_path / "paper-stiffness.png").read_bytes().startswith(b"\x89PNG")
