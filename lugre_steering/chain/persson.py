@@ -3,7 +3,7 @@
 """Friction of rubber sliding on a self-affine rough road: the full contact integral, for offline use.
 
 Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, with the contact-area correction S(q) of B. N. J. Persson,
-J. Phys.: Condens. Matter 18 (2006) 7789. The compiled chain uses the ratio form E''/|E| instead, which is the limit of one
+J. Phys.: Condens. Matter 18 (2006) 7789. The compiled chain uses the ratio form E''/|E| instead, the limit of one
 dominant wavevector and light contact; ``ratio_validity`` shows over which temperatures that holds.
 """
 
@@ -95,13 +95,13 @@ def rubber_modulus(rubber: Rubber, temperature_degC: float) -> Modulus:
 
 @dataclass(frozen=True)
 class RatioValidity:
-    """Both friction laws over temperature [degC] (n,), each relative to the reference temperature, and their agreement."""
+    """Both friction laws over temperature [degC] (n,), relative to the reference temperature."""
 
     temperature_degC: Array
     integral: Array
     ratio: Array
 
-    def range_degC(self, tolerance: float) -> tuple[float, float] | None:
+    def agreement(self, tolerance: float) -> tuple[float, float] | None:
         """Widest stretch around unity in which the ratio form is within ``tolerance`` (relative) of the integral."""
         good = np.abs(self.ratio / self.integral - 1.0) <= tolerance
         start = int(np.argmin(np.abs(self.integral - 1.0)))

@@ -28,14 +28,14 @@ def nested_quadrature(speed: float, pressure: float) -> float:
     H, q0, q1, h = ROAD.hurst, ROAD.roll_off_1_m, ROAD.cut_off_1_m, ROAD.rms_height_m
     C0 = h**2 / (2 * math.pi * quad(lambda q: q * (q / q0) ** (-2 * (1 + H)), q0, q1, limit=200)[0])
 
-    def C(q: float) -> float:
+    def spectrum(q: float) -> float:
         return C0 * (q / q0) ** (-2 * (1 + H))
 
-    def E(q: float, phi: float) -> complex:
+    def modulus(q: float, phi: float) -> complex:
         return complex(standard_solid(q * speed * math.cos(phi) / (2 * math.pi))) / (0.75 * pressure)
 
     def inner(q: float) -> float:
-        return q**3 * C(q) * quad(lambda phi: abs(E(q, phi)) ** 2, 0, 2 * math.pi)[0]
+        return q**3 * spectrum(q) * quad(lambda phi: abs(modulus(q, phi)) ** 2, 0, 2 * math.pi)[0]
 
     def outer(u: float) -> float:
         q = q0 * (q1 / q0) ** (u * u)
@@ -43,10 +43,10 @@ def nested_quadrature(speed: float, pressure: float) -> float:
         G = quad(lambda x: inner(math.exp(x)) * math.exp(x), math.log(q0), math.log(q), epsrel=1e-6)[0] / 8
         P = erf(1 / (2 * math.sqrt(G))) if G > 0 else 1.0
         S = 0.5 + 0.5 * P**2
-        drag = quad(lambda phi: math.cos(phi) * E(q, phi).imag, 0, 2 * math.pi, points=[math.pi / 2, 3 * math.pi / 2])[
-            0
-        ]
-        return 0.5 * q**3 * C(q) * S * P * drag * jacobian
+        drag = quad(
+            lambda phi: math.cos(phi) * modulus(q, phi).imag, 0, 2 * math.pi, points=[math.pi / 2, 3 * math.pi / 2]
+        )[0]
+        return 0.5 * q**3 * spectrum(q) * S * P * drag * jacobian
 
     return float(quad(outer, 0, 1, epsrel=1e-4, limit=60)[0])
 
@@ -85,7 +85,7 @@ def test_ratio_form_holds_within_ten_percent_from_zero_to_sixty_degrees() -> Non
     rubber = vehicle().rubber
     assert rubber is not None
     validity = ratio_validity(rubber, 15.0, np.arange(-40.0, 81.0, 20.0))
-    found = validity.range_degC(0.1)
+    found = validity.agreement(0.1)
     assert found is not None
     assert found[0] <= 0.0
     assert found[1] >= 60.0
