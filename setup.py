@@ -43,6 +43,7 @@ setup(
     ],
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        "import": ["pyarrow>=14.0"],
         "report": ["matplotlib>=3.6", "plotly>=5.18"],
         "test": ["pytest>=7.4", "hypothesis>=6.80", "jsonschema>=4.17", "mcap>=1.1", "ruff>=0.6", "mypy>=1.10", "types-PyYAML"],
     },

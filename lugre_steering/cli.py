@@ -58,22 +58,25 @@ def print_json(result: Any) -> None:
     print(json.dumps(result, indent=2, allow_nan=False))
 
 
-def command(function: F) -> F:
+def command(name: str | None = None) -> Callable[[F], F]:
     """Register a command whose expected errors end as one line on stderr and exit code 2."""
 
-    @app.command()
-    @functools.wraps(function)
-    def run(*arguments: Any, **options: Any) -> Any:
-        try:
-            return function(*arguments, **options)
-        except LugreSteeringError as error:
-            print(f"lugre-steering: {error}", file=sys.stderr)
-            raise typer.Exit(2) from None
+    def register(function: F) -> F:
+        @app.command(name)
+        @functools.wraps(function)
+        def run(*arguments: Any, **options: Any) -> Any:
+            try:
+                return function(*arguments, **options)
+            except LugreSteeringError as error:
+                print(f"lugre-steering: {error}", file=sys.stderr)
+                raise typer.Exit(2) from None
 
-    return function
+        return function
+
+    return register
 
 
-@command
+@command()
 def replay(
     bags: Bags,
     vehicle: VehicleFile,
@@ -96,7 +99,7 @@ def replay(
         print("\n".join([*describe(result), f"results in {out}"]))
 
 
-@command
+@command()
 def simulate(
     what: Annotated[
         str, typer.Argument(help="manoeuvre, published experiment, YAML or CSV file, or bag; see --list")
@@ -149,6 +152,22 @@ def simulate(
     }
     result = simulation.run_manoeuvre(what, chosen, out, sensing, storage)
     print_json(result) if as_json else simulation.show_run(Console(), result)
+
+
+@command("import")
+def import_(
+    table: Annotated[Path, typer.Argument(help="CSV, Parquet (.parquet) or MATLAB (.mat) file")],
+    map_file: Annotated[Path, typer.Option("--map", help="which column is which channel, and its unit (YAML)")],
+    out: Annotated[Path, typer.Option("--out", help="bag folder to write")],
+    storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
+    as_json: Json = False,
+) -> None:
+    """Turn a table into a bag with the standard topics; counts rates, gaps and outliers, repairs nothing."""
+    from lugre_steering.importing.write import import_table
+    from lugre_steering.report.imported import show_import
+
+    result = import_table(table, map_file, out, storage)
+    print_json(result) if as_json else show_import(Console(), result)
 
 
 def main() -> None:

@@ -1,0 +1,9 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Logs that are no rosbag2 recordings (CSV, Parquet, MATLAB), turned into bags with the standard topics."""
+
+from lugre_steering.importing.map import ImportMap, load_map
+from lugre_steering.importing.table import Table, read_table
+from lugre_steering.importing.write import import_table
+
+__all__ = ["ImportMap", "Table", "import_table", "load_map", "read_table"]

@@ -1,0 +1,40 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an import found, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show_import(console: Console, result: Mapping[str, Any]) -> None:
+    """One row per channel: samples, rate, range, and what is worth a look."""
+    table = Table(title=f"{result['table']} -> {result['bag']}", title_justify="left")
+    for heading in ("channel", "samples", "rate", "time", "range", "worth a look"):
+        table.add_column(heading, overflow="fold")
+    for channel in result["channels"]:
+        rate = "-" if channel["rate_Hz"] is None else f"{channel['rate_Hz']:.4g} Hz"
+        time = f"{channel['from_s']:.4g} ... {channel['to_s']:.4g} s"
+        value = f"{channel['lowest']:.4g} ... {channel['highest']:.4g} {channel['unit']}"
+        notes = "; ".join(_notes(channel)) or "-"
+        table.add_row(channel["channel"], str(channel["samples"]), rate, time, value, notes)
+    console.print(table)
+
+
+def _notes(channel: Mapping[str, Any]) -> list[str]:
+    counts = (
+        ("missing", channel["missing"]),
+        ("outside start and stop", channel["outside_start_stop"]),
+        ("not increasing in time", channel["not_increasing"]),
+    )
+    notes = [f"{count} {what}" for what, count in counts if count]
+    if gaps := channel["gaps_s"]:
+        begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
+        notes.append(f"{len(gaps)} gaps, longest {end - begin:.3g} s at {begin:.4g} s")
+    if spikes := channel["outliers_s"]:
+        notes.append(f"{len(spikes)} outliers, first at {spikes[0]:.4g} s")
+    return notes
