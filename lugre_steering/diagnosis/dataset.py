@@ -119,8 +119,11 @@ def _at(time: Array, signal: Signal) -> Array:
     value = signal.value
     width = round(step / spacing)
     if width > 1:
-        kernel = np.ones(width) / width
-        value = np.convolve(np.pad(value, (width // 2, width - 1 - width // 2), mode="edge"), kernel, mode="valid")
+        # Symmetric for even widths too (half weight at both ends): half a sample of delay would look like physics.
+        kernel = np.ones(width + 1 - width % 2) / width
+        if width % 2 == 0:
+            kernel[[0, -1]] *= 0.5
+        value = np.convolve(np.pad(value, kernel.size // 2, mode="edge"), kernel, mode="valid")
     return np.interp(time, signal.time_s, value)
 
 
