@@ -57,7 +57,7 @@ class Reader:
             return yaml.load(self.file.read_text(encoding="utf-8"), Loader=Loader)
         except OSError as error:
             raise self.error(f"{self.file}: cannot be read: {error.strerror or error}") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
+        except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: 2020-13-45, or not UTF-8
             raise self.error(f"{self.file}: is not valid YAML: {' '.join(str(error).split())}") from error
 
     def fail(self, key: str, value: object, expected: str) -> LugreSteeringError:
@@ -107,7 +107,7 @@ class Reader:
     def number(self, value: Any, key: str, bounds: Mapping[str, Any]) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise self.fail(key, value, "a plain number in the unit the key ends in")
-        number = float(value)
+        number = math.inf if isinstance(value, int) and abs(value) >= 2**1023 else float(value)
         low, high, open_low = bounds.get("low", -math.inf), bounds.get("high", math.inf), bounds.get("open_low", False)
         if not math.isfinite(number) or number < low or number > high or (open_low and number == low):
             raise self.fail(key, value, f"a finite number {'above' if open_low else 'from'} {low:g} to {high:g}")

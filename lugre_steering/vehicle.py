@@ -340,7 +340,7 @@ def _read_table(reader: Reader, key: str, name: object, columns: tuple[str, ...]
     path = reader.file.parent / name
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
         raise reader.fail(key, name, f"a readable CSV file ({path}: {error})") from error
     rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
     header = [cell.strip() for cell in rows[0][1].split(",")] if rows else []

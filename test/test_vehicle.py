@@ -1,0 +1,255 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Vehicle files: round trip, and every mistake refused with file, key, value and expectation."""
+
+from __future__ import annotations
+
+import copy
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lugre_steering.errors import VehicleFileError
+from lugre_steering.vehicle import Vehicle, from_mapping, load, pavements, save
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+FILE = CONFIG / "test_vehicle.yaml"
+SHEET: dict[str, Any] = yaml.safe_load(FILE.read_text())
+SHEET["sensors"] |= {"pressure_range_Pa": 25e6, "pressure_noise_Pa": 1.5e4}  # YAML 1.1 takes both for texts
+JOINT: dict[str, Any] = {
+    "schema": "lugre_steering/vehicle/1",
+    "name": "one joint",
+    "sides": ["left"],
+    "contact": {
+        "static_torque_Nm": 12.0,
+        "coulomb_torque_Nm": 10.0,
+        "stiffness_Nm_per_deg": 50.0,
+        "stribeck_speed_deg_s": 2.0,
+    },
+    "torque_sensor": {"topic": "joint/torque"},
+}
+REMOVE = object()
+
+
+def changed(sheet: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A copy with one dotted key set or removed."""
+    result = copy.deepcopy(sheet)
+    *parents, last = path.split(".")
+    node = result
+    for name in parents:
+        node = node.setdefault(name, {})
+    if value is REMOVE:
+        del node[last]
+    else:
+        node[last] = value
+    return result
+
+
+def test_reference_vehicle_loads_with_its_table() -> None:
+    vehicle = load(FILE)
+    assert vehicle.rubber is not None
+    assert vehicle.rubber.dma is not None
+    assert len(vehicle.rubber.dma.temperature_degC) > 50
+    assert [c.name for c in vehicle.channels] == ["left", "right", "main_a", "main_b", "aux_a", "aux_b", "air"]
+
+
+@pytest.mark.parametrize("sheet", [SHEET, JOINT], ids=["vehicle", "joint"])
+def test_round_trip_stands_alone(sheet: dict[str, Any], tmp_path: Path) -> None:
+    vehicle = from_mapping(sheet, FILE)
+    save(vehicle, tmp_path / "copy.yaml")
+    assert load(tmp_path / "copy.yaml") == vehicle
+    assert "dma_csv" not in (tmp_path / "copy.yaml").read_text()
+
+
+def test_effects_and_provenance_survive(tmp_path: Path) -> None:
+    sheet = changed(SHEET, "effects", [{"id": "end_stop", "parameters": {"stiffness": 5e4}}])
+    sheet["provenance"] = {"bag": "a", "when": 3}
+    vehicle = from_mapping(sheet, FILE)
+    save(vehicle, tmp_path / "copy.yaml")
+    assert load(tmp_path / "copy.yaml") == vehicle
+    assert vehicle.effects[0].parameters == {"stiffness": 5e4}
+
+
+def test_exponent_without_point_is_a_number(tmp_path: Path) -> None:
+    text = FILE.read_text().replace("load_N: 90000.0", "load_N: 9e4").replace("rubber_dma", str(CONFIG / "rubber_dma"))
+    (tmp_path / "v.yaml").write_text(text)
+    axle = load(tmp_path / "v.yaml").axle
+    assert axle is not None
+    assert axle.load_N == 90_000.0
+
+
+def test_pavement_by_name_fills_friction() -> None:
+    sheet = changed(changed(SHEET, "friction.static", REMOVE), "friction.coulomb", REMOVE)
+    for name, row in pavements().items():
+        friction = from_mapping(changed(sheet, "friction.pavement", name), FILE).friction
+        assert friction is not None
+        assert (friction.static, friction.coulomb) == (row["static"], row["coulomb"])
+
+
+def test_shipped_pavements_keep_the_published_ranking() -> None:
+    level = {name: row["coulomb"] for name, row in pavements().items()}
+    ranking = ["dry_asphalt", "wet_asphalt", "wet_concrete", "dry_earth", "gravel"]
+    assert level["dry_concrete"] == level["dry_asphalt"]
+    assert [level[name] for name in ranking] == sorted((level[name] for name in ranking), reverse=True)
+    assert all(row["source"] == "assumed" for name, row in pavements().items() if name.startswith("wet"))
+
+
+MISTAKES = [
+    ("schema", "lugre_steering/vehicle/2", "'lugre_steering/vehicle/1'"),
+    ("schema", REMOVE, "'lugre_steering/vehicle/1'"),
+    ("name", REMOVE, "a text"),
+    ("name", 7, "a text"),
+    ("axel", {}, "did you mean 'axle'"),
+    ("axle", REMOVE, "this section"),
+    ("axle", 3.0, "a mapping"),
+    ("axle.load_N", -1.0, "above 0"),
+    ("axle.load_N", "90 kN", "a plain number"),
+    ("axle.load_N", True, "a plain number"),
+    ("axle.load_N", math.nan, "finite"),
+    ("axle.load_N", math.inf, "finite"),
+    ("axle.load_N", 10**400, "finite"),
+    ("axle.load_N", None, "this key"),
+    ("axle.wheel_base_m", 3.0, "did you mean 'wheelbase_m'"),
+    ("axle.kingpin_inclination_deg", 60.0, "from 0 to 45"),
+    ("track.rollers.x_m", [], "at least one roller"),
+    ("track.rollers.x_m", 0.3, "a list"),
+    ("track.rollers.load_share", [0.5, 0.5], "4 shares"),
+    ("track.rollers.load_share", [0.3, 0.3, 0.3, 0.3], "sum to 1"),
+    ("track.rollers.load_share", REMOVE, "exactly one of load_share and levers"),
+    ("track.ground_pressure_exponent", 5.0, "from 2 to 4"),
+    ("friction.static", 0.5, "at least friction.coulomb"),
+    ("friction.temperature_law", "magic", "loss_tangent"),
+    ("friction.reference_temperature_degC", 140.0, "inside the rubber table"),
+    ("rubber.dma_csv", "missing.csv", "a readable CSV file"),
+    ("rubber.dma_csv", "a\0b", "a readable CSV file"),
+    ("rubber.dma_csv", REMOVE, "exactly one of dma_csv"),
+    ("rubber.dma", {"temperature_degC": [1.0]}, "not both"),
+    ("rubber.density_kg_m3", 0.0, "above 0"),
+    ("initial", REMOVE, "this section"),
+    ("hydraulics", REMOVE, "exactly one of 'hydraulics' and 'torque_sensor'"),
+    ("torque_sensor", {}, "exactly one of 'hydraulics' and 'torque_sensor'"),
+    ("hydraulics.lines", ["main_a", "main_a"], "distinct"),
+    ("hydraulics.cylinders", {}, "at least one cylinder"),
+    ("hydraulics.cylinders.left_main.side", "middle", "left, right"),
+    ("hydraulics.cylinders.left_main.cap", "main_c", "main_a"),
+    ("hydraulics.cylinders.left_main.rod_m", 0.2, "less than bore_m"),
+    ("hydraulics.cylinders.left_main.knuckle_m", [0.0, 0.0], "away from the hinge"),
+    ("hydraulics.cylinders.left_main.chassis_m", [1.0], "two coordinates"),
+    ("sensors.pressure_reference", "vacuum", "gauge or absolute"),
+    ("sides", ["left", "left"], "left, right"),
+    ("sides", "left", "a list"),
+    ("contact", JOINT["contact"], "beside 'contact'"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "expectation"), MISTAKES)
+def test_mistakes_are_refused_with_file_key_value_and_expectation(key: str, value: Any, expectation: str) -> None:
+    with pytest.raises(VehicleFileError) as caught:
+        from_mapping(changed(SHEET, key, value), FILE)
+    message = str(caught.value)
+    assert message.startswith(f"{FILE}: key '")
+    assert "got " in message
+    assert expectation in message.split("expected", 1)[1]
+    named = message.split("key '", 1)[1].split("'", 1)[0]
+    # The key named is the wrong one, an inner part of it, the section it belongs to, or its counterpart.
+    assert named.split(".")[0].split("[")[0] in {key.split(".")[0], "axle", "hydraulics", "(top level)"}
+    shown = "nothing" if value in (REMOVE, None) else repr(value)[:30]
+    if named == key and not isinstance(value, (list, dict)):
+        assert shown in message
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(VehicleFileError, match="cannot be read"):
+        load(tmp_path / "none.yaml")
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("a: [1, 2")
+    with pytest.raises(VehicleFileError, match="not valid YAML"):
+        load(bad)
+    bad.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(VehicleFileError, match="not valid YAML"):
+        load(bad)
+    for text in ("a: 2020-13-45", "a: " + "1" * 5000, "[" * 5000):
+        bad.write_text(text)
+        with pytest.raises(VehicleFileError, match="not valid YAML"):
+            load(bad)
+    bad.write_text("")
+    with pytest.raises(VehicleFileError, match="a mapping"):
+        load(bad)
+
+
+def test_broken_tables(tmp_path: Path) -> None:
+    sheet = changed(SHEET, "rubber.dma_csv", "table.csv")
+    file, table = tmp_path / "v.yaml", tmp_path / "table.csv"
+    head = "temperature_degC,storage_modulus_Pa,loss_modulus_Pa\n"
+    for text, expectation in (
+        ("", "columns"),
+        ("a,b\n1,2\n", "columns"),
+        (head + "-90,1e6,1e5\n0,x,1e5\n90,1e6,1e5\n", "line 3"),
+        (head + "-90,1e6\n", "line 2"),
+        (head + "-90,1e6,1e5\n90,1e6,1e5\n", "at least 3 rows"),
+        (head + "-90,1e6,1e5\n95,1e6,1e5\n90,1e6,1e5\n", "strictly increasing"),
+        (head + "-90,1e6,1e5\n0,-1,1e5\n90,1e6,1e5\n", "above 0"),
+    ):
+        table.write_text(text)
+        with pytest.raises(VehicleFileError, match=expectation):
+            from_mapping(sheet, file)
+
+
+scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.just([]) | st.just({})
+values = st.recursive(
+    scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4) | st.integers(), inner, max_size=3),
+    max_leaves=5,
+)  # fmt: skip
+
+
+def paths(node: Any, prefix: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    found = [prefix] if prefix else []
+    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, inner in items:
+        found += paths(inner, (*prefix, key))
+    return found
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.data(), st.sampled_from([SHEET, JOINT]))
+def test_any_mutation_gives_a_vehicle_or_a_clear_error(data: st.DataObject, original: dict[str, Any]) -> None:
+    sheet = copy.deepcopy(original)
+    for _ in range(data.draw(st.integers(1, 3))):
+        path = data.draw(st.sampled_from(paths(sheet)))
+        node = sheet
+        for key in path[:-1]:
+            node = node[key]
+        action = data.draw(st.sampled_from(["set", "delete", "add"]))
+        if action == "set":
+            node[path[-1]] = data.draw(values)
+        elif action == "delete":
+            del node[path[-1]]
+        elif isinstance(node, dict):
+            node[data.draw(st.text(max_size=6) | st.integers())] = data.draw(values)
+        if not paths(sheet):
+            break
+    try:
+        vehicle = from_mapping(sheet, FILE)
+    except VehicleFileError as error:
+        assert str(FILE) in str(error)
+    else:
+        assert isinstance(vehicle, Vehicle)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.binary(max_size=80), st.integers(0, 3000))
+def test_any_bytes_give_a_vehicle_or_a_clear_error(noise: bytes, position: int) -> None:
+    text = FILE.read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "v.yaml"
+        file.write_bytes(text[:position] + noise + text[position + len(noise) :])
+        try:
+            load(file)
+        except VehicleFileError as error:
+            assert str(file) in str(error)
