@@ -134,12 +134,6 @@ def simulate(
         raise DataError(
             "simulate: needs a name or file and --out DIR; 'lugre-steering simulate --list' shows what there is"
         )
-    chosen = simulation.load_vehicle(vehicle, effect or [])
-    if simulation.is_experiment(what):
-        outcomes = simulation.run_experiments(what, chosen)
-        result = simulation.write_outcomes(what, outcomes, out)
-        print_json(result) if as_json else simulation.show_outcomes(Console(), outcomes, out)
-        raise typer.Exit(0 if result["passed"] else 1)
     sensing = {
         "angle_rate_Hz": rate,
         "pressure_rate_Hz": pressure_rate if pressure_rate is not None else rate,
@@ -150,6 +144,14 @@ def simulate(
         "pressure_resolution_Pa": pressure_resolution,
         "seed": seed,
     }
+    chosen = simulation.load_vehicle(vehicle, effect or [])
+    if simulation.is_experiment(what):
+        if any(value is not None for value in sensing.values()):
+            raise DataError(f"simulate {what}: has its own sampling and noise; expected no such option")
+        outcomes = simulation.run_experiments(what, chosen)
+        result = simulation.write_outcomes(what, outcomes, out)
+        print_json(result) if as_json else simulation.show_outcomes(Console(), outcomes, out)
+        raise typer.Exit(0 if result["passed"] else 1)
     result = simulation.run_manoeuvre(what, chosen, out, sensing, storage)
     print_json(result) if as_json else simulation.show_run(Console(), result)
 

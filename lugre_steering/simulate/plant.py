@@ -8,20 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.model import build_model
 from lugre_steering.chain.step import Records, run_side
+from lugre_steering.effects import catalogue
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.vehicle import EffectEntry, Vehicle
-
-_SENSOR_EFFECTS = {
-    "time_delay": ("delay",),
-    "pressure_lag": ("tau",),
-    "moment_arm_error": ("linear", "quadratic"),
-}
-_LINE_EFFECTS = ("pressure_offset", "pressure_drift")
 
 
 @dataclass(frozen=True)
@@ -46,7 +39,10 @@ def run(vehicle: Vehicle, motion: Motion) -> Truth:
     """Torques and temperatures of all tracks for true angles, with the effects of the vehicle file."""
     model = build_model(vehicle)
     rows = zip(model.parameters, motion.theta, motion.rate, motion.acceleration, strict=True)
-    return Truth(motion, np.stack([run_side(p, model.rubber, motion.time, *row) for p, *row in rows]))
+    truth = Truth(motion, np.stack([run_side(p, model.rubber, motion.time, *row) for p, *row in rows]))
+    if not np.isfinite(truth.torque).all():
+        raise DataError(f"vehicle '{vehicle.name}': the simulated torque is not finite; check its effects' parameters")
+    return truth
 
 
 def with_effects(vehicle: Vehicle, texts: list[str]) -> Vehicle:
@@ -56,29 +52,26 @@ def with_effects(vehicle: Vehicle, texts: list[str]) -> Vehicle:
 
 def _effect(vehicle: Vehicle, text: str) -> EffectEntry:
     name, _, rest = text.partition(":")
-    known = _parameters_of(name, vehicle)
-    if not known:
-        raise DataError(
-            f"effect '{text}': no effect '{name}' that a simulation can carry; expected id:parameter=value,..."
-        )
+    entry = catalogue.effect(name)
+    if entry.needs:
+        raise DataError(f"effect '{text}': cannot be simulated; it needs {entry.needs}")
+    ranges = {p.name: (p.low, p.high) for p in entry.parameters}
+    if entry.per_line:
+        ranges = dict.fromkeys(vehicle.hydraulics.lines if vehicle.hydraulics else (), next(iter(ranges.values())))
     values: dict[str, float] = {}
     for item in filter(None, rest.split(",")):
         key, _, number = item.partition("=")
-        if key not in known:
-            raise DataError(f"effect '{text}': no parameter '{key}'; {name} has {', '.join(known)}")
+        if key not in ranges:
+            raise DataError(f"effect '{text}': no parameter '{key}'; {name} has {', '.join(ranges)}")
+        low, high = ranges[key]
         try:
             values[key] = float(number)
         except ValueError:
             values[key] = np.nan
-        if not np.isfinite(values[key]):
-            raise DataError(f"effect '{text}': parameter '{key}': got '{number}', expected a number")
-    if not values:
-        raise DataError(f"effect '{text}': names no parameter; {name} has {', '.join(known)}")
+        if not low <= values[key] <= high:
+            raise DataError(f"effect '{text}': '{key}': got '{number}', expected a number from {low:g} to {high:g}")
+    # What may not be zero has no neutral value, so it cannot be left out.
+    missing = [key for key, (low, high) in ranges.items() if key not in values and not low <= 0.0 <= high]
+    if missing or not values:
+        raise DataError(f"effect '{text}': lacks {', '.join(missing or ranges)}")
     return EffectEntry(name, values)
-
-
-def _parameters_of(effect: str, vehicle: Vehicle) -> tuple[str, ...]:
-    if effect in _LINE_EFFECTS:
-        return vehicle.hydraulics.lines if vehicle.hydraulics else ()
-    chain = tuple(field.removeprefix(f"{effect}_") for field in EFFECT_FIELDS if field.startswith(f"{effect}_"))
-    return chain or _SENSOR_EFFECTS.get(effect, ())

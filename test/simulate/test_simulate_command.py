@@ -65,6 +65,8 @@ def test_a_manoeuvre_and_the_angles_of_its_own_bag(tmp_path: Path) -> None:
         (("{tmp}/bad.yaml", "--out", "{tmp}"), "bad.yaml"),
         (("{tmp}/empty", "--out", "{tmp}/x"), "empty"),
         (("paper-rate", "--out", "{tmp}/file"), "file"),
+        (("paper-rate", "--out", "{tmp}", "--seed", "3"), "paper-rate"),
+        (("paper-rate", "--out", "{tmp}", "--effect", "slope_bias:torque=100"), "slope_bias"),
         (("paper-rate", "--out", "{tmp}", "--vehicle", "{tmp}/bad.yaml"), "bad.yaml"),
     ],
 )

@@ -37,7 +37,7 @@ def test_each_experiment_passes(name: str, prepared: bench.Bench) -> None:
 
 def test_calibration_moves_only_friction_level_and_heat_capacity(prepared: bench.Bench) -> None:
     level, capacity = (prepared.calibrated[f"{name} factor"] for name in ("friction level", "heat capacity"))
-    assert prepared.vehicle == bench.scaled(VEHICLE.replace(effects=()), level, capacity)
+    assert prepared.vehicle == bench.scaled(VEHICLE, level, capacity)
     assert 0.8 < level < 1.2
     assert 0.5 < capacity < 1.5
 

@@ -19,7 +19,7 @@ from scipy.integrate import trapezoid
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
-from lugre_steering.errors import BagError, DataError
+from lugre_steering.errors import BagError, DataError, LugreSteeringError
 from lugre_steering.recording import Kind
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import manoeuvres, plant
@@ -151,12 +151,15 @@ def test_an_effect_of_the_vehicle_acts_on_the_torque() -> None:
         "end_stop:stif=1",
         "end_stop:stiffness=much",
         "end_stop:stiffness=nan",
+        "end_stop:stiffness=-5",
+        "wear_polishing:amount=0.1",
+        "load_transfer:x=1",
         "pressure_offset:no_line=1",
         ":",
     ],
 )
 def test_bad_effects_are_refused(text: str) -> None:
-    with pytest.raises(DataError, match="effect"):
+    with pytest.raises(LugreSteeringError, match="effect"):
         plant.with_effects(VEHICLE, [text])
 
 
