@@ -87,7 +87,7 @@ def describe(summary: Mapping[str, Any]) -> Iterator[str]:
         if fit is None:
             yield f"  {bag['fit_note']}"
         else:
-            r2 = "" if fit["r2"] is None else f", R2 {fit['r2']:.4f}"
+            r2 = "" if fit["r2"] is None else f", R2 {fit['r2']:.5f}"
             yield f"  against cylinder torque: RMSE {fit['rmse_Nm']:.1f} N m{r2}, bias {fit['bias_Nm']:+.1f} N m"
         for label, counts in bag["samples"].items():
             if counts["rejected"]:

@@ -84,7 +84,7 @@ def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
     if fit is None:
         return text + "No residual: the torque was not measured."
     unit = vehicle.coordinate.force_unit
-    r2 = "" if fit["r2"] is None else f", R² {fit['r2']:.4f}"
+    r2 = "" if fit["r2"] is None else f", R² {fit['r2']:.5f}"
     return text + (
         f"Residual over {fit['samples']} samples: RMSE {fit['rmse_Nm']:.1f} {unit}{r2}, bias {fit['bias_Nm']:+.1f} "
         f"{unit}."

@@ -1,0 +1,419 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Replay: the same numbers as one message at a time, nothing lost, every mishap said. All data are synthetic."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import bag_making as make
+import numpy as np
+import pytest
+from bag_making import Message
+from rosbags.highlevel import AnyReader
+
+import lugre_steering
+from lugre_steering.bench.replay import write_cycle
+from lugre_steering.errors import BagError
+from lugre_steering.estimator import Estimator, Options
+from lugre_steering.live.plan import planned_angles
+from lugre_steering.recording import Kind
+from lugre_steering.replay import replay
+from lugre_steering.vehicle import Vehicle, load
+
+ROOT = Path(__file__).resolve().parents[1]
+VEHICLE = ROOT / "config" / "test_vehicle.yaml"
+DOUBLE_CYCLE = ROOT / "bags" / "synthetic_double_cycle"
+NODE = "/steering_torque_estimator"
+SECOND = 10**9
+STEP = SECOND // 50
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+JOINTS = ("left_track_steer_joint", "right_track_steer_joint")
+
+CONTACT = """
+schema: lugre_steering/vehicle/1
+name: synthetic single joint
+sides: [left]
+contact: {static_torque_Nm: 60.0, coulomb_torque_Nm: 50.0, stiffness_Nm_per_deg: 40.0, stribeck_speed_deg_s: 2.0}
+torque_sensor: {topic: steering/measured_torque}
+"""
+
+
+def joint(side: str, stamp: int, angle: float, log: int) -> Message:
+    data = make.joint_state(stamp, [f"{side}_track_steer_joint"], [angle])
+    return f"/steering/{side}/joint_state", make.JOINT_STATE, log, data
+
+
+def pressure(line: str, stamp: int, value: float, log: int) -> Message:
+    return f"/steering/pressure/{line}", make.FLUID_PRESSURE, log, make.pressure(stamp, value)
+
+
+def drive(seconds: float = 6.0, sides: Iterable[str] = ("left", "right"), start: int = make.T0) -> list[Message]:
+    """Both angles swing; pressures are sampled between them; everything is logged a little late."""
+    messages = []
+    for i in range(int(seconds * SECOND / STEP)):
+        t = start + i * STEP
+        angle = 0.4 * np.sin(i * 0.04)
+        messages += [joint(side, t, angle, t + 1_000_000 + k * 300_000) for k, side in enumerate(sides)]
+        for k, line in enumerate(("main_a", "main_b", "aux_a", "aux_b")):
+            stamp = t + 3_000_000 + k * 1_000_000
+            messages.append(pressure(line, stamp, 1e6 * (1 + (-1) ** k * np.sin(i * 0.04)), stamp + 500_000))
+    return messages
+
+
+def command(stamp: int, log: int, angles: Iterable[float]) -> Message:
+    types = make.TYPES.types
+    point, duration = types["trajectory_msgs/msg/JointTrajectoryPoint"], types["builtin_interfaces/msg/Duration"]
+    none = np.empty(0)
+    points = [
+        point(np.array([angle, angle]), none, none, none, duration(0, (i + 1) * 100_000_000))
+        for i, angle in enumerate(angles)
+    ]
+    return "/steering/command", TRAJECTORY, log, make.pack(types[TRAJECTORY](make.header(stamp), list(JOINTS), points))
+
+
+def read(bag: Path) -> list[tuple[str, str, int, bytes]]:
+    with AnyReader([bag], default_typestore=make.TYPES) as reader:
+        return [(c.topic, c.msgtype, log, bytes(raw)) for c, log, raw in reader.messages()]
+
+
+def decoded(bag: Path, topic: str) -> list[Any]:
+    return [make.TYPES.deserialize_cdr(raw, kind) for name, kind, _, raw in read(bag) if name == topic]
+
+
+def stamp_of(message: Any) -> int:
+    return int(message.header.stamp.sec) * SECOND + int(message.header.stamp.nanosec)
+
+
+def one_by_one(bag: Path, vehicle: Vehicle, options: Options) -> dict[str, list[Any]]:
+    """What a node would publish: rosbags reads, Estimator.push takes one sample, in log order."""
+    estimator = Estimator(vehicle, options)
+    found: dict[str, list[Any]] = {"estimates": [], "residuals": []}
+    for topic, kind, log, raw in sorted(read(bag), key=lambda row: row[2]):
+        if topic.startswith(NODE):
+            continue
+        message = make.TYPES.deserialize_cdr(raw, kind)
+        if kind == TRAJECTORY:
+            latest = max(estimator.latest_ns[f"angle/{side}"] for side in vehicle.sides)
+            joints = [f"{side}_track_steer_joint" for side in vehicle.sides]
+            estimator.set_plan(*planned_angles(message, joints, latest))
+            continue
+        for i, channel in enumerate(vehicle.channels):
+            if topic != "/" + channel.topic:
+                continue
+            value = {
+                Kind.ANGLE: lambda m: m.position[0],
+                Kind.PRESSURE: lambda m: m.fluid_pressure,
+                Kind.AIR_TEMPERATURE: lambda m: m.temperature,
+                Kind.TORQUE: lambda m: m.wrench.torque.z,
+            }[channel.kind](message)
+            estimates, residuals = estimator.push(i, stamp_of(message), float(value))
+            found["estimates"] += [(log, row.copy()) for row in estimates]
+            found["residuals"] += [(log, row.copy()) for row in residuals]
+    return found
+
+
+def assert_same(result: Path, expected: dict[str, list[Any]], sides: int) -> None:
+    """Every output message of a replayed bag against single pushes: stamps, log times and bits."""
+    messages: dict[str, list[Any]] = {}
+    for topic, kind, log, raw in read(result):
+        if topic.startswith(NODE):
+            messages.setdefault(topic, []).append((log, make.TYPES.deserialize_cdr(raw, kind)))
+    estimates, residuals = expected["estimates"], expected["residuals"]
+    assert estimates
+    for topic in ("torque", "estimate", "feed_forward", "rubber_temperature/left"):
+        assert len(messages[f"{NODE}/{topic}"]) == len(estimates)
+        for (log, message), (cause, row) in zip(messages[f"{NODE}/{topic}"], estimates, strict=True):
+            assert (log, stamp_of(message)) == (cause + 1, row["stamp_ns"])
+            if topic == "torque":
+                assert message.wrench.torque.z == row["total"]
+            elif topic == "rubber_temperature/left":
+                assert message.temperature == row["temperature"][0]
+            else:
+                field = "torque" if topic == "estimate" else "feed_forward"
+                assert message.effort.tolist() == row[field][:sides].tolist()
+            if topic == "estimate":
+                assert message.position.tolist() == row["theta"][:sides].tolist()
+                assert message.velocity.tolist() == row["omega"][:sides].tolist()
+    for topic, field in (("cylinder_torque", "measured_torque"), ("residual", "residual")):
+        assert len(messages[f"{NODE}/{topic}"]) == len(residuals) > 0
+        for (log, message), (cause, row) in zip(messages[f"{NODE}/{topic}"], residuals, strict=True):
+            assert (log, stamp_of(message), message.wrench.torque.z) == (cause + 1, row["stamp_ns"], row[field])
+
+
+@pytest.fixture(scope="module")
+def double_cycle(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    out = tmp_path_factory.mktemp("double_cycle")
+    return out, replay([DOUBLE_CYCLE], VEHICLE, out)
+
+
+def test_is_bit_for_bit_what_single_messages_give(double_cycle: tuple[Path, dict[str, Any]]) -> None:
+    expected = one_by_one(DOUBLE_CYCLE, load(VEHICLE), Options())
+    assert_same(double_cycle[0] / DOUBLE_CYCLE.name, expected, sides=2)
+
+
+def test_inputs_are_kept_verbatim(double_cycle: tuple[Path, dict[str, Any]]) -> None:
+    out = read(double_cycle[0] / DOUBLE_CYCLE.name)
+    kept = [row for row in out if not row[0].startswith(NODE)]
+    assert sorted(kept) == sorted(read(DOUBLE_CYCLE))
+    assert [row[2] for row in out] == sorted(row[2] for row in out)
+
+
+def test_summary_is_what_the_output_topics_say(double_cycle: tuple[Path, dict[str, Any]]) -> None:
+    out, summary = double_cycle
+    measured, residual = (
+        np.array([m.wrench.torque.z for m in decoded(out / DOUBLE_CYCLE.name, f"{NODE}/{topic}")])
+        for topic in ("cylinder_torque", "residual")
+    )
+    fit = summary["bags"][0]["fit"]
+    assert fit["samples"] == len(residual)
+    assert fit["rmse_Nm"] == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+    assert fit["bias_Nm"] == pytest.approx(np.mean(residual), rel=1e-9)
+    assert fit["r2"] == pytest.approx(1.0 - np.mean(residual**2) / np.var(measured), rel=1e-12)
+    assert fit["peaks"]["cylinder_torque"]["max_Nm"] == measured.max()
+    assert fit["peaks"]["estimate"]["min_Nm"] == (measured - residual).min()
+    assert summary["overall"] == fit
+    assert json.loads((out / "summary.json").read_text()) == summary
+    counts = summary["bags"][0]["samples"]["angle/left"]
+    assert counts["used"] == len(decoded(DOUBLE_CYCLE, "/steering/left/joint_state"))
+    assert counts["rejected"] == {}
+
+
+def test_fits_the_truth_of_the_recording(double_cycle: tuple[Path, dict[str, Any]]) -> None:
+    """Nothing is hidden in this one: the noise-free torque of the simulation is the oracle."""
+    out, _ = double_cycle
+
+    def curve(bag: Path, topic: str) -> tuple[np.ndarray, np.ndarray]:
+        messages = decoded(bag, topic)
+        return np.array([stamp_of(m) for m in messages]), np.array([m.wrench.torque.z for m in messages])
+
+    time, torque = curve(out / DOUBLE_CYCLE.name, f"{NODE}/torque")
+    true_time, truth = curve(DOUBLE_CYCLE, "/synthetic_truth/torque")
+    error = np.interp(true_time, time, torque) - truth
+    assert np.sqrt(np.mean(error**2)) < 0.01 * np.abs(truth).max()
+
+
+def test_picture_is_a_png(double_cycle: tuple[Path, dict[str, Any]]) -> None:
+    out, summary = double_cycle
+    assert summary["bags"][0]["picture"] == f"{DOUBLE_CYCLE.name}.png"
+    assert (out / f"{DOUBLE_CYCLE.name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_again_into_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None:
+    bag = make.write(tmp_path / "run", drive())
+    files = ("run/run.mcap", "run/metadata.yaml", "summary.json", "run.png")
+    replay([bag], VEHICLE, tmp_path / "out")
+    first = [(tmp_path / "out" / file).read_bytes() for file in files]
+    replay([bag], VEHICLE, tmp_path / "out")
+    assert [(tmp_path / "out" / file).read_bytes() for file in files] == first
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["run", "run.png", "summary.json"]
+
+
+# ------------------------------------------------------------ feed-forward
+
+
+def test_plans_take_effect_in_recorded_order(tmp_path: Path) -> None:
+    messages = drive()
+    # One plan right between two samples, one with a zero stamp ("from now on"), one with the log time of a sample.
+    for k, (i, stamp) in enumerate(((301, make.T0 + 2 * SECOND), (700, 0))):
+        messages.insert(i + k, command(stamp, messages[i + k][2] - 100, [0.1, 0.2, 0.3]))
+    bag = make.write(tmp_path / "run", messages)
+    options = Options(feed_forward_horizon_s=0.4)
+    summary = replay([bag], VEHICLE, tmp_path / "out", options)
+    assert summary["bags"][0]["samples"]["command"] == {
+        "topic": "/steering/command", "used": 2, "rejected": {}, "noted": {}
+    }  # fmt: skip
+    expected = one_by_one(bag, load(VEHICLE), options)
+    assert_same(tmp_path / "out" / "run", expected, sides=2)
+    without = one_by_one(make.write(tmp_path / "no_plan", drive()), load(VEHICLE), options)
+    changed = [
+        i
+        for i, ((_, a), (_, b)) in enumerate(zip(expected["estimates"], without["estimates"], strict=True))
+        if a["feed_forward"].tolist() != b["feed_forward"].tolist()
+    ]
+    assert 0 < min(changed) < max(changed)
+
+
+def test_unusable_plans_are_counted(tmp_path: Path) -> None:
+    topic, kind, log, data = command(make.T0, make.T0 + SECOND, [0.1])
+    bad = [command(make.T0, log, [np.nan]), (topic, kind, log + 1, data[:-4])]
+    bag = make.write(tmp_path / "run", sorted([*drive(), *bad], key=lambda row: row[2]))
+    counts = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]["samples"]["command"]
+    assert counts["used"] == 0
+    assert sum(counts["rejected"].values()) == 2
+    assert counts["rejected"]["malformed"] == 1
+
+
+def test_needs_no_ros(tmp_path: Path) -> None:
+    """With every ROS package made impossible to import, a bag with a plan is replayed all the same."""
+    bag = make.write(tmp_path / "run", [*drive(), command(0, make.T0 + 7 * SECOND, [0.1])])
+    code = f"""
+import sys
+for name in ("rclpy", "trajectory_msgs", "sensor_msgs", "builtin_interfaces", "std_msgs", "geometry_msgs"):
+    sys.modules[name] = None
+from pathlib import Path
+from lugre_steering.replay import replay
+print(replay([Path({str(bag)!r})], Path({str(VEHICLE)!r}), Path("out"))["bags"][0]["samples"]["command"]["used"])
+"""
+    environment = os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, "1"), done.stderr
+
+
+# --------------------------------------------------- what a recording lacks
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_missing_angle_is_an_error_that_names_the_topic(tmp_path: Path, side: str) -> None:
+    messages = [row for row in drive() if side not in row[0]]
+    with pytest.raises(BagError, match=f"steering/{side}/joint_state"):
+        replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")
+    assert not (tmp_path / "out" / "run").exists()
+
+
+def test_angle_topic_without_usable_samples_is_an_error(tmp_path: Path) -> None:
+    messages = [row for row in drive() if "left" not in row[0]]
+    messages += [joint("left", make.T0 + i * STEP, np.nan, make.T0 + i * STEP) for i in range(50)]
+    bag = make.write(tmp_path / "run", sorted(messages, key=lambda row: row[2]))
+    with pytest.raises(BagError, match="angle/left: 0 samples used, 50 not_finite"):
+        replay([bag], VEHICLE, tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_without_a_pressure_the_torque_is_still_estimated(tmp_path: Path) -> None:
+    whole = make.write(tmp_path / "whole", drive())
+    poor = make.write(tmp_path / "poor", [row for row in drive() if "aux_b" not in row[0]])
+    summary = replay([whole, poor], VEHICLE, tmp_path / "out")
+    assert summary["bags"][1]["fit"] is None
+    assert "pressure/aux_b: topic missing" in summary["bags"][1]["fit_note"]
+    assert summary["overall"] == summary["bags"][0]["fit"]
+    torques = [decoded(tmp_path / "out" / name, f"{NODE}/torque") for name in ("whole", "poor")]
+    assert [m.wrench.torque.z for m in torques[0]] == [m.wrench.torque.z for m in torques[1]]
+    assert (tmp_path / "out" / "poor.png").exists()
+
+
+def test_single_joint_with_torque_sensor(tmp_path: Path) -> None:
+    (tmp_path / "joint.yaml").write_text(CONTACT)
+    messages = []
+    for i in range(300):
+        t = make.T0 + i * STEP
+        messages.append(joint("left", t, 0.3 * np.sin(i * 0.05), t))
+        topic = "/steering/measured_torque"
+        messages.append((topic, make.WRENCH, t + 5_000_000, make.wrench(t + 5_000_000, 50.0 * np.cos(i * 0.05))))
+    bag = make.write(tmp_path / "run", messages)
+    summary = replay([bag], tmp_path / "joint.yaml", tmp_path / "out")
+    assert summary["bags"][0]["fit"]["samples"] > 250
+    topics = {row[0] for row in read(tmp_path / "out" / "run")}
+    assert f"{NODE}/torque" in topics
+    assert f"{NODE}/rubber_temperature/left" not in topics  # no rubber, no temperature
+    expected = one_by_one(bag, load(tmp_path / "joint.yaml"), Options())
+    torques = decoded(tmp_path / "out" / "run", f"{NODE}/torque")
+    assert [m.wrench.torque.z for m in torques] == [row["total"] for _, row in expected["estimates"]]
+
+
+def test_rejected_samples_are_counted_by_reason(tmp_path: Path) -> None:
+    messages = drive()
+    extra = [
+        joint("left", make.T0 + 10 * STEP, 0.1, make.T0 + 4 * SECOND),  # long past
+        joint("right", 0, 0.1, make.T0 + 4 * SECOND + 1),
+        pressure("main_a", make.T0 + 4 * SECOND, np.inf, make.T0 + 4 * SECOND + 2),
+        pressure("main_a", make.T0 + 4 * SECOND, 1e12, make.T0 + 4 * SECOND + 3),
+    ]
+    bag = make.write(tmp_path / "run", sorted([*messages, *extra], key=lambda row: row[2]))
+    samples = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]["samples"]
+    assert samples["angle/left"]["rejected"] == {"time_jump": 1}
+    assert samples["angle/right"]["rejected"] == {"zero_stamp": 1}
+    assert samples["pressure/main_a"]["rejected"] == {"not_finite": 1, "absurd": 1}
+    assert samples["angle/left"]["used"] == len(drive()) // 6
+
+
+def test_clock_set_back_is_reported_and_replayed(tmp_path: Path) -> None:
+    later = [(t, k, log + 100 * SECOND, data) for t, k, log, data in drive(3.0)]  # the same stamps once more
+    bag = make.write(tmp_path / "run", [*drive(5.0), *later])
+    summary = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]
+    assert "clock_set_back" in [finding["finding"] for finding in summary["findings"]]
+    assert summary["estimates"] > 390
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_torn_bag_is_replayed_as_far_as_it_goes(tmp_path: Path, storage: str) -> None:
+    write_cycle(tmp_path / "run", 100.0, storage)  # type: ignore[arg-type]
+    file = make.file_of(tmp_path / "run")
+    file.write_bytes(file.read_bytes()[: int(file.stat().st_size * 0.7)])
+    summary = replay([tmp_path / "run"], VEHICLE, tmp_path / "out")["bags"][0]
+    assert summary["findings"]
+    assert 0 < summary["estimates"] < 10_000
+    assert len(decoded(tmp_path / "out" / "run", f"{NODE}/torque")) == summary["estimates"]
+
+
+# ------------------------------------------------------------ where it goes
+
+
+def test_same_named_bags_do_not_mix(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    first = make.write(tmp_path / "a" / "run", drive(3.0))
+    second = make.write(tmp_path / "b" / "run", drive(5.0))
+    summary = replay([first, second], VEHICLE, tmp_path / "out")
+    assert [bag["name"] for bag in summary["bags"]] == ["run", "run_2"]
+    for name, bag in (("run", first), ("run_2", second)):
+        assert_same(tmp_path / "out" / name, one_by_one(bag, load(VEHICLE), Options()), sides=2)
+
+
+@pytest.mark.parametrize("out", ["here", "here/run", "here/run/deeper"])
+def test_an_input_is_never_overwritten(tmp_path: Path, out: str) -> None:
+    (tmp_path / "here").mkdir()
+    bag = make.write(tmp_path / "here" / "run", drive(2.0))
+    before = {p: p.read_bytes() for p in bag.iterdir()}
+    with pytest.raises(BagError, match="--out"):
+        replay([bag], VEHICLE, tmp_path / out)
+    if out == "here":
+        with pytest.raises(BagError, match="--out"):
+            replay([make.file_of(bag)], VEHICLE, tmp_path / out)
+    assert {p: p.read_bytes() for p in bag.iterdir()} == before
+
+
+def test_what_is_no_earlier_result_is_never_overwritten(tmp_path: Path) -> None:
+    bag = make.write(tmp_path / "run", drive(2.0))
+    (tmp_path / "out").mkdir()
+    shutil.copytree(bag, tmp_path / "out" / "run")
+    with pytest.raises(BagError, match="not an earlier result"):
+        replay([bag], VEHICLE, tmp_path / "out")
+
+
+def test_a_result_can_be_replayed_and_its_old_outputs_are_replaced(tmp_path: Path) -> None:
+    bag = make.write(tmp_path / "run", drive(3.0))
+    replay([bag], VEHICLE, tmp_path / "first")
+    summary = replay([tmp_path / "first" / "run"], VEHICLE, tmp_path / "second")
+    assert sorted(read(tmp_path / "second" / "run")) == sorted(read(tmp_path / "first" / "run"))
+    assert "replaced_topics" in [finding["finding"] for finding in summary["bags"][0]["findings"]]
+
+
+def test_without_matplotlib_there_is_no_picture_and_a_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "matplotlib" else object())
+    bag = make.write(tmp_path / "run", drive(2.0))
+    summary = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]
+    assert summary["picture"] is None
+    assert "matplotlib" in summary["picture_note"]
+    assert not (tmp_path / "out" / "run.png").exists()
+
+
+def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
+    peaks = []
+    for seconds in (200.0, 600.0):
+        write_cycle(tmp_path / f"run_{seconds:.0f}", seconds)
+        tracemalloc.start()
+        replay([tmp_path / f"run_{seconds:.0f}"], VEHICLE, tmp_path / "out")
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
