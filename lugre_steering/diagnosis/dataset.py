@@ -49,9 +49,16 @@ class Run:
 
 
 def motion(time: Array, theta: Array) -> tuple[Array, Array]:
-    """Rate and acceleration (sides, n) of smoothed angles by central differences."""
-    omega = np.gradient(theta, time, axis=1)
-    return omega, np.gradient(omega, time, axis=1)
+    """Rate and acceleration (sides, n) of smoothed angles by central differences.
+
+    The acceleration is the second difference over neighbours: the rate differentiated once more would span twice as many
+    samples and flatten short transients (an inertia came out 3 % too large at 125 Hz).
+    """
+    step = float(time[1] - time[0])
+    omega = np.gradient(theta, step, axis=1)
+    alpha = np.zeros_like(theta)
+    alpha[:, 1:-1] = np.diff(theta, 2, axis=1) / step**2
+    return omega, alpha
 
 
 def angle_noise(vehicle: Vehicle) -> float:
