@@ -4,20 +4,20 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit code (0; 2 for bad parameters or a bad vehicle file)."""
-    # Before the heavy imports, so that a stop during start-up is as clean as a later one.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        from lugre_steering.live.run import run
+    # Set before the heavy imports. Until the node spins there is nothing to tidy up, and an exception raised by a handler
+    # may be swallowed (compiler callbacks) or turn the exit code into the signal's (CPython, inside exec).
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: os._exit(0))
+    from lugre_steering.live.run import run
 
-        return run(sys.argv if args is None else args)
-    except KeyboardInterrupt:
-        return 0
+    return run(sys.argv if args is None else args)
 
 
 if __name__ == "__main__":

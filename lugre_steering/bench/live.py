@@ -48,12 +48,14 @@ def serve(vehicle_file: str, executor: str, size: int, results: Connection) -> N
 
     import rclpy
 
+    from rclpy.signals import SignalHandlerOptions
+
     from lugre_steering.live.estimator_node import SteeringTorqueEstimator
     from lugre_steering.live.run import spin
 
     # The two angles are stamped apart here: a pause of the publisher between them must not count as a loss.
     arguments = ["-p", f"vehicle_file:={vehicle_file}", "-p", f"executor:={executor}", "-p", "pair_tolerance_s:=1.0"]
-    rclpy.init(args=["--ros-args", "--log-level", "warn", *arguments])
+    rclpy.init(args=["--ros-args", "--log-level", "warn", *arguments], signal_handler_options=SignalHandlerOptions.NO)
     node = SteeringTorqueEstimator(latency_window=size)
     gc.collect()
     gc.freeze()

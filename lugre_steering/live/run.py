@@ -5,22 +5,25 @@
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 
 import rclpy
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions, install_signal_handlers
 from rclpy.task import Future
 
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.live.estimator_node import SteeringTorqueEstimator
 
-_LONG_S = 1e5
+_SLICE_S = 0.5  # how long a shutdown that came between check and spin may go unnoticed
 
 
 def run(args: list[str]) -> int:
     """Run the node until the context is shut down; returns the exit code."""
     try:
-        rclpy.init(args=args)
+        # Signals become rclpy's once the node spins; a context that is shut down before that breaks start-up.
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy raises several private types for arguments it cannot parse
         return _refused(error)
     try:
@@ -31,8 +34,6 @@ def run(args: list[str]) -> int:
         spin(node)
     except LugreSteeringError as error:
         return _refused(error)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     finally:
         rclpy.try_shutdown()
     return 0
@@ -47,6 +48,9 @@ def spin(node: SteeringTorqueEstimator) -> None:
     """Run callbacks until shutdown; an exception that the middleware raises between them does not end the node."""
     executor = make_executor(node.settings.executor)
     executor.add_node(node)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: None)  # rclpy's handlers, put before these, shut the context down
+    install_signal_handlers(SignalHandlerOptions.ALL)
     try:
         while rclpy.ok():
             _spin_some(executor, node)
@@ -59,7 +63,7 @@ def spin(node: SteeringTorqueEstimator) -> None:
 def _spin_some(executor: Executor, node: SteeringTorqueEstimator) -> None:
     try:
         # Not spin(): the one of EventsExecutor in rclpy 7.1 keeps a core busy and ignores SIGTERM.
-        executor.spin_until_future_complete(Future(), timeout_sec=_LONG_S)
+        executor.spin_until_future_complete(Future(), timeout_sec=_SLICE_S)
     except ExternalShutdownException:
         raise
     except Exception as error:

@@ -12,6 +12,8 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+import itertools
+
 from builtin_interfaces.msg import Time
 from live_harness import SECOND, T0, VEHICLE, LiveNode, Sample, World, motion, to_time
 from rosgraph_msgs.msg import Clock
@@ -46,7 +48,7 @@ def test_stale_pressures_stop_the_residual_and_a_missing_angle_the_torque() -> N
     samples = motion(vehicle, 4.0)
     whole = [s for s in samples if s.stamp_ns < T0 + SECOND]
     no_pressure = [s for s in samples if T0 + SECOND <= s.stamp_ns < T0 + 3 * SECOND and s.channel in (0, 1)]
-    no_right = [s for s in samples if T0 + 3 * SECOND <= s.stamp_ns and s.channel != 1]
+    no_right = [s for s in samples if s.stamp_ns >= T0 + 3 * SECOND and s.channel != 1]
     with LiveNode(), World(vehicle) as world:
         torque, residual = world.heard["torque"], world.heard["residual"]
         world.play(whole)
@@ -92,7 +94,7 @@ def test_every_rejection_is_counted_by_channel_and_reason() -> None:
             time.sleep(0.001)
         world.wait(lambda: len(world.heard["torque"]) == 21)
         world.wait(lambda: len(world.heard["diagnostics"]) > 2)
-        level, message, values = world.status("rejected")
+        _level, _message, values = world.status("rejected")
         levels = [s.level for d in world.heard["diagnostics"] for s in d.status if s.name.endswith("rejected")]
         assert WARN in levels  # while they were new
         expected = {
@@ -172,7 +174,7 @@ def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> 
         wanted = [list(m.effort) for m in world.heard["feed_forward"][120:]]
         assert list(commands[120].data) == last
         assert abs(wanted[0][0] - last[0]) > 500.0  # or this test would show nothing
-        steps = [abs(b.data[0] - a.data[0]) for a, b in zip(commands[119:], commands[120:], strict=False)]
+        steps = [abs(b.data[0] - a.data[0]) for a, b in itertools.pairwise(commands)]
         assert max(steps) < 0.2 * abs(wanted[0][0] - last[0])
         assert list(commands[-1].data) == wanted[-1]
 
@@ -205,6 +207,6 @@ def test_simulated_time() -> None:
         assert len(world.heard["feed_forward/commands"]) == 100
         # Time stands still, so the inputs do not grow old; health is reported all the same.
         time.sleep(1.0)
-        level, message, values = world.status("inputs")
+        _level, message, values = world.status("inputs")
         assert "angle" not in message
         assert float(values["angle/left age [s]"]) < 0.2

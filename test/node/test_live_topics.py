@@ -83,7 +83,7 @@ def test_live_equals_direct_on_every_topic() -> None:
 
 def test_both_joints_on_one_topic_in_a_namespace() -> None:
     vehicle = load(VEHICLE)
-    one = {topic: "/joint_states" for topic in ("steering/left/joint_state", "steering/right/joint_state")}
+    one = dict.fromkeys(("steering/left/joint_state", "steering/right/joint_state"), "/joint_states")
     remaps = [text for topic, target in one.items() for text in ("-r", f"{topic}:={target}")]
     estimator = Estimator(vehicle)
     expected = []
