@@ -35,7 +35,8 @@ BASELINE_FIELDS = (
 
 EFFECT_FIELDS = (
     # motion
-    "angle_offset_offset", "angle_scale_scale", "backlash_width", "linkage_compliance_compliance",
+    "angle_offset_offset", "angle_scale_scale", "backlash_width",
+    "backlash_softness", "linkage_compliance_compliance",
     "linkage_compliance_stiffening",
     # contact
     "direction_asymmetry_asymmetry", "surface_patch_change", "surface_patch_angle_low", "surface_patch_angle_high",
@@ -66,8 +67,7 @@ STATE = np.dtype(
         ("time", np.float64),  # since the start of the recording [s]
         ("started", np.float64),  # 0 before the first sample
         ("theta", np.float64),  # steering angle after sensor corrections [rad]
-        ("link_angle", np.float64),  # angle behind the linkage compliance [rad]
-        ("gap", np.float64),  # position inside the backlash [rad]
+        ("contact_angle", np.float64),  # angle of the contact, behind linkage and backlash [rad]
         ("z", np.float64),  # bristle deflection [rad]
         ("elements", np.float64, (ELEMENTS,)),  # bristles of the distributed contact [rad]
         ("element_shares", np.float64, (ELEMENTS,)),  # their shares of the stiffness, set at the start
@@ -87,6 +87,7 @@ STATE = np.dtype(
         ("berm_right", np.float64),  # farthest push of the soil, negative side [rad]
         ("seal", np.float64),  # cylinder seal deflection, -1 ... 1
         ("torque", np.float64),  # last total torque [N m]
+        ("load", np.float64),  # the same without losses in cylinders and lines [N m]
         ("heat", np.float64),  # energy turned into heat by friction [J]
         ("work", np.float64),  # work of the friction torque [J]
         ("non_passive", np.float64),  # negative dissipation that was withheld from the heat [J]

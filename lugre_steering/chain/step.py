@@ -55,8 +55,7 @@ def begin(p, s, theta):
     """State at the first sample of a recording: bristles and temperatures as the parameters say."""
     s.started = 1.0
     s.theta = theta
-    s.link_angle = theta
-    s.gap = 0.5 * p.backlash_width * p.backlash_start
+    s.contact_angle = theta
     s.z = p.initial_bristle
     s.z_max = abs(p.initial_bristle)
     for i in range(ELEMENTS):
@@ -160,6 +159,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     conservative = aligning(theta, p.aligning_torque, p.gravity_cos)
     parallel = parallel_torque(p, s, turned, omega, alpha) if effects else 0.0
     load = elastic + damping + viscous + conservative + parallel
+    s.load = load
     s.torque = hydraulic_limits(p, s, load + losses(p, s, omega, turned, load)) if effects else load
 
     out.torque = s.torque

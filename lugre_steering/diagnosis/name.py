@@ -100,8 +100,10 @@ def search(
         if before - best.cost < OWN_ERROR * samples:
             break
         rivals = tied(problem, weight, split, best, trials[1:], before, samples)
+        best, rivals = simplest(best, rivals)
         gained = (before - best.cost) / max(before - samples, before - best.cost)
-        steps.append((best.fit, Found(best.score, rivals, tuple(trials)), gained))
+        names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
+        steps.append((best.fit, Found(best.score, names, tuple(trials)), gained))
         current = best.fit
         if best.cost - samples < OWN_ERROR * samples:
             break
@@ -166,24 +168,34 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
 
 
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
-    """Let the effect have the optional parts of its family, if they earn their place."""
+    """Let the effect have the optional parts of its family; those that do not earn their place go again."""
     candidate, values = trial.fit.effects[-1]
-    optional = tuple(p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free)
-    evaluations = 8
+    optional = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     if not optional:
-        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=evaluations)
-    else:
-        richer = replace(candidate, free=candidate.free + optional)
-        start = {**values, **{name: 0.2 * richer.parameter(name).scale for name in optional}}
-        result = fit(problem, weight, [*trial.fit.effects[:-1], (richer, start)], trial.fit.x, evaluations=evaluations + 4)
+        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=8)
+        return Trial(trial.score, result, cost(problem, result, weight))
+    earlier = trial.fit.effects[:-1]
+    start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
+    richer = replace(candidate, free=candidate.free + tuple(optional))
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=12)
+    deviation = np.sqrt(np.diag(result.covariance))[-len(optional) :]
+    fitted = result.effects[-1][1]
+    needed = tuple(name for name, sd in zip(optional, deviation, strict=True) if abs(fitted[name]) > 4.0 * sd)
+    if len(needed) < len(optional):
+        fitted = {name: value for name, value in fitted.items() if name not in optional or name in needed}
+        leaner = replace(candidate, free=candidate.free + needed)
+        result = fit(problem, weight, [*earlier, (leaner, fitted)], result.x, evaluations=8)
     better = cost(problem, result, weight)
-    return Trial(trial.score, result, better) if better < trial.cost - 10.0 * max(len(optional), 1) else trial
+    return Trial(trial.score, result, better) if better < trial.cost - 10.0 * max(len(needed), 1) else trial
 
 
 def tied(
     problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float, samples: float
-) -> tuple[str, ...]:
-    """Rivals that this data cannot tell from the best: no clear difference block by block (Vuong), or none beyond our misfit."""
+) -> list[Trial]:
+    """Rivals that this data cannot tell from the best.
+
+    Either no clear difference block by block (Vuong 1989), or a difference smaller than what even the best leaves over.
+    """
     found = []
     error = ((problem.measured - best.fit.prediction) * weight) ** 2
     misfit = max(best.cost - samples, 0.0)
@@ -193,5 +205,12 @@ def tied(
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
         if t < TIE_T or other.cost - best.cost < 0.1 * misfit + 10.0:
-            found.append(other.candidate.label.split("[")[0])
-    return tuple(dict.fromkeys(found))[:6]
+            found.append(other)
+    return found
+
+
+def simplest(best: Trial, rivals: list[Trial]) -> tuple[Trial, list[Trial]]:
+    """Of effects that fit equally well the one with the fewest free parameters stands for the group."""
+    group = [best, *rivals]
+    chosen = min(group, key=lambda trial: (len(trial.candidate.free), trial.cost))
+    return chosen, [trial for trial in group if trial is not chosen]

@@ -21,10 +21,13 @@ EFFECTS = (
     ),
     Effect(
         "backlash", "motion", 1, "Free play between angle sensor and track",
-        "contact angle = play(theta_m, width); the gap opens where the torque changes sign",
+        "contact angle = theta_m - width / 2 tanh(M / (100 N m + softness)); the gap opens where the torque changes sign",
         "Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996)",
         "flat, near-zero torque after each sign change of the torque, then a delayed build-up", "torque sign change",
-        (Parameter("width", "rad", "full width of the gap", 0.006, 0.0, 0.1),),
+        (
+            Parameter("width", "rad", "full width of the gap", 0.006, 0.0, 0.1),
+            Parameter("softness", "N m", "torque over which a flank gives, beyond 100 N m", 500.0, 0.0, 2e4, optional=True),
+        ),
         ("linkage_compliance",),
     ),
     Effect(
