@@ -6,8 +6,9 @@ Live node and replay push the same messages through the same compiled loop, so e
 
 Rules of time (header stamps only, never arrival times):
 
-* Each angle sample advances its own side exactly once. A torque is published when both sides have a sample of (nearly)
-  the same stamp; a sample without a partner is counted as unpaired and advances its side all the same.
+* Each angle sample advances its own side exactly once. A torque is published when both sides have a sample of the same
+  stamp, to within half a sampling period; samples wait for a partner that arrives late, and one that gets none is
+  counted as unpaired (it has advanced its side all the same).
 * The residual of a torque follows when every line has a pressure at or after its stamp; pressures are interpolated
   linearly, never held or extrapolated, and not across a gap.
 * Duplicate, backward, zero, not finite, absurd and jumping samples are rejected and counted by reason. A jump is
@@ -41,6 +42,8 @@ _DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _G
 
 LINE_RING = 8192
 PENDING_RING = 8192
+WAITING_RING = 64
+MAX_PAIR_TOLERANCE_NS = 50_000_000
 PREVIEW_STEPS = 20
 PLAN_POINTS = 1024
 
@@ -96,7 +99,8 @@ CHANNEL = np.dtype(
         ("suspect_value", np.float64),
         ("last_value", np.float64),
         ("accepted", np.int64),
-        ("head", np.int64),  # samples stored in this line's ring so far
+        ("period_ns", np.int64),  # from the last but one accepted sample to the last
+        ("head", np.int64),  # samples stored so far in the ring of this line or side
         ("cursor", np.int64),  # first ring sample that may still be needed
         ("offset", np.float64),  # sensor offset [Pa]
         ("drift", np.float64),  # sensor drift [Pa/s]
@@ -106,7 +110,6 @@ CHANNEL = np.dtype(
 WAITING = np.dtype(
     [
         ("stamp_ns", np.int64),
-        ("ready", np.int64),
         ("theta", np.float64),
         ("omega", np.float64),
         ("torque", np.float64),
@@ -120,7 +123,7 @@ WAITING = np.dtype(
 class Options:
     """Timing rules; the defaults suit sensors of 20 Hz and more."""
 
-    pair_tolerance_s: float = 0.004
+    pair_tolerance_s: float = 0.002  # or half a sampling period, if that is more
     max_gap_s: float = 0.25
     backward_jump_s: float = 2.0
     forward_jump_s: float = 10.0
@@ -165,6 +168,7 @@ def _reset(core, keep):
     c.plan_size = 0
     for i in range(core.channels.size):
         core.channels[i].last_ns = 0
+        core.channels[i].period_ns = 0
         core.channels[i].head = 0
         core.channels[i].cursor = 0
         if i != keep:
@@ -223,7 +227,7 @@ def _admit(core, k, stamp_ns, value):
                 ch.suspect_ns = stamp_ns
                 ch.suspect_value = value
                 return False
-    if ahead > c.max_gap_ns:
+    if ahead > c.max_gap_ns and ch.kind != 2:  # air may come as rarely as it likes
         ch.reasons[_GAP] += 1
     ch.suspect_ns = 0
     return True
@@ -269,14 +273,45 @@ def _preview(core, side, stamp_ns):
 
 
 @njit
+def _pair(core):
+    """Drop waiting samples that can get no partner; stamp of the pair now at the head of the sides' queues, or 0."""
+    sides, ring = core.waiting.shape
+    period_ns = MAX_PAIR_TOLERANCE_NS
+    for side in range(sides):
+        if core.channels[side].period_ns > 0:
+            period_ns = min(period_ns, core.channels[side].period_ns)
+    tolerance_ns = max(core.config[0].pair_tolerance_ns, period_ns // 2)
+    while True:
+        latest = 0
+        for side in range(sides):
+            ch = core.channels[side]
+            if ch.head == ch.cursor:
+                return 0
+            latest = max(latest, core.waiting[side, ch.cursor % ring].stamp_ns)
+        paired = True
+        for side in range(sides):
+            ch = core.channels[side]
+            if latest - core.waiting[side, ch.cursor % ring].stamp_ns > tolerance_ns:
+                ch.cursor += 1
+                ch.reasons[_UNPAIRED] += 1
+                paired = False
+        if paired:
+            return latest
+
+
+@njit
 def _angle(core, k, stamp_ns, value, rate, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
     c, ch = core.config[0], core.channels[k]
     side = ch.index
     if c.start_ns == 0:
         c.start_ns = stamp_ns
-    first = ch.last_ns == 0
-    dt = (stamp_ns - c.start_ns) * 1e-9 if first else (stamp_ns - ch.last_ns) * 1e-9
+    dt = 0.0
+    if ch.last_ns == 0:
+        core.state[side].time = max(0.0, (stamp_ns - c.start_ns) * 1e-9)
+    else:
+        ch.period_ns = stamp_ns - ch.last_ns
+        dt = ch.period_ns * 1e-9
     ch.last_ns = stamp_ns
     ch.last_value = value
     motion = core.motion[side]
@@ -291,34 +326,28 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
         motion.omega,
         motion.alpha,
     )
-    waiting = core.waiting[side]
-    if waiting.ready:
+    ring = core.waiting.shape[1]
+    if ch.head - ch.cursor == ring:
         ch.reasons[_UNPAIRED] += 1
-    waiting.ready = 1
+        ch.cursor += 1
+    waiting = core.waiting[side, ch.head % ring]
+    ch.head += 1
     waiting.stamp_ns = stamp_ns
     waiting.theta = core.state[side].theta
     waiting.omega = motion.omega
     waiting.torque = core.output[side].torque
     waiting.temperature = core.output[side].temperature
     waiting.feed_forward = _preview(core, side, stamp_ns)
-
-    latest = stamp_ns
-    for other in range(core.waiting.size):
-        if not core.waiting[other].ready:
-            return count
-        latest = max(latest, core.waiting[other].stamp_ns)
-    for other in range(core.waiting.size):
-        if latest - core.waiting[other].stamp_ns > c.pair_tolerance_ns:
-            core.waiting[other].ready = 0
-            core.channels[other].reasons[_UNPAIRED] += 1
-            return count
+    latest = _pair(core)
+    if latest == 0:
+        return count
     e = estimates[count]
     e.stamp_ns = latest
     e.message = c.message
     e.total = 0.0
-    for other in range(core.waiting.size):
-        w = core.waiting[other]
-        w.ready = 0
+    for other in range(core.waiting.shape[0]):
+        w = core.waiting[other, core.channels[other].cursor % ring]
+        core.channels[other].cursor += 1
         e.theta[other] = w.theta
         e.omega[other] = w.omega
         e.torque[other] = w.torque
@@ -549,7 +578,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
         state=np.zeros(sides, STATE),
         motion=np.zeros(sides, MOTION),
         output=np.zeros(sides, OUTPUT),
-        waiting=np.zeros(sides, WAITING),
+        waiting=np.zeros((sides, WAITING_RING), WAITING),
         rubber=model.rubber,
         pending=np.zeros(PENDING_RING, ESTIMATE),
         line_ns=np.zeros((lines, LINE_RING), np.int64),

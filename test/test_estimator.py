@@ -1,0 +1,333 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator on well-behaved and ill-behaved messages: time rules, rejects, residual. All data are synthetic."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lugre_steering.estimator import Estimator, Options
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import TorqueSensor, Vehicle, load
+
+VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
+T0 = 1_790_000_000_000_000_000
+MS = 1_000_000
+LEFT, RIGHT, MAIN_A, MAIN_B, AUX_A, AUX_B, AIR = range(7)
+Message = tuple[int, int, float]
+
+
+def angle(stamp_ns: int, share: float = 1.0) -> float:
+    return share * 0.3 * math.sin((stamp_ns - T0) * 1e-9 * 0.7)
+
+
+def pressure(line: int, stamp_ns: int) -> float:
+    return 5e6 + 1e6 * line + 4e6 * math.sin((stamp_ns - T0) * 1e-9 * 0.7 + line)
+
+
+def messages(
+    duration_s: float = 6.0, line_rates: tuple[float, ...] = (50.0, 50.0, 80.0, 40.0), offset_ms: float = 0.0
+) -> list[Message]:
+    """100 Hz angles, lines at their own rates and phases, air at 1 Hz; in stamp order."""
+    found: list[Message] = []
+    for i in range(round(duration_s * 100)):
+        stamp = T0 + i * 10 * MS
+        found += [(LEFT, stamp, angle(stamp)), (RIGHT, stamp + round(offset_ms * MS), angle(stamp, 0.95))]
+    for line, rate in enumerate(line_rates):
+        for i in range(round(duration_s * rate) + 1):
+            stamp = T0 - 7 * MS + line * MS + round(i / rate * 1e9)
+            found.append((MAIN_A + line, stamp, pressure(line, stamp)))
+    found += [(AIR, T0 + i * 1000 * MS, 15.0) for i in range(round(duration_s))]
+    return sorted(found, key=lambda m: m[1])
+
+
+def feed(stream: list[Message], vehicle: Vehicle = VEHICLE, options: Options | None = None):  # type: ignore[no-untyped-def]
+    estimator = Estimator(vehicle, options)
+    channel, stamp, value = (np.array(column) for column in zip(*stream, strict=True))
+    estimates, residuals = estimator.push_block(
+        channel, stamp.astype(np.int64), value.astype(float), np.full(len(stream), np.nan)
+    )
+    return estimator, estimates, residuals
+
+
+def drop_message(records: Array) -> list[Array]:
+    """Every field but the number of the completing message, which depends on the order of arrival."""
+    return [records[name] for name in records.dtype.names if name != "message"]
+
+
+def rejected(estimator: Estimator) -> dict[str, dict[str, int]]:
+    return {
+        k: {r: n for r, n in row.items() if r != "accepted"} for k, row in estimator.counters.items() if len(row) > 1
+    }
+
+
+def test_every_angle_pair_gives_one_torque_and_residuals_follow_in_order() -> None:
+    estimator, estimates, residuals = feed(messages())
+    assert estimates.size == 600
+    assert rejected(estimator) == {}
+    assert np.all(np.diff(residuals["stamp_ns"]) > 0)
+    assert residuals.size >= 595
+    assert set(residuals["stamp_ns"]) <= set(estimates["stamp_ns"])
+
+
+def test_single_pushes_equal_a_block() -> None:
+    stream = messages(2.0)
+    _, estimates, residuals = feed(stream)
+    one = Estimator(VEHICLE)
+    torque, residual = [], []
+    for m in stream:
+        e, r = one.push(*m)
+        torque += list(e["total"])
+        residual += list(r["residual"])
+    np.testing.assert_array_equal(torque, estimates["total"])
+    np.testing.assert_array_equal(residual, residuals["residual"])
+
+
+def test_residual_by_hand() -> None:
+    _, estimates, residuals = feed(messages())
+    assert VEHICLE.hydraulics is not None
+    k = 300
+    r = residuals[k]
+    e = estimates[estimates["stamp_ns"] == r["stamp_ns"]][0]
+    p: dict[str, float] = {"tank": 0.0}
+    for line, (name, rate) in enumerate(zip(VEHICLE.hydraulics.lines, (50.0, 50.0, 80.0, 40.0), strict=True)):
+        stamps = [T0 - 7 * MS + line * MS + round(i / rate * 1e9) for i in range(400)]
+        after = next(s for s in stamps if s >= r["stamp_ns"])
+        before = stamps[stamps.index(after) - 1]
+        w = (r["stamp_ns"] - before) / (after - before)
+        p[name] = (1 - w) * pressure(line, before) + w * pressure(line, after)
+    torque = 0.0
+    for c in VEHICLE.hydraulics.cylinders.values():
+        th = e["theta"][VEHICLE.sides.index(c.side)]
+
+        def length(a: float, c=c) -> float:  # type: ignore[no-untyped-def]
+            kx, ky = c.knuckle_m
+            x, y = kx * math.cos(a) - ky * math.sin(a), kx * math.sin(a) + ky * math.cos(a)
+            return math.hypot(x - c.chassis_m[0], y - c.chassis_m[1])
+
+        arm = (length(th + 1e-6) - length(th - 1e-6)) / 2e-6
+        force = p[c.cap] * math.pi / 4 * c.bore_m**2 - p[c.rod] * math.pi / 4 * (c.bore_m**2 - c.rod_m**2)
+        torque += force * arm
+    assert r["measured_torque"] == pytest.approx(torque, rel=1e-7)
+    assert r["residual"] == pytest.approx(torque - e["total"], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_arrival_order_across_topics_does_not_matter(seed: int) -> None:
+    stream = messages(4.0)
+    rng = np.random.default_rng(seed)
+    delay = {k: rng.uniform(0.0, 60 * MS) for k in range(7)}  # each topic has its own latency, up to six samples
+    late = sorted(stream, key=lambda m: m[1] + delay[m[0]])
+    assert late != stream
+    _, estimates, residuals = feed(stream)
+    other, late_estimates, late_residuals = feed(late)
+    assert rejected(other) == {}
+    for a, b in zip(drop_message(late_estimates), drop_message(estimates), strict=True):
+        np.testing.assert_array_equal(a, b)
+    n = min(residuals.size, late_residuals.size)
+    assert n > 390
+    for a, b in zip(drop_message(late_residuals[:n]), drop_message(residuals[:n]), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("offset_ms", [0.5, 3.0, 4.9])
+def test_staggered_angle_topics_still_pair(offset_ms: float) -> None:
+    estimator, estimates, _ = feed(messages(offset_ms=offset_ms))
+    assert estimates.size >= 599
+    assert rejected(estimator) == {}
+
+
+def test_sides_at_different_rates() -> None:
+    stream = [m for m in messages() if not (m[0] == RIGHT and (m[1] - T0) // (10 * MS) % 2)]
+    estimator, estimates, _ = feed(stream)
+    assert estimates.size == 300
+    assert rejected(estimator) == {"angle/left": {"unpaired": 299}}
+    # The side that has all its samples is the same as ever.
+    _, every, _ = feed(messages())
+    np.testing.assert_array_equal(estimates["torque"][:, 0], every["torque"][::2, 0])
+
+
+def test_jitter_of_stamps() -> None:
+    rng = np.random.default_rng(1)
+    stream = []
+    for i in range(600):
+        stamp = T0 + i * 10 * MS + int(rng.uniform(-2, 2) * MS)
+        stream += [(LEFT, stamp, angle(stamp)), (RIGHT, stamp + int(rng.uniform(0, 1) * MS), angle(stamp, 0.95))]
+    _, estimates, residuals = feed(stream)
+    assert estimates.size == 600
+    assert residuals.size == 0
+    _, clean, _ = feed([m for m in messages() if m[0] in (LEFT, RIGHT)])
+    assert np.sqrt(np.mean((estimates["total"] - clean["total"]) ** 2)) < 0.01 * np.abs(clean["total"]).max()
+
+
+def test_duplicates_and_backward_stamps_are_rejected_and_change_nothing() -> None:
+    stream = messages()
+    _, clean, _ = feed(stream)
+    dirty: list[Message] = []
+    for i, m in enumerate(stream):
+        dirty.append(m)
+        if i % 50 == 10:
+            dirty.append(m)
+        if i % 50 == 30:
+            dirty.append((m[0], m[1] - 15 * MS, m[2] + 0.01))
+    estimator, estimates, _ = feed(dirty)
+    for a, b in zip(drop_message(estimates), drop_message(clean), strict=True):
+        np.testing.assert_array_equal(a, b)
+    counts = rejected(estimator)
+    assert sum(row.get("duplicate", 0) for row in counts.values()) == sum(i % 50 == 10 for i in range(len(stream)))
+    assert sum(row.get("backward", 0) for row in counts.values()) >= len(stream) // 50 - 7
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"), [(math.nan, "not_finite"), (math.inf, "not_finite"), (40.0, "absurd"), (1.5, "spike")]
+)
+def test_single_bad_angles_are_rejected(value: float, reason: str) -> None:
+    stream = messages()
+    k = next(i for i, m in enumerate(stream) if m[0] == LEFT and m[1] >= T0 + 2000 * MS)
+    stream[k] = (LEFT, stream[k][1], value)
+    estimator, estimates, _ = feed(stream)
+    assert rejected(estimator) == {"angle/left": {reason: 1}, "angle/right": {"unpaired": 1}}
+    assert estimates.size == 599
+    _, clean, _ = feed(messages())
+    assert abs(estimates["total"][-1] - clean["total"][-1]) < 5.0
+
+
+def test_bad_pressures_and_air_are_rejected() -> None:
+    stream = messages()
+    extra = [
+        (MAIN_A, T0 + 2003 * MS, math.nan),
+        (MAIN_B, T0 + 2003 * MS, 1e12),
+        (AIR, T0 + 2003 * MS, 400.0),
+        (AUX_A, 0, 5e6),
+    ]
+    estimator, _, residuals = feed(sorted(stream + extra, key=lambda m: m[1] or T0 + 2003 * MS))
+    assert rejected(estimator) == {
+        "pressure/main_a": {"not_finite": 1},
+        "pressure/main_b": {"absurd": 1},
+        "air_temperature": {"absurd": 1},
+        "pressure/aux_a": {"zero_stamp": 1},
+    }
+    _, _, clean = feed(stream)
+    np.testing.assert_array_equal(residuals["residual"], clean["residual"])
+
+
+def test_a_true_step_of_the_angle_is_believed_when_confirmed() -> None:
+    stream = [(k, s, v + (1.0 if s >= T0 + 3000 * MS and k <= RIGHT else 0.0)) for k, s, v in messages()]
+    estimator, estimates, _ = feed(stream)
+    assert rejected(estimator)["angle/left"] == {"spike": 1}
+    assert estimates.size == 599
+    assert estimates["theta"][-1, 0] > 0.5
+
+
+@pytest.mark.parametrize("channel", [LEFT, MAIN_A])
+def test_a_single_absurd_stamp_far_ahead_does_not_lock_out(channel: int) -> None:
+    stream = messages()
+    k = next(i for i, m in enumerate(stream) if m[0] == channel and m[1] >= T0 + 2000 * MS)
+    stream.insert(k, (channel, T0 + 10**9 * 10**9, stream[k][2]))
+    estimator, estimates, residuals = feed(stream)
+    assert list(rejected(estimator).values()) == [{"time_jump": 1}]
+    assert estimates.size == 600
+    assert residuals.size >= 595
+
+
+def test_jump_back_in_time_starts_anew_once_confirmed() -> None:
+    first, again = messages(5.0), messages(5.0)
+    estimator, estimates, residuals = feed(first + again)
+    _, alone, alone_residuals = feed(again)
+    restart = int(np.argmin(np.diff(estimates["stamp_ns"]))) + 1
+    assert estimates["stamp_ns"][restart] < T0 + 50 * MS
+    # One message of each side was spent on the confirmation.
+    lost = alone.size - (estimates.size - restart)
+    assert 1 <= lost <= 2
+    assert abs(estimates["torque"][restart - 1, 0]) > 5000.0
+    assert abs(estimates["torque"][restart, 0]) < 50.0  # bristles relaxed again
+    np.testing.assert_allclose(estimates["total"][-1], alone["total"][-1], rtol=5e-3)
+    assert np.all(np.diff(residuals["stamp_ns"][-alone_residuals.size + 10 :]) > 0)
+    assert rejected(estimator)["angle/left"]["time_jump"] == 1
+
+
+def test_gap_is_counted_and_no_residual_is_interpolated_across_it() -> None:
+    stream = [m for m in messages() if not (m[0] == MAIN_A and T0 + 2000 * MS < m[1] < T0 + 3000 * MS)]
+    estimator, estimates, residuals = feed(stream)
+    assert estimates.size == 600
+    assert rejected(estimator) == {"pressure/main_a": {"gap": 1}}
+    inside = (residuals["stamp_ns"] > T0 + 2010 * MS) & (residuals["stamp_ns"] < T0 + 2980 * MS)
+    assert not inside.any()
+    assert residuals["stamp_ns"].max() > T0 + 5900 * MS
+
+
+def test_late_line_and_missing_line() -> None:
+    late = [m for m in messages() if not (m[0] == AUX_B and m[1] < T0 + 3000 * MS)]
+    _, estimates, residuals = feed(late)
+    assert estimates.size == 600
+    assert residuals["stamp_ns"].min() >= T0 + 3000 * MS - 25 * MS
+    assert residuals.size > 250
+    missing = [m for m in messages() if m[0] != AUX_B]
+    _, estimates, residuals = feed(missing)
+    assert estimates.size == 600
+    assert residuals.size == 0
+
+
+def test_missing_side_gives_no_torque_and_is_told() -> None:
+    estimator, estimates, _ = feed([m for m in messages() if m[0] != RIGHT])
+    assert estimates.size == 0
+    assert estimator.latest_ns["angle/right"] == 0
+    assert rejected(estimator)["angle/left"]["unpaired"] > 500
+
+
+def test_absolute_pressure_reference_is_removed() -> None:
+    absolute = VEHICLE.replace(sensors=dataclasses.replace(VEHICLE.sensors, pressure_reference="absolute"))
+    raised = [(k, s, v + (101_325.0 if MAIN_A <= k <= AUX_B else 0.0)) for k, s, v in messages()]
+    _, _, gauge = feed(messages())
+    _, _, shifted = feed(raised, absolute)
+    np.testing.assert_allclose(shifted["measured_torque"], gauge["measured_torque"], rtol=1e-9, atol=1e-5)
+
+
+def test_single_side_with_torque_sensor() -> None:
+    one = VEHICLE.replace(sides=("left",), hydraulics=None, torque_sensor=TorqueSensor())
+    stream: list[Message] = []
+    for i in range(300):
+        stamp = T0 + i * 10 * MS
+        stream += [(0, stamp, angle(stamp)), (1, stamp + 4 * MS, 100.0 + i)]
+    _, estimates, residuals = feed(stream, one)
+    assert estimates.size == 300
+    k = 100
+    r = residuals[k]
+    i = (r["stamp_ns"] - T0) // (10 * MS)
+    assert r["measured_torque"] == pytest.approx(100.0 + i - 0.4)
+    assert r["residual"] == pytest.approx(r["measured_torque"] - estimates["total"][i])
+
+
+def test_air_temperature_is_taken_over() -> None:
+    cold = [(k, s, -20.0 if k == AIR else v) for k, s, v in messages()]
+    _, estimates, _ = feed(cold)
+    _, mild, _ = feed(messages())
+    assert np.all(estimates["temperature"][-1] < mild["temperature"][-1])
+
+
+def test_snapshot_and_restore() -> None:
+    stream = messages(4.0)
+    estimator = Estimator(VEHICLE)
+    for m in stream[:1000]:
+        estimator.push(*m)
+    saved = estimator.snapshot()
+    first = [float(e["total"][0]) for m in stream[1000:] for e, _ in [estimator.push(*m)] if e.size]
+    estimator.restore(saved)
+    second = [float(e["total"][0]) for m in stream[1000:] for e, _ in [estimator.push(*m)] if e.size]
+    assert first == second
+    fresh = Estimator(VEHICLE)
+    fresh.restore(saved)
+    assert [float(e["total"][0]) for m in stream[1000:] for e, _ in [fresh.push(*m)] if e.size] == first
+
+
+def test_feed_forward_without_a_horizon_is_the_torque_and_ahead_leads_it() -> None:
+    _, now, _ = feed(messages())
+    np.testing.assert_array_equal(now["feed_forward"], now["torque"])
+    _, ahead, _ = feed(messages(), options=Options(feed_forward_horizon_s=0.1))
+    lead = np.sqrt(np.mean((ahead["feed_forward"][100:-10, 0] - now["torque"][110:, 0]) ** 2))
+    assert lead < np.sqrt(np.mean((now["torque"][100:-10, 0] - now["torque"][110:, 0]) ** 2))
