@@ -11,8 +11,8 @@ import sys
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit code (0; 2 for bad parameters or a bad vehicle file)."""
-    # Set before the heavy imports. Until the node spins there is nothing to tidy up, and an exception raised by a handler
-    # may be swallowed (compiler callbacks) or turn the exit code into the signal's (CPython, inside exec).
+    # Set before the heavy imports. Until the node spins there is nothing to tidy up, and an exception raised by a
+    # handler may be swallowed (compiler callbacks) or turn the exit code into the signal's (CPython, inside exec).
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: os._exit(0))
     from lugre_steering.live.run import run

@@ -47,7 +47,6 @@ def serve(vehicle_file: str, executor: str, size: int, results: Connection) -> N
     import gc
 
     import rclpy
-
     from rclpy.signals import SignalHandlerOptions
 
     from lugre_steering.live.estimator_node import SteeringTorqueEstimator

@@ -18,6 +18,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import FluidPressure, JointState, Temperature
 from trajectory_msgs.msg import JointTrajectory
 
+from lugre_steering.ackermann import other_track
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options
@@ -117,6 +118,8 @@ class SteeringTorqueEstimator(Node):
                 carried = True
                 angle = position[i] if i < len(position) else math.nan
                 rate = velocity[i] if i < len(velocity) else math.nan
+                if ratio := self.vehicle.channels[channel].ackermann:
+                    angle, rate = map(float, other_track(np.array(angle), np.array(rate), ratio))
                 self._push(channel, stamp_ns, angle, rate)
             if not carried:
                 self.health.unused[f"{topic} without a wanted joint"] += 1

@@ -53,6 +53,7 @@ def test_stale_pressures_stop_the_residual_and_a_missing_angle_the_torque() -> N
         torque, residual = world.heard["torque"], world.heard["residual"]
         world.play(whole)
         world.wait(lambda: len(torque) == 100)
+        time.sleep(0.3)
         assert 90 < len(residual) <= 100
         formed = len(residual)
 
@@ -149,7 +150,10 @@ def test_an_exception_in_a_callback_withholds_the_torque_and_passes(tmp_path: Pa
 
 def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> None:
     vehicle = load(VEHICLE)
-    with LiveNode("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5"), World(vehicle) as world:
+    with (
+        LiveNode("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.8", "-p", "angle_timeout_s:=0.6"),
+        World(vehicle) as world,
+    ):
         commands = world.heard["feed_forward/commands"]
 
         def steer(seconds: float, value: float, age_ns: int = 0) -> None:
@@ -175,12 +179,12 @@ def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> 
         assert list(commands[120].data) == last
         assert abs(wanted[0][0] - last[0]) > 500.0  # or this test would show nothing
         steps = [abs(b.data[0] - a.data[0]) for a, b in itertools.pairwise(commands)]
-        assert max(steps) < 0.2 * abs(wanted[0][0] - last[0])
+        assert max(steps) < 0.3 * abs(wanted[0][0] - last[0])
         assert list(commands[-1].data) == wanted[-1]
 
         n_torque = len(world.heard["torque"])
-        time.sleep(0.7)
-        steer(0.3, 0.3, age_ns=SECOND // 2)  # half a second old on arrival: an estimate, but nothing to act upon
+        time.sleep(1.2)
+        steer(0.3, 0.3, age_ns=SECOND)  # a second old on arrival: an estimate, but nothing to act upon
         world.wait(lambda: len(world.heard["torque"]) == n_torque + 30)
         assert len(commands) == 220
         _, _, values = world.status("outputs")
