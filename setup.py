@@ -3,6 +3,7 @@
 """ament_python package for ROS 2 and, at the same time, a plain pip package (no ROS needed for offline work)."""
 
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -13,7 +14,7 @@ setup(
     name=PACKAGE,
     version=VERSION,
     description="Steering-torque estimator for rubber-tracked vehicles that finds the physics its model leaves out",
-    long_description=open("README.md", encoding="utf-8").read(),
+    long_description=Path("README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     author="The lugre_steering contributors",
     maintainer="The lugre_steering contributors",
@@ -45,7 +46,18 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "import": ["pyarrow>=14.0"],
         "report": ["matplotlib>=3.6", "plotly>=5.18"],
-        "test": ["pytest>=7.4", "hypothesis>=6.80", "jsonschema>=4.17", "mcap>=1.1", "ruff>=0.6", "mypy>=1.10", "types-PyYAML"],
+        "test": [
+            "pytest>=7.4",
+            "hypothesis>=6.80",
+            "jsonschema>=4.17",
+            "mcap>=1.1",
+            "ruff>=0.6",
+            "mypy>=1.10",
+            "types-PyYAML",
+            "setuptools>=61",
+            "wheel",
+            "colcon-common-extensions",
+        ],
     },
     entry_points={
         "console_scripts": [
