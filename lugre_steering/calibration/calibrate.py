@@ -1,0 +1,417 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``lugre-steering calibrate`` without the command line: recordings in, calibrated vehicle and its uncertainty out.
+
+``calibration.json`` (schema lugre_steering/calibration/1; every number finite, ``null`` where there is none):
+
+==================  ===============================================================================================
+key                 content
+==================  ===============================================================================================
+bags, vehicle       what was used; ``tool_version``, ``date`` (UTC), ``duration_s``, ``priors`` (true or false)
+parameters          list: ``name``, ``key`` in the vehicle file, ``unit``, ``sheet``, ``value``, ``ci95``, relative
+                    standard deviations ``relative_sd`` and (sheet) ``prior_relative_sd``, ``at_bound`` (null, low,
+                    high), ``prior_dominated`` (the data add little to the sheet), ``advice`` (helpful manoeuvre)
+covariance          ``names`` and ``matrix`` of the fitted values (logarithms of factors on the sheet; static_ratio:
+                    added to static over sliding friction)
+rmse_Nm             of ``sheet`` and ``calibrated`` vehicle on all samples, and the ``noise_floor`` to compare with
+heldout_rmse_Nm     of ``sheet`` and ``calibrated`` on stretches that this extra fit did not see
+undetermined        combinations that the data leave open: ``parts``, ``data_over_sheet``, ``statement``
+assumed             sheet values taken as exact: relative change of each parameter per relative error of it
+data_quality        findings of the reader and of the preparation, per bag
+statement           one paragraph
+==================  ===============================================================================================
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lugre_steering import __version__
+from lugre_steering.bag import read_recording
+from lugre_steering.calibration.estimate import EVALUATIONS, Effects, Estimate, estimate
+from lugre_steering.calibration.identify import Assumed, Combination, identifiability
+from lugre_steering.diagnosis.apply import apply_calibration
+from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.problem import (
+    GAIN,
+    KINGPIN,
+    STATIC,
+    Calibration,
+    Candidate,
+    Problem,
+    calibrations_for,
+    fit,
+)
+from lugre_steering.diagnosis.split import split
+from lugre_steering.effects.catalogue import effect as catalogue_entry
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Array, Recording
+from lugre_steering.vehicle import Vehicle, load, save
+
+SCHEMA = "lugre_steering/calibration/1"
+SHORTEST_S = 10.0
+SLIDING = 3.0
+"""Turns must reach this many presliding lengths, or friction never slides."""
+PRIOR_DOMINATED = 0.5
+"""Posterior over prior standard deviation above which a value is the sheet's rather than the data's."""
+MISFIT = 1.5
+"""Residual over noise floor above which the model misses something."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of the vehicle file: how to read it and which calibration value decides about it."""
+
+    calibration: str
+    key: str
+    unit: str
+    read: Callable[[Vehicle], float | None]
+
+
+def _of(section: str, name: str) -> Callable[[Vehicle], float | None]:
+    return lambda vehicle: getattr(getattr(vehicle, section), name, None)
+
+
+KEYS = tuple(
+    Key(calibration, f"{section}.{name}", unit, _of(section, name))
+    for calibration, section, name, unit in (
+        ("friction_level", "friction", "coulomb", "1"),
+        ("static_ratio", "friction", "static", "1"),
+        ("stiffness", "friction", "stiffness_Nm_per_deg", "N m/deg"),
+        ("stribeck_speed", "friction", "stribeck_speed_deg_s", "deg/s"),
+        ("friction_level", "contact", "coulomb_torque_Nm", "N m"),
+        ("static_ratio", "contact", "static_torque_Nm", "N m"),
+        ("stiffness", "contact", "stiffness_Nm_per_deg", "N m/deg"),
+        ("stribeck_speed", "contact", "stribeck_speed_deg_s", "deg/s"),
+        ("heat_capacity", "rubber", "specific_heat_J_kgK", "J/(kg K)"),
+        ("cooling", "rubber", "heat_transfer_W_m2K", "W/(m2 K)"),
+        ("kingpin_arm", "axle", "kingpin_lever_arm_m", "m"),
+        ("pressure_gain", "sensors", "pressure_gain", "1"),
+    )
+)
+
+ADVICE = {
+    "friction_level": "varied-rates",
+    "static_ratio": "slow-sweeps",
+    "stiffness": "small-loops",
+    "stribeck_speed": "slow-sweeps",
+    "heat_capacity": "heat-and-rest",
+    "cooling": "heat-and-rest",
+    "kingpin_arm": "heat-and-rest",
+    "pressure_gain": "a run against a known torque",
+}
+"""Manoeuvre (see ``lugre-steering simulate --list``) that determines each parameter best."""
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """Everything a report needs: the fit, the new vehicle, and ``result`` as written to calibration.json."""
+
+    problem: Problem
+    estimate: Estimate
+    vehicle: Vehicle
+    result: dict[str, Any]
+
+
+def calibrate(
+    bags: Sequence[Path],
+    vehicle_file: Path,
+    out: Path,
+    *,
+    free: Sequence[str] = (),
+    fix: Sequence[str] = (),
+    prior: Mapping[str, float] | None = None,
+    priors: bool = True,
+    progress: Progress = lambda _: None,
+) -> dict[str, Any]:
+    """Fit the vehicle file to the bags; write calibrated.yaml, calibration.json and calibration.png into ``out``.
+
+    Returns the content of calibration.json. ``free`` adds ``kingpin_arm`` or ``pressure_gain`` to the fitted values,
+    ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
+    """
+    vehicle = load(vehicle_file)
+    recordings = []
+    for bag in bags:
+        progress(f"reading {bag}")
+        recordings.append(read_recording(bag, vehicle.channels))
+    calibrations = chosen(vehicle, free, fix, prior or {})
+    done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
+    result = {
+        "schema": SCHEMA,
+        "tool_version": __version__,
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "bags": [str(bag) for bag in bags],
+        "vehicle": str(vehicle_file),
+        **done.result,
+    }
+    progress("writing")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        save(with_provenance(done.vehicle, result), out / "calibrated.yaml")
+        result["picture"], result["picture_note"] = _picture(done, out / "calibration.png")
+        text = json.dumps(result, indent=2, allow_nan=False)
+        (out / "calibration.json").write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
+    return result
+
+
+def chosen(
+    vehicle: Vehicle, free: Sequence[str] = (), fix: Sequence[str] = (), prior: Mapping[str, float] | None = None
+) -> tuple[Calibration, ...]:
+    """The values to fit: the standard set, plus ``free``, minus ``fix``, with ``prior`` in place of the sheet's."""
+    optional = [KINGPIN] if vehicle.axle is not None and vehicle.axle.kingpin_lever_arm_m != 0.0 else []
+    if vehicle.hydraulics is not None:
+        optional.append(GAIN)
+    known = {calibration.name: calibration for calibration in (*calibrations_for(vehicle), *optional)}
+    for option, names in (("--free", free), ("--fix", fix), ("--prior", list(prior or {}))):
+        for name in names:
+            if name not in known:
+                raise DataError(f"{option} {name}: this vehicle has no such parameter; expected {', '.join(known)}")
+    standard = {calibration.name for calibration in calibrations_for(vehicle)}
+    if vehicle.rubber is not None and vehicle.rubber.heat_transfer_W_m2K == 0.0:
+        standard.discard("cooling")
+    wanted = [c for c in known.values() if (c.name in standard or c.name in free) and c.name not in fix]
+    if not wanted:
+        raise DataError("--fix: keeps every parameter at the sheet, expected at least one to fit")
+    changed = []
+    for calibration in wanted:
+        width = (prior or {}).get(calibration.name, calibration.prior)
+        if not 0.0 < width <= 1.0:
+            raise DataError(f"--prior {calibration.name}: got {width:g}, expected a relative deviation above 0 up to 1")
+        low = calibration.low
+        if calibration.name == STATIC.name:
+            low = max(low, 1.0 - _static_ratio(vehicle))  # static friction stays at or above the sliding one
+        changed.append(replace(calibration, prior=width, low=low))
+    return tuple(changed)
+
+
+def calibrate_recordings(
+    recordings: Sequence[Recording],
+    vehicle: Vehicle,
+    calibrations: Sequence[Calibration] | None = None,
+    *,
+    priors: bool = True,
+    progress: Progress = lambda _: None,
+) -> Calibrated:
+    """Fit ``vehicle`` to recordings in memory. Raises ``DataError`` when they cannot determine anything."""
+    progress("preparing")
+    runs = [prepare(recording, vehicle) for recording in recordings]
+    problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)
+    check_motion(problem)
+    effects = standing_effects(vehicle)
+    progress("fitting")
+    result = estimate(problem, effects, priors=priors)
+    progress("judging on held-out stretches")
+    held = heldout_rmse(problem, result, effects, priors)
+    progress("what the data cannot tell")
+    weak, assumed = identifiability(problem, result, effects)
+    fitted = _rounded(apply_calibration(vehicle, problem, result.x))
+    rows = parameter_rows(problem, result, fitted, priors)
+    used = result.weight > 0.0
+    rmse = {
+        "sheet": _rms((problem.measured - problem.predict_all(problem.start(), effects))[used]),
+        "calibrated": _rms(result.residual[used]),
+        "noise_floor": result.noise_floor,
+    }
+    names = [calibration.name for calibration in problem.calibrations]
+    found = [{"bag": recording.name, **asdict(finding)} for recording in recordings for finding in recording.findings]
+    return Calibrated(problem, result, fitted, {
+        "priors": priors,
+        "duration_s": sum(float(run.time[-1] - run.time[0]) for run in runs),
+        "parameters": rows,
+        "covariance": {"names": names, "matrix": result.covariance[: len(names), : len(names)].tolist()},
+        "rmse_Nm": rmse,
+        "heldout_rmse_Nm": held,
+        "undetermined": [asdict(combination) for combination in weak],
+        "assumed": [asdict(value) for value in assumed],
+        "data_quality": found,
+        "statement": statement(rows, rmse, held, weak, assumed),
+    })  # fmt: skip
+
+
+def check_motion(problem: Problem) -> None:
+    """Refuse recordings that hold no friction to fit, with the manoeuvre that would."""
+    duration = sum(float(run.time[-1] - run.time[0]) for run in problem.runs)
+    names = ", ".join(run.name for run in problem.runs)
+    if duration < SHORTEST_S:
+        raise DataError(
+            f"{names}: {duration:.1f} s in all, expected at least {SHORTEST_S:g} s; "
+            "drive 'varied-rates' (see lugre-steering simulate --list)"
+        )
+    travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs)
+    needed = SLIDING * problem.presliding
+    if travel < needed:
+        unit = problem.vehicle.coordinate.unit
+        far, least = (f"{math.degrees(v):.3g} deg" if unit == "rad" else f"{v:.3g} {unit}" for v in (travel, needed))
+        raise DataError(
+            f"{names}: turns {far} at most, expected at least {least}, below which friction does not slide; "
+            "drive 'varied-rates' (see lugre-steering simulate --list)"
+        )
+
+
+def standing_effects(vehicle: Vehicle) -> list[tuple[Candidate, dict[str, float]]]:
+    """Effects that the vehicle file already has, at their values: sensor effects act on the prediction too."""
+    found: list[tuple[Candidate, dict[str, float]]] = []
+    for entry in vehicle.effects:
+        effect = catalogue_entry(entry.id)
+        if effect.per_line:
+            name = effect.parameters[0].name
+            found += [(Candidate(effect, line=line), {name: value}) for line, value in entry.parameters.items()]
+        else:
+            found.append((Candidate(effect), dict(entry.parameters)))
+    return found
+
+
+def heldout_rmse(problem: Problem, result: Estimate, effects: Effects, priors: bool) -> dict[str, float | None]:
+    """RMSE [N m] of sheet and calibrated vehicle on held-out stretches that a fit of its own did not see."""
+    parts = split(problem)
+    if not parts.held.any() or not parts.fit.any():
+        return {"sheet": None, "calibrated": None}
+    weight = np.where(parts.fit, result.weight, 0.0)
+    other = fit(problem, weight, effects, result.x, evaluations=EVALUATIONS, robust=True, priors=priors)
+    sheet = problem.predict_all(problem.start(), effects)
+    return {
+        "sheet": _rms((problem.measured - sheet)[parts.held]),
+        "calibrated": _rms((problem.measured - other.prediction)[parts.held]),
+    }
+
+
+def parameter_rows(problem: Problem, result: Estimate, fitted: Vehicle, priors: bool) -> list[dict[str, Any]]:
+    """One row per vehicle-file key that the fit decided about."""
+    names = [calibration.name for calibration in problem.calibrations]
+    spread = np.sqrt(np.diag(result.covariance))
+    low, high = problem.bounds()
+    prior = problem.scales()[: len(names)]
+    rows = []
+    for key in KEYS:
+        sheet, value = key.read(problem.vehicle), key.read(fitted)
+        if key.calibration not in names or sheet is None or value is None:
+            continue
+        i = names.index(key.calibration)
+        gradient = _log_gradient(problem, result.x, key)
+        deviation = float(np.sqrt(gradient @ result.covariance @ gradient))
+        reach = math.exp(min(result.quantile * deviation, 20.0))
+        edge = 0.01 * (high[i] - low[i])
+        at_bound = "low" if result.x[i] < low[i] + edge else "high" if result.x[i] > high[i] - edge else None
+        dominated = bool(spread[i] > PRIOR_DOMINATED * problem.calibrations[i].prior)
+        rows.append({
+            "name": key.calibration,
+            "key": key.key,
+            "unit": key.unit,
+            "sheet": sheet,
+            "value": value,
+            "ci95": sorted((value / reach, value * reach)),
+            "relative_sd": deviation,
+            "prior_relative_sd": float(np.linalg.norm(gradient[: len(names)] * prior)) if priors else None,
+            "at_bound": at_bound,
+            "prior_dominated": dominated,
+            "advice": ADVICE[key.calibration] if dominated or at_bound else None,
+        })  # fmt: skip
+    return rows
+
+
+def _log_gradient(problem: Problem, x: Array, key: Key) -> Array:
+    """Derivative of the logarithm of a key's value by each fitted value (p,)."""
+    gradient = np.zeros(x.size)
+    for i in range(len(problem.calibrations)):
+        ends = []
+        for step in (-1e-4, 1e-4):
+            moved = x.copy()
+            moved[i] += step
+            ends.append(key.read(apply_calibration(problem.vehicle, problem, moved)) or 1.0)
+        gradient[i] = math.log(ends[1] / ends[0]) / 2e-4
+    return gradient
+
+
+def statement(
+    rows: Sequence[Mapping[str, Any]],
+    rmse: Mapping[str, float],
+    held: Mapping[str, float | None],
+    weak: Sequence[Combination],
+    assumed: Sequence[Assumed],
+) -> str:
+    """What an engineer should know, in one paragraph."""
+    before, after = held["sheet"], held["calibrated"]
+    text = []
+    if before is not None and after is not None:
+        text.append(f"Torque error on held-out stretches: {after:.0f} N m; with the sheet it was {before:.0f} N m.")
+    if rmse["calibrated"] > MISFIT * rmse["noise_floor"]:
+        text.append(
+            f"The residual ({rmse['calibrated']:.0f} N m) is above the noise ({rmse['noise_floor']:.0f} N m): physics "
+            "beyond the baseline; run diagnose before trusting these values."
+        )
+    for row in rows:
+        if row["at_bound"]:
+            text.append(f"{row['key']} stopped at the {row['at_bound']} end of its range.")
+        if row["prior_dominated"]:
+            text.append(f"{row['key']} is hardly determined by these recordings; drive '{row['advice']}'.")
+    said = {row["name"] for row in rows if row["prior_dominated"]}
+    text += [f"{c.statement[0].upper()}{c.statement[1:]}." for c in weak if not set(c.parts) <= said]
+    for value in assumed:
+        name = max(value.shifts, key=lambda n: abs(value.shifts[n]) if n not in said else 0.0)
+        text.append(
+            f"Intervals take the sheet's {value.name.replace('_', ' ')} as exact: 1 % of it would move "
+            f"{name.replace('_', ' ')} by {value.shifts[name]:+.2g} %."
+        )
+    return " ".join(text)
+
+
+def with_provenance(vehicle: Vehicle, result: Mapping[str, Any]) -> Vehicle:
+    """The vehicle with a note of how its values came about."""
+    note = {
+        "tool": f"lugre_steering {result['tool_version']} calibrate",
+        "date": result["date"],
+        "data": result["bags"],
+        "sheet": result["vehicle"],
+        "heldout_rmse_Nm": dict(result["heldout_rmse_Nm"]),
+        "ci95": {row["key"]: row["ci95"] for row in result["parameters"]},
+        "sheet_values": {row["key"]: row["sheet"] for row in result["parameters"]},
+    }
+    return vehicle.replace(provenance={**vehicle.provenance, "calibration": note})
+
+
+def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
+    if importlib.util.find_spec("matplotlib") is None:
+        file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
+        return None, "no picture: matplotlib is not installed (pip install 'lugre_steering[report]')"
+    from lugre_steering.report.calibration_figure import draw_calibration
+
+    draw_calibration(done, file)
+    return str(file), None
+
+
+def _rounded(vehicle: Vehicle) -> Vehicle:
+    """Fitted keys to seven digits: readable, and far below any uncertainty."""
+    sections: dict[str, Any] = {}
+    for key in KEYS:
+        value = key.read(vehicle)
+        section, name = key.key.split(".")
+        if value is not None:
+            old = sections.get(section, getattr(vehicle, section))
+            sections[section] = replace(old, **{name: float(f"{value:.7g}")})
+    return vehicle.replace(**sections)
+
+
+def _static_ratio(vehicle: Vehicle) -> float:
+    if vehicle.contact is not None:
+        return vehicle.contact.static_torque_Nm / vehicle.contact.coulomb_torque_Nm
+    assert vehicle.friction is not None
+    assert vehicle.friction.static is not None
+    assert vehicle.friction.coulomb is not None
+    return vehicle.friction.static / vehicle.friction.coulomb
+
+
+def _rms(error: Array) -> float:
+    return float(np.sqrt(np.mean(error**2)))
