@@ -39,12 +39,17 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Channel:
-    """One wanted quantity and the topic (relative name) that carries it; ``joint`` selects inside a JointState."""
+    """One wanted quantity and the topic (relative name) that carries it; ``joint`` selects inside a JointState.
+
+    With ``ackermann`` (signed kingpin distance over wheelbase) the topic carries the other track, and this one's angle
+    follows from the steering geometry.
+    """
 
     kind: Kind
     name: str
     topic: str
     joint: str = ""
+    ackermann: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -180,7 +180,10 @@ class TorqueSensor:
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the data sheets say; noise as one standard deviation."""
+    """What the data sheets say; noise as one standard deviation.
+
+    ``angle_from`` names the only side with an angle sensor; the other side then follows from Ackermann geometry.
+    """
 
     angle_resolution_deg: float = quantity(0.0, 10.0, default=0.0)
     angle_noise_deg: float = quantity(0.0, 10.0, default=0.01)
@@ -188,6 +191,7 @@ class Sensors:
     pressure_range_Pa: float = positive(1e9, default=40.0e6)
     pressure_noise_Pa: float = quantity(0.0, 1e8, default=1.5e4)
     pressure_gain: float = quantity(0.5, 2.0, default=1.0)
+    angle_from: str | None = None
 
 
 @dataclass(frozen=True)
@@ -252,10 +256,7 @@ class Vehicle:
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """Every input this vehicle listens to, in the order the compiled loop numbers them."""
-        found = [
-            Channel(Kind.ANGLE, side, getattr(self.topics, side), getattr(self.topics, f"{side}_joint"))
-            for side in self.sides
-        ]
+        found = [self._angle_channel(side) for side in self.sides]
         if self.hydraulics is not None:
             found += [
                 Channel(Kind.PRESSURE, line, self.topics.pressure_prefix + line) for line in self.hydraulics.lines
@@ -264,6 +265,13 @@ class Vehicle:
             found.append(Channel(Kind.TORQUE, "torque", self.torque_sensor.topic))
         found.append(Channel(Kind.AIR_TEMPERATURE, "air", self.topics.ambient_temperature))
         return tuple(found)
+
+    def _angle_channel(self, side: str) -> Channel:
+        sensor, ratio = self.sensors.angle_from or side, 0.0
+        if sensor != side:
+            assert self.axle is not None  # checked when the file was read
+            ratio = self.axle.kingpin_distance_m / self.axle.wheelbase_m * (1.0 if sensor == "left" else -1.0)
+        return Channel(Kind.ANGLE, side, getattr(self.topics, sensor), getattr(self.topics, f"{sensor}_joint"), ratio)
 
     def replace(self, **changes: Any) -> Vehicle:
         """A copy with some sections changed."""
@@ -389,6 +397,11 @@ def _check(vehicle: Vehicle, reader: Reader) -> None:
     if law is not None and law.temperature_law not in ("loss_over_modulus", "loss_tangent", "loss_modulus"):
         key = "friction" if vehicle.friction else "contact"
         raise fail(f"{key}.temperature_law", law.temperature_law, "loss_over_modulus, loss_tangent or loss_modulus")
+    if vehicle.sensors.angle_from is not None and (
+        vehicle.sensors.angle_from not in vehicle.sides or len(vehicle.sides) < 2 or vehicle.axle is None
+    ):
+        expected = "left or right, for a vehicle with both sides and an axle (Ackermann geometry)"
+        raise fail("sensors.angle_from", vehicle.sensors.angle_from, expected)
     if vehicle.sensors.pressure_reference not in ("gauge", "absolute"):
         raise fail("sensors.pressure_reference", vehicle.sensors.pressure_reference, "gauge or absolute")
     if vehicle.hydraulics is not None:

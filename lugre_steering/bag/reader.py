@@ -18,6 +18,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from lugre_steering.ackermann import other_track
 from lugre_steering.bag import cdr, mcap, sqlite
 from lugre_steering.bag.compression import ZSTD_MAGIC, expand_file
 from lugre_steering.bag.messages import Connection, Messages, inflated, merged, windows
@@ -208,15 +209,11 @@ class Bag:
                     self.malformed[self.connections[k].topic] += bad
                 for j, i in enumerate(wanted):
                     use = decoded.valid & decoded.carried[j]
-                    rows.append(
-                        (
-                            alike[use],
-                            np.full(int(use.sum()), i, np.int32),
-                            decoded.stamp_ns[use],
-                            decoded.value[j, use],
-                            decoded.rate[j, use],
-                        )
-                    )
+                    value, rate = decoded.value[j, use], decoded.rate[j, use]
+                    if channels[i].ackermann != 0.0:
+                        value, rate = other_track(value, rate, channels[i].ackermann)
+                    number = np.full(value.size, i, np.int32)
+                    rows.append((alike[use], number, decoded.stamp_ns[use], value, rate))
         if not rows:
             none = np.empty(0, np.int64)
             empty = none.astype(np.float64)

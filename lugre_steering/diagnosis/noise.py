@@ -109,7 +109,9 @@ def noise_model(
         base = problem.predict(bag, x, effects)
         errors = np.empty((draws, run.time.size))
         for i in range(draws):
-            noisy = run.theta + sheet * rng.standard_normal(run.theta.shape)
+            # One sensor for both tracks makes one error.
+            sensors = 1 if problem.vehicle.sensors.angle_from else len(run.theta)
+            noisy = run.theta + sheet * rng.standard_normal((sensors, run.time.size))
             theta = np.array([smooth_angle(row, sheet) for row in noisy])
             omega, alpha = motion(run.time, theta)
             errors[i] = problem.predict(bag, x, effects, replace(run, theta=theta, omega=omega, alpha=alpha)) - base

@@ -49,6 +49,8 @@ def simulate(vehicle: Vehicle, motion: Motion, sensing: Sensing) -> Simulated:
     rng = np.random.default_rng(sensing.seed)
     signals: dict[Channel, Signal] = {}
     for channel in vehicle.channels:
+        if channel.ackermann != 0.0:
+            continue  # this track has no sensor of its own
         if channel.kind is Kind.ANGLE:
             theta = motion.theta[vehicle.sides.index(channel.name)]
             signals[channel] = sense_angle(motion.time, theta, sensing, rng)

@@ -87,7 +87,7 @@ def _truth(run: Simulated) -> list[_Topic]:
 
     torque = seen(truth.torque[None, :])[:, 0]
     state = (truth.motion.theta, truth.motion.rate, truth.tracks["torque"])
-    joints = [channel.joint for channel in angles]
+    joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
     topics: list[_Topic] = [
         (f"{TRUTH}/torque", cdr.WRENCH_STAMPED, stamp, cdr.encode_wrench(stamp, FRAME, torque)),
         (f"{TRUTH}/state", cdr.JOINT_STATE, stamp, cdr.encode_joint_state(stamp, FRAME, joints, *map(seen, state))),
