@@ -53,6 +53,16 @@ def progress_bar() -> Iterator[Callable[[str, int, int | None], None]]:
         yield show
 
 
+@contextmanager
+def spinner() -> Iterator[Callable[[str], None]]:
+    """One line that says what is being done, on a terminal only: call it with each new text."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    with console().status("") as status:
+        yield lambda text: status.update(text)
+
+
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
     print(json.dumps(result, indent=2, allow_nan=False))
@@ -170,6 +180,44 @@ def import_(
 
     result = import_table(table, map_file, out, storage)
     print_json(result) if as_json else show_import(Console(), result)
+
+
+@command
+def calibrate(
+    bags: Bags,
+    vehicle: VehicleFile,
+    out: OutFolder,
+    free: Annotated[list[str] | None, typer.Option(help="also fit kingpin_arm or pressure_gain; repeatable")] = None,
+    fix: Annotated[list[str] | None, typer.Option(help="keep this parameter at the sheet; repeatable")] = None,
+    prior: Annotated[
+        list[str] | None, typer.Option(help="NAME=SHARE: relative standard deviation of the sheet [0.15]; repeatable")
+    ] = None,
+    no_prior: Annotated[bool, typer.Option("--no-prior", help="let the data alone decide")] = False,
+    as_json: Json = False,
+) -> None:
+    """Fit the baseline parameters that a vehicle sheet may have wrong, all bags together: a vehicle file, intervals,
+    and what the data cannot tell."""
+    from lugre_steering.calibration import calibrate as run
+    from lugre_steering.calibration.table import parse_priors, show_calibration
+
+    if no_prior and prior:
+        raise DataError("--no-prior: leaves no use for --prior; expected one of them")
+    with spinner() as progress:
+        result = run(
+            bags,
+            vehicle,
+            out,
+            free=free or (),
+            fix=fix or (),
+            prior=parse_priors(prior or ()),
+            priors=not no_prior,
+            progress=progress,
+        )
+    if as_json:
+        print_json(result)
+    else:
+        show_calibration(Console(), result)
+        print(f"results in {out}")
 
 
 def main() -> None:

@@ -103,7 +103,7 @@ def _weak_directions(names: Sequence[str], sheet: Array, data: Array) -> list[Co
     reduced = reduced - cross @ np.linalg.pinv(data[np.ix_(alone, alone)], hermitian=True) @ cross.T
     for value, vector in zip(*np.linalg.eigh(reduced), strict=True):
         if _weak(value):
-            found.append(_fitted([names[i] for i in rest], sheet[rest] * vector, _ratio(value)))
+            found.append(_fitted([names[int(i)] for i in rest], sheet[rest] * vector, _ratio(value)))
     return found
 
 

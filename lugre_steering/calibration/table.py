@@ -1,0 +1,53 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The result of a calibration on a terminal, and its options as they are typed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from lugre_steering.errors import DataError
+
+
+def parse_priors(texts: Sequence[str]) -> dict[str, float]:
+    """``NAME=SHARE`` options as a mapping."""
+    priors: dict[str, float] = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        try:
+            priors[name] = float(number)
+        except ValueError:
+            raise DataError(f"--prior {text}: expected NAME=SHARE, such as stiffness=0.05") from None
+    return priors
+
+
+def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
+    """Parameters with intervals, what to make of them, and the paragraph."""
+    table = Table(
+        "key", "sheet", "fitted", "95 % interval", "unit", "remark", title="calibration", title_justify="left"
+    )
+    for row in result["parameters"]:
+        low, high = row["ci95"]
+        table.add_row(
+            row["key"],
+            f"{row['sheet']:.5g}",
+            f"{row['value']:.5g}",
+            f"{low:.5g} … {high:.5g}",
+            row["unit"],
+            _remark(row),
+        )
+    console.print(table)
+    console.print(result["statement"], soft_wrap=True)
+    if result["picture_note"]:
+        console.print(result["picture_note"])
+
+
+def _remark(row: Mapping[str, Any]) -> str:
+    remarks = [f"at the {row['at_bound']} bound"] if row["at_bound"] else []
+    if row["prior_dominated"]:
+        remarks.append("hardly determined")
+    return ", ".join(remarks)
