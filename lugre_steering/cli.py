@@ -182,7 +182,7 @@ def import_(
     print_json(result) if as_json else show_import(Console(), result)
 
 
-@command
+@command()
 def calibrate(
     bags: Bags,
     vehicle: VehicleFile,

@@ -31,12 +31,12 @@ def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
         "key", "sheet", "fitted", "95 % interval", "unit", "remark", title="calibration", title_justify="left"
     )
     for row in result["parameters"]:
-        low, high = row["ci95"]
+        interval = " … ".join(f"{end:.5g}" for end in row["ci95"])
         table.add_row(
             row["key"],
             f"{row['sheet']:.5g}",
             f"{row['value']:.5g}",
-            f"{low:.5g} … {high:.5g}",
+            interval,
             row["unit"],
             _remark(row),
         )
