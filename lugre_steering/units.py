@@ -23,7 +23,7 @@ def label(vehicle: Vehicle, unit: str) -> str:
         return unit
     if unit == "kg m2":
         return _MASS.get((coordinate, force), f"{force} s2/{coordinate}")
-    text = re.sub(r"\bN m\b", force, unit)
+    text = re.sub(r"\(N m\)|\bN m\b", force, unit)
     return re.sub(r"\brad(?=\b|\d)", coordinate, text)
 
 

@@ -179,7 +179,7 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         ("[1, 2", "is not valid YAML"),
         ("- 1\n", "expected a mapping"),
     ],
-)  # fmt: skip  # noqa: E501
+)  # fmt: skip
 def test_mistakes_in_the_map_are_named(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(MapFileError, match=message) as error:
         load_map(write(tmp_path, "map.yaml", text))

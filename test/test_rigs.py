@@ -1,0 +1,154 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Fewer instruments and single joints: shipped examples load, simulate, replay and calibrate, and geometry is exact."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from typer.testing import CliRunner
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.ackermann import other_track
+from lugre_steering.bag import read_recording
+from lugre_steering.cli import app
+from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.errors import VehicleFileError
+from lugre_steering.simulate.manoeuvres import BUILT_IN, ackermann, motion_of
+from lugre_steering.simulate.run import Simulated, sensing_of, simulate
+from lugre_steering.simulate.write import write_bag
+from lugre_steering.units import label
+
+CONFIG = Path(__file__).parents[1] / "config"
+EXAMPLES = ("single_joint_example", "linear_axis_example", "one_angle_sensor_example")
+
+
+def test_the_other_track_turns_about_the_same_point() -> None:
+    """Oracle: the turning centre of one track, on the line of the unsteered axle, seen from the other hinge."""
+    length, width = 3.6, 2.1
+    for left in np.radians([-30.0, -5.0, 4.0, 25.0, 31.0]):
+        centre = length / np.tan(left)  # to the left of the left hinge
+        right, _ = other_track(np.array(left), np.array(0.0), width / length)
+        assert float(right) == pytest.approx(np.arctan(length / (centre + width)), abs=1e-12)
+        back, _ = other_track(right, np.array(0.0), -width / length)
+        assert float(back) == pytest.approx(left, abs=1e-12)
+
+
+def test_the_rate_of_the_other_track_is_the_derivative_of_its_angle() -> None:
+    angle = np.linspace(-0.55, 0.55, 23)
+    _, rate = other_track(angle, np.full(angle.size, 0.3), 0.58)
+    ahead, _ = other_track(angle + 0.3e-6, angle, 0.58)
+    behind, _ = other_track(angle - 0.3e-6, angle, 0.58)
+    assert rate == pytest.approx((ahead - behind) / 2e-6, rel=1e-7)
+
+
+def test_angles_that_are_no_numbers_stay_so() -> None:
+    angle, rate = other_track(np.array([np.nan, np.inf, 0.1]), np.array([np.nan, 0.0, np.nan]), 0.5)
+    assert np.isfinite(angle).tolist() == [False, False, True]
+    assert not np.isfinite(rate[[0, 2]]).any()
+
+
+def simulated(name: str, manoeuvre: str = "double-cycle") -> Simulated:
+    vehicle = vehicle_file.load(CONFIG / f"{name}.yaml")
+    return simulate(vehicle, motion_of(BUILT_IN[manoeuvre], vehicle), sensing_of(vehicle))
+
+
+def test_one_angle_sensor_gives_both_angles(tmp_path: Path) -> None:
+    run = simulated("one_angle_sensor_example")
+    write_bag(tmp_path / "bag", run, "test")
+    with AnyReader([tmp_path / "bag"], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        topics = set(reader.topics)
+    assert "/steering/right/joint_state" in topics
+    assert "/steering/left/joint_state" not in topics
+    vehicle = run.vehicle
+    recording = read_recording(tmp_path / "bag", vehicle.channels)
+    truth = ackermann_of(run)
+    sigma = np.radians(np.hypot(vehicle.sensors.angle_noise_deg, vehicle.sensors.angle_resolution_deg / 12**0.5))
+    for side in (0, 1):
+        signal = recording.angle[("left", "right")[side]]
+        error = signal.value - np.interp(signal.time_s, run.truth.motion.time, truth[side])
+        assert np.std(error) < 2.0 * sigma
+    assert prepare(recording, vehicle).theta.shape[0] == 2
+
+
+def ackermann_of(run: Simulated) -> np.ndarray:
+    """Both angles from the mean angle, by the relation of the manoeuvres (not that of the reader)."""
+    axle = run.vehicle.axle
+    assert axle is not None
+    right = run.truth.motion.theta[1]
+    mean = np.arctan(np.tan(right) / (1.0 - 0.5 * axle.kingpin_distance_m / axle.wheelbase_m * np.tan(right)))
+    return ackermann(mean, axle)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_simulate_replay_and_calibrate(tmp_path: Path, name: str) -> None:
+    file = str(CONFIG / f"{name}.yaml")
+    vehicle = vehicle_file.load(file)
+
+    def run(*arguments: str) -> str:
+        result = CliRunner().invoke(app, list(arguments))
+        assert result.exit_code == 0, result.output
+        return result.stdout
+
+    run("simulate", "varied-rates", "--vehicle", file, "--out", str(tmp_path))
+    bag = str(tmp_path / "synthetic_varied_rates")
+    summary = json.loads(run("replay", bag, "--vehicle", file, "--out", str(tmp_path / "r"), "--json"))
+    assert summary["bags"][0]["samples"][f"angle/{vehicle.sides[0]}"]["rejected"] == {}
+    assert summary["overall"]["r2"] > 0.995
+    run("calibrate", bag, "--vehicle", file, "--out", str(tmp_path / "c"), "--json")
+    calibrated = vehicle_file.load(tmp_path / "c" / "calibrated.yaml")
+    level = ("friction", "coulomb") if vehicle.friction else ("contact", "coulomb_torque_Nm")
+    before, after = (getattr(getattr(v, level[0]), level[1]) for v in (vehicle, calibrated))
+    assert after == pytest.approx(before, rel=0.02)  # the recording was made with the sheet's value
+    assert calibrated.sensors.angle_from == vehicle.sensors.angle_from
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("one_angle_sensor_example", {"sensors": {"angle_from": "middle"}}, "sensors.angle_from': got 'middle'"),
+        (
+            "single_joint_example",
+            {"sensors": {"angle_from": "left"}},
+            "sensors.angle_from': got 'left', expected .*axle",
+        ),
+        ("single_joint_example", {"axle": {"load_N": 1.0}}, "key 'axle"),
+        ("single_joint_example", {"torque_sensor": None}, "exactly one of 'hydraulics' and 'torque_sensor'"),
+        ("single_joint_example", {"contact": {"static_torque_Nm": 1.0}}, "key 'contact"),
+        ("single_joint_example", {"sides": ["front"]}, "key 'sides'"),
+        ("linear_axis_example", {"coordinate": {"unit": "m", "force": "N"}}, "key 'coordinate.force'"),
+    ],
+)
+def test_mistakes_in_such_vehicle_files_are_named(tmp_path: Path, name: str, change: dict, message: str) -> None:
+    data = yaml.safe_load((CONFIG / f"{name}.yaml").read_text(encoding="utf-8"))
+    with pytest.raises(VehicleFileError, match=message):
+        vehicle_file.from_mapping({**data, **change}, CONFIG / "broken.yaml")
+
+
+@pytest.mark.parametrize(
+    ("unit", "axis"),
+    [
+        ("N m", "N"), ("N m s/rad", "N s/m"), ("N m s2/rad2", "N s2/m2"), ("rad", "m"), ("rad/s", "m/s"), ("N m/rad", "N/m"),  # noqa: E501
+        ("N m/rad^3", "N/m^3"), ("kg m2", "kg"), ("1/rad", "1/m"), ("1/(N m)", "1/N"), ("rad/(N m)", "m/N"), ("1/rad^2", "1/m^2"),  # noqa: E501
+        ("s", "s"), ("1", "1"), ("Pa", "Pa"), ("K/W", "K/W"), ("rad2/s2", "m2/s2"), ("J/K", "J/K"), ("N m2", "N m2"),
+    ],
+)  # fmt: skip
+def test_units_of_a_linear_axis(unit: str, axis: str) -> None:
+    linear, joint = (
+        vehicle_file.load(CONFIG / f"{name}.yaml") for name in ("linear_axis_example", "single_joint_example")
+    )
+    assert label(linear, unit) == axis
+    assert label(joint, unit) == unit
+
+
+def test_a_linear_axis_in_other_units_names_its_own_mass() -> None:
+    linear = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+    millimetres = linear.replace(coordinate=dataclasses.replace(linear.coordinate, unit="mm"))
+    assert label(millimetres, "kg m2") == "N s2/mm"
