@@ -126,7 +126,7 @@ def test_examples_simulate_replay_and_calibrate(tmp_path: Path, name: str) -> No
         ("linear_axis_example", {"coordinate": {"unit": "m", "force": "N"}}, "key 'coordinate.force'"),
     ],
 )
-def test_mistakes_in_such_vehicle_files_are_named(tmp_path: Path, name: str, change: dict, message: str) -> None:
+def test_mistakes_in_such_vehicle_files_are_named(name: str, change: dict, message: str) -> None:
     data = yaml.safe_load((CONFIG / f"{name}.yaml").read_text(encoding="utf-8"))
     with pytest.raises(VehicleFileError, match=message):
         vehicle_file.from_mapping({**data, **change}, CONFIG / "broken.yaml")
