@@ -56,8 +56,7 @@ def motion(time: Array, theta: Array) -> tuple[Array, Array]:
     """
     step = float(time[1] - time[0])
     omega = np.gradient(theta, step, axis=1)
-    alpha = np.zeros_like(theta)
-    alpha[:, 1:-1] = np.diff(theta, 2, axis=1) / step**2
+    alpha = np.pad(np.diff(theta, 2, axis=1) / step**2, ((0, 0), (1, 1)), mode="edge")
     return omega, alpha
 
 
