@@ -220,6 +220,28 @@ def calibrate(
         print(f"results in {out}")
 
 
+@command()
+def diagnose(
+    bags: Bags,
+    vehicle: VehicleFile,
+    out: OutFolder,
+    seed: Annotated[int, typer.Option(help="seed of the noise draws and bootstraps")] = 1,
+    material: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
+    ] = 0.005,
+    as_json: Json = False,
+) -> None:
+    """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
+    from lugre_steering.diagnosis.command import run
+
+    with spinner() as progress:
+        result = run(bags, vehicle, out, seed=seed, material=material, progress=progress)
+    if as_json:
+        print_json(result)
+    else:
+        print(f"{result['verdict']}: {result['statement']}\nresults in {out}")
+
+
 def main() -> None:
     """Entry point of ``lugre-steering``."""
     app()

@@ -48,6 +48,8 @@ class Found:
     score: Score
     rivals: tuple[str, ...]
     trials: tuple[Trial, ...]
+    gain: float
+    """Energy it took away when it was added, in noise variances."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,8 @@ def search(
     start_cost = cost(problem, baseline, weight)
     excess = start_cost - samples
     steps: list[tuple[Fit, Found, float]] = []
-    current, first_scores, all_trials = baseline, (), []
-    for _ in range(MAX_EFFECTS):
+    current, first_scores, all_trials, restarts = baseline, (), [], 0
+    while len(steps) < MAX_EFFECTS:
         progress("fingerprints")
         taken = [candidate.effect.id for candidate, _ in current.effects]
         scores = screen(problem, current, weight, noise.draws, taken)
@@ -96,6 +98,14 @@ def search(
         trials = [refine(problem, weight, trial) for trial in trials[:3]] + trials[3:]
         trials.sort(key=lambda trial: trial.cost)
         best, before = trials[0], cost(problem, current, weight)
+        # A trial may have led the calibration out of a local minimum: then the gain is not the effect's, so look again.
+        again = fit(problem, weight, current.effects, best.fit.x, evaluations=12)
+        if cost(problem, again, weight) < 0.9 * before and restarts < MAX_EFFECTS:
+            current, restarts = again, restarts + 1
+            if not steps:
+                baseline, start_cost = again, cost(problem, again, weight)
+                excess = start_cost - samples
+            continue
         all_trials += trials
         if before - best.cost < OWN_ERROR * samples:
             break
@@ -103,7 +113,7 @@ def search(
         best, rivals = simplest(best, rivals)
         gained = (before - best.cost) / max(before - samples, before - best.cost)
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
-        steps.append((best.fit, Found(best.score, names, tuple(trials)), gained))
+        steps.append((best.fit, Found(best.score, names, tuple(trials), before - best.cost), gained))
         current = best.fit
         if best.cost - samples < OWN_ERROR * samples:
             break
@@ -212,5 +222,5 @@ def tied(
 def simplest(best: Trial, rivals: list[Trial]) -> tuple[Trial, list[Trial]]:
     """Of effects that fit equally well the one with the fewest free parameters stands for the group."""
     group = [best, *rivals]
-    chosen = min(group, key=lambda trial: (len(trial.candidate.free), trial.cost))
+    chosen = min(group, key=lambda trial: trial.cost + 10.0 * len(trial.candidate.free))
     return chosen, [trial for trial in group if trial is not chosen]

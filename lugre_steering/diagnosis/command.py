@@ -1,0 +1,42 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The ``diagnose`` command: bags in, a folder of results out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
+from lugre_steering.errors import BagError, LugreSteeringError
+from lugre_steering.vehicle import load, save
+
+
+def run(
+    bags: Sequence[Path],
+    vehicle_file: Path,
+    out: Path,
+    *,
+    seed: int = 1,
+    material: float = MATERIAL_SHARE,
+    progress: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """Diagnose and write DIR/diagnosis.json, augmented.yaml, report.html and pictures; returns the JSON."""
+    vehicle = load(vehicle_file)
+    for bag in bags:
+        if not bag.exists():
+            raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LugreSteeringError(f"{out}: cannot be made: {error.strerror or error}; expected a writable folder") from error
+    result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
+    (out / "diagnosis.json").write_text(json.dumps(result.json, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    save(result.vehicle, out / "augmented.yaml")
+    progress("writing the report")
+    from lugre_steering.report.diagnosis_report import write_report
+
+    write_report(result, out)
+    return result.json

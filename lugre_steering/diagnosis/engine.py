@@ -1,0 +1,387 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnosis from bags to verdict: check the data, recalibrate, fingerprint, detect, locate, name, verify, advise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.bag import read_recording
+from lugre_steering.diagnosis import experiment, locate, name, unlisted, verify
+from lugre_steering.diagnosis.apply import apply_calibration
+from lugre_steering.diagnosis.dataset import Run, prepare
+from lugre_steering.diagnosis.fingerprint import Score
+from lugre_steering.diagnosis.noise import Noise, noise_model
+from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
+from lugre_steering.diagnosis.quality import Quality, inspect
+from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence, finite
+from lugre_steering.diagnosis.split import Split, split
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Array, Recording
+from lugre_steering.vehicle import EffectEntry, Vehicle
+
+NULL_DRAWS = 16
+MIN_SLIDING = 2.0
+"""Travel, in presliding lengths, below which friction level and stiffness cannot be told apart."""
+UNLISTED_EXCESS = 0.25
+MATERIAL_SHARE = 0.005
+"""Default share of the torque amplitude above which an effect is called material; it only labels."""
+
+Progress = Callable[[str], None]
+
+
+def diagnose(
+    bags: Sequence[Path], vehicle: Vehicle, *, seed: int = 1, material: float = MATERIAL_SHARE, progress: Progress = lambda _: None
+) -> Diagnosis:
+    """Read and diagnose bags of one vehicle together."""
+    recordings = []
+    for bag in bags:
+        progress(f"reading {bag.name}")
+        recordings.append(read_recording(bag, vehicle.channels))
+    return diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
+
+
+def diagnose_recordings(
+    recordings: Sequence[Recording], vehicle: Vehicle, *, seed: int = 1, material: float = MATERIAL_SHARE, progress: Progress = lambda _: None
+) -> Diagnosis:
+    """Diagnose recordings of one vehicle together; effects that the vehicle file already has stay in the baseline."""
+    progress("checking the data")
+    qualities = [inspect(recording, vehicle) for recording in recordings]
+    findings = _findings(qualities)
+    blocking = [f"{q.recording.name}: {f.statement}" for q in qualities for f in q.blocking]
+    if blocking:
+        return _insufficient(qualities, vehicle, findings, "The data must be put right first. " + " ".join(blocking), None)
+    progress("estimating the motion")
+    try:
+        problem = Problem(vehicle, [prepare(quality.recording, vehicle) for quality in qualities])
+    except DataError as error:
+        return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
+    travel = max(float(np.ptp(run.theta)) for run in problem.runs) / problem.presliding
+    roles = split(problem)
+    if travel < MIN_SLIDING or roles.fit.sum() < 500:
+        advice = {
+            "manoeuvre": "double-cycle: " + experiment.BUILT_IN["double-cycle"].description,
+            "separates": ["friction level", "stiffness"],
+            "why": f"the recording turns the contact by only {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed",
+        }
+        statement = (
+            f"The recording does not determine the baseline: the contact turned by {travel:.1f} presliding lengths in "
+            f"{sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s. Nothing can be said about missing physics."
+        )
+        return _insufficient(qualities, vehicle, findings, statement, advice)
+    progress("recalibrating the baseline")
+    noise, baseline = _recalibrate(problem, roles, seed)
+    found = name.search(problem, noise, roles, baseline, progress)
+    progress("verifying on held-out data")
+    return _Conclusion(problem, noise, roles, found, seed, material, progress).diagnosis(findings)
+
+
+def _recalibrate(problem: Problem, roles: Split, seed: int) -> tuple[Noise, Fit]:
+    """Baseline fitted with sheet noise first, then with the noise measured at that fit."""
+    sheet = np.concatenate([run.sigma for run in problem.runs])
+    weight = np.where(roles.fit, 1.0 / sheet, 0.0)
+    starts = [fit(problem, weight, evaluations=25), fit(problem, weight, robust=True, evaluations=25)]
+    first = min((fit(problem, weight, start=start.x, evaluations=10) for start in starts), key=lambda f: f.cost)
+    noise = noise_model(problem, first.x, (), draws=NULL_DRAWS, seed=seed)
+    return noise, fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=first.x)
+
+
+@dataclass(frozen=True)
+class _Conclusion:
+    """From a finished search to the result, step by step."""
+
+    problem: Problem
+    noise: Noise
+    roles: Split
+    found: name.Search
+    seed: int
+    material: float
+    progress: Progress
+
+    def diagnosis(self, findings: list[dict[str, Any]]) -> Diagnosis:
+        problem, roles, found = self.problem, self.roles, self.found
+        gain, interval = verify.improvement(problem, found.baseline, found.final, roles, self.seed)
+        named = bool(found.found) and interval[0] > 0.0
+        final = found.final if named else found.baseline
+        weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
+        whole = fit(problem, weight, final.effects, final.x, evaluations=12)
+        residual = problem.measured - final.prediction
+        left, left_text, structured = self._left_over(final, residual)
+        if named:
+            verdict = "missing_physics"
+        elif structured:
+            verdict = "unlisted_physics"
+        else:
+            verdict = "consistent"
+        effects = self._effects(whole) if named else []
+        vehicle = self._vehicle(whole, effects)
+        baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": verify.rmse(problem, found.baseline, roles.held)}
+        augmented = {"rmse_Nm": verify.rmse(problem, final, problem.valid), "heldout_rmse_Nm": verify.rmse(problem, final, roles.held)}
+        augmented |= {"improvement": gain, "improvement_ci95": list(interval)} if named else {"improvement": 0.0, "improvement_ci95": [0.0, 0.0]}
+        self.progress("next experiment")
+        json = {
+            "schema": SCHEMA,
+            "bags": [run.name for run in problem.runs],
+            "verdict": verdict,
+            "statement": self._statement(verdict, effects, baseline, augmented, left_text),
+            "noise_floor_Nm": self.noise.floor,
+            "baseline": baseline,
+            "augmented": augmented,
+            "effects": effects,
+            "unexplained": left,
+            "detection_limits": self._limits([effect["id"] for effect in effects]),
+            "data_quality": findings,
+            "next_experiment": self._next(verdict, whole),
+        }
+        return Diagnosis(finite(json), vehicle, self._traces(whole, final), self._evidence(effects), {e["id"]: CATALOGUE[e["id"]].coordinate for e in effects})
+
+    def _effects(self, whole: Fit) -> list[dict[str, Any]]:
+        problem, found = self.problem, self.found
+        weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
+        covariance = verify.robust_covariance(problem, whole, weight, self.roles.cluster)
+        position, entries = problem.nuisances, []
+        start = name.cost(problem, found.baseline, np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0))
+        amplitude = float(np.percentile(np.abs(problem.measured), 99.0))
+        for index, ((candidate, values), item) in enumerate(zip(whole.effects, found.found, strict=True)):
+            parameters = {}
+            for key in candidate.free:
+                sd = float(np.sqrt(max(covariance[position, position], 0.0)))
+                label = candidate.line if candidate.effect.per_line else key
+                parameters[label] = {
+                    "value": values[key], "ci95": [values[key] - 1.96 * sd, values[key] + 1.96 * sd], "unit": candidate.parameter(key).unit,
+                }  # fmt: skip
+                position += 1
+            part = locate.contribution(problem, whole, index)
+            size = float(np.max(np.abs(part)))
+            where = self._where(candidate, part)
+            share = float(np.clip(item.gain / max(start, 1e-9), 0.0, 1.0))
+            rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
+            label = "material" if size > self.material * amplitude else "small"
+            entries.append({
+                "id": candidate.effect.id, "stage": candidate.effect.stage,
+                "statement": (
+                    f"{candidate.effect.title}: {candidate.effect.equation}. Up to {size:.0f} N m ({100 * size / amplitude:.1f} % of the "
+                    f"torque amplitude, {label})" + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
+                ),
+                "p_value": item.score.p_value, "parameters": parameters, "where": where, "energy_share": share,
+                "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,
+            })  # fmt: skip
+        return sorted(entries, key=lambda entry: -entry["energy_share"])
+
+    def _where(self, candidate: Candidate, part: Array) -> list[dict[str, Any]]:
+        entries = []
+        for bag, run in enumerate(self.problem.runs):
+            piece = part[self.problem.edges[bag] : self.problem.edges[bag + 1]]
+            spans = locate.intervals(run.time, piece)
+            if not candidate.active_in(bag) or not spans:
+                continue
+            axes = locate.coordinates(run, run.measured)
+            axis = candidate.effect.coordinate if candidate.effect.coordinate in axes else "time"
+            entries.append({
+                "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
+                "range": list(locate.active_range(axes[axis], piece)), "unit": locate.UNITS[axis],
+            })  # fmt: skip
+        return entries
+
+    def _left_over(self, final: Fit, residual: Array) -> tuple[dict[str, Any], str, bool]:
+        """What remains after ``final``: contract entry, one sentence, and whether it is structure worth a verdict."""
+        problem = self.problem
+        weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
+        parts = [slice(a, b) for a, b in zip(problem.edges, problem.edges[1:], strict=False)]
+        axes = [locate.coordinates(run, run.measured) for run in problem.runs]
+        axis, share, p = locate.telling_coordinate(
+            axes, [residual[s] for s in parts], [weight[s] for s in parts], [self.noise.draws[:, s] for s in parts]
+        )
+        used = weight > 0.0
+        moving = np.concatenate([np.abs(run.omega).max(axis=0) > 1e-3 for run in problem.runs])
+        energy = (residual * weight) ** 2
+        excess = float(energy[used].mean()) - 1.0
+        rest = float(energy[used & ~moving].mean()) if (used & ~moving).sum() > 200 else 1.0
+        in_motion = float(energy[used & moving].mean()) - max(rest, 1.0) if (used & moving).any() else 0.0
+        structured = excess > UNLISTED_EXCESS and (in_motion > UNLISTED_EXCESS or (share > 0.1 and p < 0.1))
+        if not structured:
+            return {"structured": False, "description": "what is left is within noise and the simulation's own error", "formula": None, "where": None}, "", False
+        formula = None
+        held = np.where(self.roles.held, weight, 0.0)
+        fitted = np.where(self.roles.fit, weight, 0.0)
+        stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
+        proposal = unlisted.propose(stacked, residual, fitted, held)
+        if proposal is not None:
+            formula = f"{proposal.text} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
+        where = []
+        for run, part, values in zip(problem.runs, parts, axes, strict=True):
+            smooth = np.sqrt(np.convolve((residual[part] * weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
+            spans = locate.intervals(run.time, np.where(smooth > 1.6, smooth, 0.0))
+            if spans:
+                where.append({
+                    "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
+                    "range": list(locate.active_range(values[axis], residual[part] * (smooth > 1.6))), "unit": locate.UNITS[axis],
+                })  # fmt: skip
+        text = (
+            f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
+            f"({100 * share:.0f} % of the residual energy follows it)"
+        )
+        return {"structured": True, "description": text, "formula": formula, "where": where}, text, True
+
+    def _limits(self, named: Sequence[str]) -> dict[str, Any]:
+        """Smallest amplitude of each effect that this recording could have revealed."""
+        samples = float(self.roles.fit.sum())
+        best: dict[str, tuple[float, Score]] = {}
+        for score in self.found.first_scores:
+            needed = max(name.OWN_ERROR * samples, 2.0 * float(np.max(score.null_explained)))
+            if not score.candidate.free or score.visible <= 0.0 or score.candidate.effect.id in named:
+                continue
+            parameter = score.candidate.parameter(score.candidate.free[0])
+            smallest = parameter.scale * float(np.sqrt(needed / score.visible))
+            if score.candidate.effect.id not in best or smallest < best[score.candidate.effect.id][0]:
+                best[score.candidate.effect.id] = (smallest, score)
+        return {
+            key: {"parameter": score.candidate.free[0], "smallest": smallest, "unit": score.candidate.parameter(score.candidate.free[0]).unit}
+            for key, (smallest, score) in sorted(best.items())
+        }
+
+    def _vehicle(self, whole: Fit, effects: Sequence[dict[str, Any]]) -> Vehicle:
+        """Recalibrated vehicle with the named effects that act in the last bag."""
+        problem = self.problem
+        entries = list(problem.vehicle.effects)
+        last = len(problem.runs) - 1
+        for candidate, values in whole.effects if effects else ():
+            if not candidate.active_in(last):
+                continue
+            keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
+            if candidate.effect.per_line:
+                keep = {candidate.line: float(values[candidate.free[0]])}
+            entries.append(EffectEntry(candidate.effect.id, keep))
+        provenance = {
+            "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
+            "heldout_rmse_Nm": round(verify.rmse(problem, whole, self.roles.held), 3),
+        }  # fmt: skip
+        changed = apply_calibration(problem.vehicle, problem, whole.x)
+        return replace(changed, effects=tuple(entries), provenance=provenance)
+
+    def _evidence(self, effects: Sequence[dict[str, Any]]) -> tuple[Evidence, ...]:
+        problem, found = self.problem, self.found
+        held = np.where(self.roles.held, 1.0 / self.noise.sigma, 0.0)
+        before = name.cost(problem, found.baseline, held)
+        named = {effect["id"] for effect in effects}
+        ties = {rival for effect in effects for rival in effect["indistinguishable_from"]}
+        trials: dict[str, name.Trial] = {}
+        for trial in found.trials:
+            trials.setdefault(trial.candidate.label, trial)
+        rows, seen = [], set()
+        for score in found.first_scores:
+            label = score.candidate.label
+            if label in seen:
+                continue
+            seen.add(label)
+            tried = trials.get(label)
+            gain = None
+            if tried is not None and before > 0.0:
+                gain = 1.0 - float(np.sqrt(name.cost(problem, tried.fit, held) / before))
+            effect_id = score.candidate.effect.id
+            if effect_id in named:
+                verdict = "named"
+            elif effect_id in ties:
+                verdict = "cannot be told from the named effect"
+            elif tried is not None:
+                verdict = "fits worse than the named effect" if named else "explains too little of what is left over"
+            elif score.p_value > name.FALSE_DISCOVERY_RATE:
+                verdict = "not significant"
+            else:
+                verdict = "explains too little to be tried"
+            rows.append(Evidence(label, score.candidate.effect.title, score.share, score.masked_share, score.p_value, gain, verdict))
+        return tuple(rows)
+
+    def _traces(self, whole: Fit, final: Fit) -> tuple[BagTrace, ...]:
+        problem, found = self.problem, self.found
+        parts = {candidate.effect.id: locate.contribution(problem, whole, i) for i, (candidate, _) in enumerate(whole.effects)}
+        traces = []
+        for bag, run in enumerate(problem.runs):
+            piece = slice(problem.edges[bag], problem.edges[bag + 1])
+            traces.append(BagTrace(
+                run.name, run.time, run.measured, found.baseline.prediction[piece], final.prediction[piece],
+                self.roles.held[piece], {key: part[piece] for key, part in parts.items()},
+                {key: locate.intervals(run.time, part[piece]) for key, part in parts.items()}, locate.coordinates(run, run.measured),
+            ))  # fmt: skip
+        return tuple(traces)
+
+    def _next(self, verdict: str, whole: Fit) -> dict[str, Any] | None:
+        """For a tie the manoeuvre that separates the rivals best; otherwise what would show the effects this data masks."""
+        for index, item in enumerate(self.found.found if verdict == "missing_physics" else ()):
+            rivals = [trial for trial in item.trials if trial.candidate.effect.id in item.rivals]
+            if rivals:
+                chosen = whole.effects[index]
+                energies = experiment.separation(self.problem, whole, [chosen], [rivals[0].fit.effects[-1]], self.noise.floor)
+                best, description, energy = experiment.recommend(energies)
+                return {
+                    "manoeuvre": f"{best}: {description}", "separates": [chosen[0].effect.id, rivals[0].candidate.effect.id],
+                    "why": f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
+                    f"more than in any other manoeuvre tried ({', '.join(f'{k} {np.sqrt(e):.0f}' for k, e in energies.items() if k != best)})",
+                }  # fmt: skip
+        if verdict == "unlisted_physics":
+            return {
+                "manoeuvre": "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",
+                "separates": ["dependence on rate", "on amplitude", "on dwell"],
+                "why": "the structure follows none of the catalogue's laws; runs that vary one quantity at a time show which it depends on",
+            }
+        return None
+
+    def _statement(self, verdict: str, effects: Sequence[dict[str, Any]], baseline: dict[str, float], augmented: dict[str, Any], left: str) -> str:
+        floor = f"{self.noise.floor:.0f} N m"
+        if verdict == "consistent":
+            return (
+                f"After recalibration the published model explains the recording: held-out error {baseline['heldout_rmse_Nm']:.0f} N m at a "
+                f"noise floor of {floor}. No missing physics is needed; see detection_limits for what could have gone unseen."
+            )
+        if verdict == "unlisted_physics":
+            return (
+                f"The recalibrated model leaves {baseline['heldout_rmse_Nm']:.0f} N m on held-out data at a noise floor of {floor}, and no "
+                f"entry of the catalogue explains it: {left}. The physics is unlisted; see unexplained for where it lives."
+            )
+        names = " and ".join(CATALOGUE[effect["id"]].title.lower() + f" ({effect['id']})" for effect in effects)
+        ties = [f"{effect['id']} cannot be told from {', '.join(effect['indistinguishable_from'])}" for effect in effects if effect["indistinguishable_from"]]
+        return (
+            f"The model leaves out {names}. With it the held-out error falls from {baseline['heldout_rmse_Nm']:.0f} to "
+            f"{augmented['heldout_rmse_Nm']:.0f} N m (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
+            f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
+            + (f" {'; '.join(ties).capitalize()} with these data." if ties else "")
+            + (f" Structure is left: {left}." if left else "")
+        )
+
+
+def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:
+    return [
+        {
+            "finding": f.finding, "topic": f.topic, "bag": quality.recording.name,
+            "intervals_s": [list(span) for span in f.intervals_s], "statement": f.statement,
+        }
+        for quality in qualities
+        for f in quality.findings
+    ]  # fmt: skip
+
+
+def _insufficient(
+    qualities: Sequence[Quality], vehicle: Vehicle, findings: list[dict[str, Any]], statement: str, advice: dict[str, Any] | None
+) -> Diagnosis:
+    """The verdict when nothing can be concluded: the vehicle stays as it was."""
+    floor = 1.0
+    if vehicle.hydraulics is not None:
+        floor = max(1.0, vehicle.sensors.pressure_noise_Pa * 5e-3)
+    fit_entry: dict[str, Any] = {"rmse_Nm": 0.0, "heldout_rmse_Nm": None}
+    json = {
+        "schema": SCHEMA, "bags": [quality.recording.name for quality in qualities], "verdict": "insufficient_data",
+        "statement": statement, "noise_floor_Nm": floor, "baseline": fit_entry,
+        "augmented": {**fit_entry, "improvement": None, "improvement_ci95": None}, "effects": [],
+        "unexplained": {"structured": False, "description": "not examined", "formula": None, "where": None},
+        "detection_limits": {}, "data_quality": findings, "next_experiment": advice,
+    }  # fmt: skip
+    return Diagnosis(finite(json), vehicle)
+
+
+__all__ = ["Run", "diagnose", "diagnose_recordings"]
