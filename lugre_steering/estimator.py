@@ -30,7 +30,7 @@ from lugre_steering.chain.hydraulics import CylinderTable, gauge_offset, moment_
 from lugre_steering.chain.layout import OUTPUT, STATE
 from lugre_steering.chain.model import build_model
 from lugre_steering.chain.rates import MOTION, follow
-from lugre_steering.chain.step import Records, advance
+from lugre_steering.chain.step import Records, has_effects, step
 from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
@@ -87,6 +87,7 @@ CONFIG = np.dtype(
         ("pending_first", np.int64),
         ("pending_count", np.int64),
         ("plan_size", np.int64),
+        ("effects", np.bool_),
         ("message", np.int64),  # number of the message being processed, from 0
     ]
 )
@@ -158,9 +159,11 @@ class Core(NamedTuple):
 @njit
 def _reset(core, keep):
     """Forget the past after a jump back in time, except the counters and channel ``keep``'s confirmation."""
-    core.state[:] = np.zeros_like(core.state)
-    core.motion[:] = np.zeros_like(core.motion)
-    core.waiting[:] = np.zeros_like(core.waiting)
+    # One by one: slice assignment would compile for ten seconds more.
+    state, motion = np.zeros_like(core.state), np.zeros_like(core.motion)
+    for side in range(state.size):
+        core.state[side] = state[side]
+        core.motion[side] = motion[side]
     c = core.config[0]
     c.start_ns = 0
     c.lagged_ns = 0
@@ -265,8 +268,16 @@ def _preview(core, side, stamp_ns):
         planned = _planned(core, side, stamp_ns + np.int64(i * dt * 1e9)) if planning else math.nan
         target = theta + motion.omega * dt if math.isnan(planned) else planned
         omega = (target - theta) / dt
-        advance(
-            core.parameters[side], core.scratch_state[0], core.rubber, core.scratch_output[0], dt, target, omega, 0.0
+        step(
+            core.parameters[side],
+            core.scratch_state[0],
+            core.rubber,
+            core.scratch_output[0],
+            dt,
+            target,
+            omega,
+            0.0,
+            c.effects,
         )
         theta = target
     return core.scratch_output[0].torque
@@ -316,7 +327,7 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
     ch.last_value = value
     motion = core.motion[side]
     follow(motion, dt, value, rate, c.angle_noise)
-    advance(
+    step(
         core.parameters[side],
         core.state[side],
         core.rubber,
@@ -325,6 +336,7 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
         motion.theta,
         motion.omega,
         motion.alpha,
+        c.effects,
     )
     ring = core.waiting.shape[1]
     if ch.head - ch.cursor == ring:
@@ -552,6 +564,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["delay_ns"] = round(correction.delay_s * 1e9)
     config["lag"] = correction.lag_s
     config["arm_linear"], config["arm_quadratic"] = correction.arm_linear, correction.arm_quadratic
+    config["effects"] = any(has_effects(p) for p in model.parameters)
     config["horizon"] = options.feed_forward_horizon_s
     config["message"] = -1
 

@@ -13,8 +13,7 @@ from numba import njit
 
 from lugre_steering.chain.contact import bristle, bristle_work, stribeck
 from lugre_steering.chain.heat import heat
-from lugre_steering.chain.layout import EFFECT_FIELDS
-from lugre_steering.chain.step import Records, torque_side
+from lugre_steering.chain.step import Records, has_effects, torque_side
 from lugre_steering.recording import Array
 
 LANES = 64
@@ -82,7 +81,7 @@ def torque_sets(parameters: Records, rubber: Array, time: Array, theta: Array, o
     sets = parameters.size
     tables = rubber[np.newaxis] if rubber.ndim == 2 else rubber
     torque = np.empty((time.size, sets))
-    with_effects = np.any([parameters[name] != 0.0 for name in EFFECT_FIELDS], axis=0)
+    with_effects = np.array([has_effects(parameters[k : k + 1]) for k in range(sets)])
     plain = (parameters["stribeck_exponent"] == 2.0) & ~with_effects
 
     def block(first: int) -> None:

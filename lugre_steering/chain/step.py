@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The order of the chain, compiled: one ``advance`` shared by the live node, replay, simulation and diagnosis."""
+"""The order of the chain, compiled: one ``step`` shared by the live node, replay, simulation and diagnosis."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import literal_unroll, njit
+from numba import njit
 
 from lugre_steering.chain.compiled import exp, law
 from lugre_steering.chain.contact import (
@@ -21,7 +21,7 @@ from lugre_steering.chain.contact import (
     tangent_factor,
 )
 from lugre_steering.chain.heat import advance_heat
-from lugre_steering.chain.layout import EFFECT_FIELDS, ELEMENTS, OUTPUT, PARAMETERS, STATE
+from lugre_steering.chain.layout import BASELINE_FIELDS, ELEMENTS, OUTPUT, PARAMETERS, STATE
 from lugre_steering.chain.motion import contact_increment
 from lugre_steering.chain.torque import aligning, hydraulic_limits, losses, parallel_torque
 from lugre_steering.recording import Array
@@ -58,10 +58,13 @@ def begin(p, s, theta):
     s.contact_angle = theta
     s.z = p.initial_bristle
     s.z_max = abs(p.initial_bristle)
+    total = 0.0
     for i in range(ELEMENTS):
         s.elements[i] = p.initial_bristle
         s.element_shares[i] = exp(p.distributed_contact_spread * _NORMAL_QUANTILES[i])
-    s.element_shares[:] /= s.element_shares.sum()
+        total += s.element_shares[i]
+    for i in range(ELEMENTS):
+        s.element_shares[i] /= total
     s.temperature = p.rubber_temperature
     s.carcass_temperature = p.rubber_temperature
     s.air_temperature = p.air_temperature
@@ -85,15 +88,6 @@ def distributed(s, d_theta, stiffness, g):
         torque += k * z_next
     mean = torque / stiffness
     return torque, mean, work + 0.5 * stiffness * (mean * mean - s.z * s.z)
-
-
-@law
-def has_effects(p):
-    """Whether any effect parameter differs from neutral."""
-    for name in literal_unroll(EFFECT_FIELDS):  # noqa: SIM110 (Numba cannot take the any())
-        if p[name] != 0.0:
-            return True
-    return False
 
 
 @law
@@ -172,23 +166,15 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     out.z = z_next
 
 
-@law
-def advance(p, s, rubber, out, dt, theta_measured, omega, alpha):
-    """``step`` for callers that take single steps."""
-    step(p, s, rubber, out, dt, theta_measured, omega, alpha, has_effects(p))
-
-
 @njit(nogil=True, cache=True)
-def _run(p, s, rubber, time, theta, omega, alpha, out, previous):
-    effects = has_effects(p[0])
+def _run(p, s, rubber, time, theta, omega, alpha, out, previous, effects):
     for i in range(time.size):
         step(p[0], s[0], rubber, out[i], time[i] - previous, theta[i], omega[i], alpha[i], effects)
         previous = time[i]
 
 
 @njit(nogil=True, cache=True)
-def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque):
-    effects = has_effects(p[0])
+def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, effects):
     previous = time[0]
     for i in range(time.size):
         step(p[0], s[0], rubber, scratch[0], time[i] - previous, theta[i], omega[i], alpha[i], effects)
@@ -204,6 +190,11 @@ def new_state() -> Records:
 def new_parameters() -> Records:
     """A parameter record (shape (1,)) with every effect neutral; the baseline fields are still to be set."""
     return np.zeros(1, PARAMETERS)
+
+
+def has_effects(p: Records) -> bool:
+    """Whether any effect parameter of the records differs from neutral."""
+    return bool(np.any(p.view(np.float64).reshape(p.size, -1)[:, len(BASELINE_FIELDS) :]))
 
 
 def run_side(
@@ -222,12 +213,12 @@ def run_side(
     """
     out = np.zeros(time.size, OUTPUT)
     previous = float(time[0]) if previous_time is None else previous_time
-    _run(p, new_state() if state is None else state, rubber, time, theta, omega, alpha, out, previous)
+    _run(p, new_state() if state is None else state, rubber, time, theta, omega, alpha, out, previous, has_effects(p))
     return out
 
 
 def torque_side(p: Records, rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array) -> Array:
     """Whole record of one track -> torque [N m] only (n,); the fast path of fits. Same arithmetic as ``run_side``."""
     torque = np.empty(time.size)
-    _torque(p, new_state(), rubber, np.zeros(1, OUTPUT), time, theta, omega, alpha, torque)
+    _torque(p, new_state(), rubber, np.zeros(1, OUTPUT), time, theta, omega, alpha, torque, has_effects(p))
     return torque
