@@ -65,6 +65,8 @@ PRIOR_DOMINATED = 0.5
 """Posterior over prior standard deviation above which a value is the sheet's rather than the data's."""
 MISFIT = 1.5
 """Residual over noise floor above which the model misses something."""
+WORTH_SAYING = 0.1
+"""Relative shift per relative error of a sheet value below which it goes without saying."""
 
 Progress = Callable[[str], None]
 
@@ -361,10 +363,11 @@ def statement(
     text += [f"{c.statement[0].upper()}{c.statement[1:]}." for c in weak if not set(c.parts) <= said]
     for value in assumed:
         name = max(value.shifts, key=lambda n: abs(value.shifts[n]) if n not in said else 0.0)
-        text.append(
-            f"Intervals take the sheet's {value.name.replace('_', ' ')} as exact: 1 % of it would move "
-            f"{name.replace('_', ' ')} by {value.shifts[name]:+.2g} %."
-        )
+        if abs(value.shifts[name]) > WORTH_SAYING:
+            text.append(
+                f"Intervals take the sheet's {value.name.replace('_', ' ')} as exact: 1 % of it would move "
+                f"{name.replace('_', ' ')} by {value.shifts[name]:+.2g} %."
+            )
     return " ".join(text)
 
 

@@ -60,5 +60,6 @@ def _parameters(ax: Any, rows: list[dict[str, Any]]) -> None:
     ax.set_ylim(len(rows) - 0.5, -0.5)
     ends = [row["value"] / row["sheet"] for row in rows]
     ax.set_xlim(max(0.2, min(0.6, min(ends) - 0.1)), min(3.0, max(1.4, max(ends) + 0.1)))
-    ax.set_title("parameters with 95 % interval (grey: the sheet's own; red: not determined or at a bound)")
+    sheet = "grey: the sheet's own; " if any(row["prior_relative_sd"] for row in rows) else ""
+    ax.set_title(f"parameters with 95 % interval ({sheet}orange: hardly determined or at a bound)")
     ax.set_xlabel("value over sheet value")

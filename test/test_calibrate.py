@@ -1,0 +1,244 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration: known truth recovered, intervals that hold it, what cannot be known said so, files and errors."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.bag import read_recording
+from lugre_steering.calibration import calibrate_recordings, coverage
+from lugre_steering.calibration.calibrate import KEYS, chosen
+from lugre_steering.chain.model import Model, build_model
+from lugre_steering.cli import app
+from lugre_steering.diagnosis.apply import apply_calibration
+from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.problem import Problem, fit
+from lugre_steering.errors import DataError
+from lugre_steering.replay import replay
+from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep
+
+ROOT = Path(__file__).parent.parent
+SHEET_FILE = ROOT / "config" / "test_vehicle.yaml"
+BAG = ROOT / "bags" / "synthetic_double_cycle"
+SHEET = vehicle_file.load(SHEET_FILE)
+KEY = {key.key: key for key in KEYS}
+
+
+def off_sheet(**factors):
+    """The shipped sheet with friction, stiffness and capacity multiplied."""
+    friction, rubber = SHEET.friction, SHEET.rubber
+    return SHEET.replace(
+        friction=dataclasses.replace(
+            friction,
+            static=friction.static * factors.get("level", 1.0),
+            coulomb=friction.coulomb * factors.get("level", 1.0),
+            stiffness_Nm_per_deg=friction.stiffness_Nm_per_deg * factors.get("stiffness", 1.0),
+        ),
+        rubber=dataclasses.replace(
+            rubber, specific_heat_J_kgK=rubber.specific_heat_J_kgK * factors.get("capacity", 1.0)
+        ),
+    )
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    rows = [row for case in coverage.cases(30) for row in case]
+    assert 0.90 <= np.mean([row.covered for row in rows]) <= 0.99
+    for key in {row.name for row in rows}:
+        assert np.mean([row.covered for row in rows if row.name == key]) >= 0.8, key
+
+
+@pytest.fixture(scope="module")
+def long_runs():
+    """Runs that determine everything, from a vehicle that no sheet value describes."""
+    truth = off_sheet(level=1.12, stiffness=0.87, capacity=1.16)
+    truth = truth.replace(
+        friction=dataclasses.replace(truth.friction, static=truth.friction.coulomb * 1.2, stribeck_speed_deg_s=1.25),
+        rubber=dataclasses.replace(truth.rubber, heat_transfer_W_m2K=22.0),
+    )
+    runs = [BUILT_IN[name] for name in ("varied-rates", "slow-sweeps", "heat-and-rest")]
+    return truth, calibrate_recordings(coverage.record(truth, runs, 3), SHEET)
+
+
+def test_known_truth_is_recovered(long_runs):
+    truth, done = long_runs
+    rows = done.result["parameters"]
+    assert [row["key"] for row in rows] == [
+        "friction.coulomb", "friction.static", "friction.stiffness_Nm_per_deg", "friction.stribeck_speed_deg_s",
+        "rubber.specific_heat_J_kgK", "rubber.heat_transfer_W_m2K",
+    ]  # fmt: skip
+    for row in rows:
+        true = KEY[row["key"]].read(truth)
+        assert row["value"] == pytest.approx(true, rel=0.03), row
+        assert row["ci95"][0] < true < row["ci95"][1], row
+        assert row["at_bound"] is None
+        assert not row["prior_dominated"]
+
+
+def test_residual_and_held_out_error_come_down_to_the_noise(long_runs):
+    _, done = long_runs
+    rmse, held = done.result["rmse_Nm"], done.result["heldout_rmse_Nm"]
+    assert rmse["sheet"] > 10.0 * rmse["calibrated"]
+    assert rmse["calibrated"] < 1.3 * rmse["noise_floor"]
+    assert held["calibrated"] < 1.3 * rmse["noise_floor"]
+
+
+def test_only_the_ratio_of_temperature_sensitivity_and_heat_capacity_is_known(long_runs):
+    """Oracle: fit again with a rubber table of other sensitivity, and see by how much the heat capacity moved."""
+    _, done = long_runs
+    tied = [c for c in done.result["undetermined"] if "temperature_sensitivity" in c["parts"]]
+    said = next(a for a in done.result["assumed"] if a["name"] == "temperature_sensitivity")["shifts"]["heat_capacity"]
+    exponent = 1.02
+    other = Problem(SHEET, done.problem.runs, done.problem.calibrations)
+    other.model = Model(other.model.parameters, other.model.rubber**exponent)
+    index = [c.name for c in other.calibrations].index("heat_capacity")
+    moved = fit(other, done.estimate.weight, start=done.estimate.x, robust=True, evaluations=40).x[index]
+    assert (moved - done.estimate.x[index]) / math.log(exponent) == pytest.approx(said, rel=0.15)
+    assert said == pytest.approx(1.0, abs=0.3)
+    if tied:
+        assert tied[0]["parts"]["heat_capacity"] > 0.0
+        assert "ratio" in tied[0]["statement"]
+
+
+def test_what_a_short_run_cannot_tell_is_said():
+    done = calibrate_recordings([read_recording(BAG, SHEET.channels)], SHEET)
+    dominated = {row["name"]: row for row in done.result["parameters"] if row["prior_dominated"]}
+    assert set(dominated) == {"stribeck_speed", "cooling"}
+    assert dominated["cooling"]["advice"] == "heat-and-rest"
+    # The data add nothing: the interval is the sheet's own.
+    assert dominated["cooling"]["relative_sd"] == pytest.approx(0.15, rel=0.2)
+    alone = [set(c["parts"]) for c in done.result["undetermined"]]
+    assert {"cooling"} in alone
+    assert {"stribeck_speed"} in alone
+    assert any({"temperature_sensitivity", "heat_capacity"} == parts for parts in alone)
+
+
+def test_a_value_beyond_its_range_is_flagged_at_the_bound():
+    recordings = coverage.record(off_sheet(stiffness=2.5), coverage.QUICK, 5)
+    row = next(r for r in calibrate_recordings(recordings, SHEET).result["parameters"] if r["name"] == "stiffness")
+    assert row["at_bound"] == "high"
+
+
+def test_pressure_gain_alone():
+    wrong = SHEET.replace(sensors=dataclasses.replace(SHEET.sensors, pressure_gain=1.06))
+    recordings = coverage.record(SHEET, coverage.QUICK, 6)
+    names = ["friction_level", "static_ratio", "stiffness", "stribeck_speed", "heat_capacity", "cooling"]
+    done = calibrate_recordings(recordings, wrong, chosen(wrong, free=["pressure_gain"], fix=names))
+    assert done.vehicle.sensors.pressure_gain == pytest.approx(1.0, rel=2e-3)
+
+
+def test_kingpin_arm_on_request():
+    truth = SHEET.replace(axle=dataclasses.replace(SHEET.axle, kingpin_lever_arm_m=0.12))
+    runs = [BUILT_IN["varied-rates"]]
+    done = calibrate_recordings(coverage.record(truth, runs, 7), SHEET, chosen(SHEET, free=["kingpin_arm"]))
+    row = next(r for r in done.result["parameters"] if r["name"] == "kingpin_arm")
+    assert row["ci95"][0] < 0.12 < row["ci95"][1]
+    assert row["value"] == pytest.approx(0.12, rel=0.1)
+
+
+def test_single_joint(tmp_path):
+    file = tmp_path / "joint.yaml"
+    file.write_text(
+        "schema: lugre_steering/vehicle/1\nname: joint\nsides: [left]\n"
+        "contact: {static_torque_Nm: 130.0, coulomb_torque_Nm: 100.0, stiffness_Nm_per_deg: 80.0, "
+        "stribeck_speed_deg_s: 2.0}\ntorque_sensor: {noise_Nm: 0.5}\n",
+        encoding="utf-8",
+    )
+    truth = vehicle_file.load(file)
+    contact = dataclasses.replace(
+        truth.contact, static_torque_Nm=120.0, coulomb_torque_Nm=110.0, stiffness_Nm_per_deg=70.0
+    )
+    wrong = truth.replace(contact=contact)
+    motion = Manoeuvre("m", "", (Hold(1.0), *(Sweep(a, r, 0.5) for a, r in ((20, 1), (-20, 8), (15, 3), (0, 0.7)))))
+    done = calibrate_recordings(coverage.record(truth, [motion], 8), wrong)
+    for row in done.result["parameters"]:
+        true = KEY[row["key"]].read(truth)
+        assert row["value"] == pytest.approx(true, rel=0.03), row
+    assert [row["key"].split(".")[0] for row in done.result["parameters"]] == ["contact"] * 4
+
+
+def test_vehicle_built_from_fitted_values_has_their_parameters():
+    problem = Problem(SHEET, [prepare(r, SHEET) for r in coverage.record(SHEET, coverage.QUICK[:1], 1)])
+    x = np.array([0.1, 0.05, -0.2, 0.15, 0.08, -0.12, 0.0])
+    record = build_model(apply_calibration(SHEET, problem, x)).parameters[0][0]
+    for field, value in problem.fields(x).items():
+        assert record[field] == pytest.approx(value, rel=1e-12), field
+
+
+@pytest.fixture(scope="module")
+def commanded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("calibrate")
+    sheet = folder / "sheet.yaml"
+    vehicle_file.save(off_sheet(level=1.1, stiffness=0.9, capacity=1.1), sheet)
+    out = folder / "out"
+    outcome = CliRunner().invoke(app, ["calibrate", str(BAG), "--vehicle", str(sheet), "--out", str(out), "--json"])
+    assert outcome.exit_code == 0, outcome.output
+    return sheet, out, json.loads(outcome.stdout)
+
+
+def test_files_of_the_command(commanded):
+    sheet, out, printed = commanded
+    assert json.loads((out / "calibration.json").read_text(encoding="utf-8")) == printed
+    assert printed["schema"] == "lugre_steering/calibration/1"
+    assert (out / "calibration.png").read_bytes().startswith(b"\x89PNG")
+    note = vehicle_file.load(out / "calibrated.yaml").provenance["calibration"]
+    assert note["data"] == [str(BAG)]
+    assert note["heldout_rmse_Nm"] == printed["heldout_rmse_Nm"]
+    assert note["sheet"] == str(sheet)
+
+
+def test_replay_with_the_calibrated_vehicle_is_better(commanded, tmp_path):
+    sheet, out, _ = commanded
+    alone = tmp_path / "elsewhere.yaml"
+    alone.write_bytes((out / "calibrated.yaml").read_bytes())
+    before = replay([BAG], sheet, tmp_path / "a")["overall"]["rmse_Nm"]
+    after = replay([BAG], alone, tmp_path / "b")["overall"]["rmse_Nm"]
+    truth = replay([BAG], SHEET_FILE, tmp_path / "c")["overall"]["rmse_Nm"]
+    assert after < 0.1 * before
+    assert after == pytest.approx(truth, rel=0.1)
+
+
+STILL = Manoeuvre("still", "", (Hold(15.0),))
+TINY = Manoeuvre("tiny", "", (Hold(5.0), Sweep(0.5, 0.5, 5.0), Sweep(0.0, 0.5, 5.0)))
+SHORT = Manoeuvre("short", "", (Hold(0.5), Sweep(14.0, 8.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "said"), [(STILL, "friction does not slide"), (TINY, "friction does not slide"), (SHORT, "s in all")]
+)
+def test_recordings_that_determine_nothing_are_refused(manoeuvre, said):
+    with pytest.raises(DataError, match=said) as error:
+        calibrate_recordings(coverage.record(SHEET, [manoeuvre], 1), SHEET)
+    assert "varied-rates" in str(error.value)
+
+
+def test_a_missing_line_is_named():
+    recording = coverage.record(SHEET, coverage.QUICK[:1], 1)[0]
+    pressure = {line: signal for line, signal in recording.pressure.items() if line != "aux_b"}
+    with pytest.raises(DataError, match="pressure/aux_b"):
+        calibrate_recordings([dataclasses.replace(recording, pressure=pressure)], SHEET)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--free", "viscosity"], "--free viscosity"),
+        (["--fix", "speed"], "--fix speed"),
+        (["--prior", "stiffness"], "--prior stiffness"),
+        (["--prior", "stiffness=0"], "--prior stiffness"),
+        (["--prior", "stiffness=0.1", "--no-prior"], "--no-prior"),
+    ],
+)
+def test_wrong_options_end_with_one_line(options, said, tmp_path):
+    arguments = ["calibrate", str(BAG), "--vehicle", str(SHEET_FILE), "--out", str(tmp_path / "out"), *options]
+    outcome = CliRunner().invoke(app, arguments)
+    assert outcome.exit_code == 2
+    assert len(outcome.stderr.splitlines()) == 1
+    assert said in outcome.stderr
+    assert not (tmp_path / "out").exists()
