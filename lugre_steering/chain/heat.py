@@ -25,7 +25,8 @@ def advance_heat(p, s, energy, dt, effects):
 
     heat_partition: (1 - ground_share) of it enters the rubber. carcass_heat_sink: a second node of its own capacity
     behind the tread, coupled by a conductance. flash_temperature: a resistance times the low-passed power, which
-    beyond saturation_power counts with its root (large Peclet number), is added where friction reads the temperature. ambient_drift: the air warms linearly.
+    beyond saturation_power counts with its root (large Peclet number), is added where friction reads the temperature.
+    ambient_drift: the air warms linearly.
     """
     if not effects:
         s.temperature = heat(s.temperature, energy, dt, p.heat_capacity, p.cooling, s.air_temperature)

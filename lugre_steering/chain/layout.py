@@ -43,11 +43,12 @@ EFFECT_FIELDS = (
     "surface_patch_time_start", "surface_patch_time_end", "wear_polishing_amount", "wear_polishing_slip_scale",
     "static_ageing_rate", "static_ageing_dwell", "static_ageing_slip_scale", "stress_relaxation_per_decade",
     "stress_relaxation_onset",
-    "stress_relaxation_recovery_angle", "payne_softening_amplitude", "payne_softening_angle", "mullins_softening_amplitude",
-    "viscous_friction_sigma_2", "distributed_contact_spread",
+    "stress_relaxation_recovery_angle", "payne_softening_amplitude", "payne_softening_angle",
+    "mullins_softening_amplitude", "viscous_friction_sigma_2", "distributed_contact_spread",
     # thermal
     "heat_partition_ground_share", "carcass_heat_sink_conductance", "carcass_heat_sink_capacity",
-    "flash_temperature_resistance", "flash_temperature_saturation_power", "flash_temperature_time_constant", "ambient_drift_rate",
+    "flash_temperature_resistance", "flash_temperature_saturation_power", "flash_temperature_time_constant",
+    "ambient_drift_rate",
     # parallel torque
     "end_stop_engage_angle", "end_stop_stiffness", "end_stop_cubic_stiffness", "end_stop_loss",
     "end_stop_damping", "end_stop_shift",

@@ -17,8 +17,8 @@ _ITERATIONS = 12
 def wind_up(p, torque):
     """Angle [rad] lost between sensor and track under ``torque`` [N m], and its slope [rad/(N m)].
 
-    linkage_compliance: c M / (1 + stiffening |M|). backlash: width / 2 tanh(M / flank torque), a gap whose flank changes
-    where the torque changes sign.
+    linkage_compliance: c M / (1 + stiffening |M|). backlash: width / 2 tanh(M / flank torque), a gap whose flank
+    changes where the torque changes sign.
     """
     stiffer = 1.0 + p.linkage_compliance_stiffening * abs(torque)
     angle = p.linkage_compliance_compliance * torque / stiffer
