@@ -41,11 +41,11 @@ def split(problem: Problem) -> Split:
         block = min(BLOCK_S, max(2.0, elapsed[-1] / 9.0))
         gap = min(GAP_S, 0.15 * block)
         index = (elapsed / block).astype(int)
-        role = (index + bag) % CYCLE == CYCLE - 1
+        role = _held(index, bag)
         within = elapsed - index * block
         edge = np.zeros(run.time.size, bool)
         for step in (-1, 1):
-            neighbour = (index + step + bag) % CYCLE == CYCLE - 1
+            neighbour = _held(index + step, bag)
             near = within < gap if step < 0 else within > block - gap
             edge |= near & (neighbour != role)
         held[part] = role & ~edge & run.valid
@@ -53,3 +53,9 @@ def split(problem: Problem) -> Split:
         cluster[part] = first + (elapsed / CLUSTER_S).astype(int)
         first = int(cluster[part][-1]) + 1
     return Split(fit, held, cluster)
+
+
+def _held(index: NDArray[np.int64], bag: int) -> Mask:
+    """Whether blocks are held out; never the first, which alone shows the bristles that a bag starts with."""
+    held: Mask = (index > 0) & ((index + bag) % CYCLE == CYCLE - 1)
+    return held
