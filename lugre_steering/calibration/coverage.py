@@ -133,7 +133,8 @@ def main() -> None:
             print(f"{number} cases: {100.0 * covered:.1f} % of {len(rows)} intervals hold the truth", flush=True)
     for name in dict.fromkeys(row.name for row in rows):
         own = [row for row in rows if row.name == name]
-        covered, determined = (100.0 * np.mean(flags) for flags in zip(*((r.covered, r.determined) for r in own)))
+        covered = 100.0 * np.mean([row.covered for row in own])
+        determined = 100.0 * np.mean([row.determined for row in own])
         worst = 100.0 * max(row.error for row in own)
         print(f"{name:32s} covered {covered:5.1f} %  largest error {worst:6.2f} %  determined {determined:3.0f} %")
 
