@@ -40,8 +40,9 @@ def parallel_torque(p, s, d_theta, omega, alpha):
 def end_stop(p, s, d_theta, omega):
     """Elastic limit device: sgn(theta) (k1 x + k3 x**3 + c x'), x = |theta| - engage_angle > 0; less by ``loss``.
 
-    The damping c acts while the stop is driven in (x' > 0). ``shift`` moves the knee of negative angles only. Compare the
-    translational hard stop of multibody libraries; hysteresis as a share of the loading branch (rubber buffers: 0.15 ... 0.4).
+    The damping c acts while the stop is driven in (x' > 0). ``shift`` moves the knee of negative angles only.
+    Compare the translational hard stop of multibody libraries; hysteresis as a share of the loading branch (rubber
+    buffers: 0.15 ... 0.4).
     """
     engage = p.end_stop_engage_angle + (p.end_stop_shift if s.theta < 0.0 else 0.0)
     x = abs(s.theta) - engage
@@ -77,8 +78,7 @@ def losses(p, s, omega, d_theta, load):
 
     cylinder_friction: (coulomb + load_share |load|) times a direction function, half of it (``holding``) kept at rest
     by the seal, raised by ``breakaway`` at low speed (Stribeck), plus viscous omega; sign changes over ``rate_scale``.
-    line_loss: b omega and c omega
-    |omega|. back_pressure: constant, opposes motion, vanishes at rest.
+    line_loss: b omega and c omega |omega|. back_pressure: constant, opposes motion, vanishes at rest.
     """
     torque = p.cylinder_friction_viscous * omega + p.line_loss_linear_b * omega
     torque += p.line_loss_quadratic_c * omega * abs(omega)
