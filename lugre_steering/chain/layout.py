@@ -58,7 +58,9 @@ EFFECT_FIELDS = (
     "cylinder_friction_coulomb", "cylinder_friction_load_share", "cylinder_friction_viscous",
     "cylinder_friction_holding", "cylinder_friction_breakaway",
     "cylinder_friction_rate_scale", "line_loss_linear_b", "line_loss_quadratic_c",
-    "back_pressure_torque", "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
+    "back_pressure_torque",
+    "back_pressure_flow",
+    "back_pressure_rate_scale", "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
 )  # fmt: skip
 
 PARAMETERS = np.dtype([(name, np.float64) for name in BASELINE_FIELDS + EFFECT_FIELDS])

@@ -78,7 +78,7 @@ def losses(p, s, omega, d_theta, load):
 
     cylinder_friction: (coulomb + load_share |load|) times a direction function, half of it (``holding``) kept at rest
     by the seal, raised by ``breakaway`` at low speed (Stribeck), plus viscous omega; sign changes over ``rate_scale``.
-    line_loss: b omega and c omega |omega|. back_pressure: constant, opposes motion, vanishes at rest.
+    line_loss: b omega and c omega |omega|. back_pressure: opposes motion, vanishes at rest, grows with the return flow.
     """
     torque = p.cylinder_friction_viscous * omega + p.line_loss_linear_b * omega
     torque += p.line_loss_quadratic_c * omega * abs(omega)
@@ -88,7 +88,8 @@ def losses(p, s, omega, d_theta, load):
         level = p.cylinder_friction_coulomb / p.sides + p.cylinder_friction_load_share * abs(load)
         bump = 1.0 + p.cylinder_friction_breakaway * exp(-((omega / 0.02) ** 2))
         torque += level * bump * (p.cylinder_friction_holding * s.seal + (1.0 - p.cylinder_friction_holding) * moving)
-        torque += p.back_pressure_torque / p.sides * moving
+        returned = math.tanh(omega / (SIGN_RATE_RAD_S + p.back_pressure_rate_scale))
+        torque += p.back_pressure_torque / p.sides * returned * (1.0 + p.back_pressure_flow * abs(omega))
     return torque
 
 

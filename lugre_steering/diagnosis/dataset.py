@@ -103,10 +103,12 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
 
 def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
     """Uniform clock over the span that all channels share, at the slowest channel's rate; false where any has a gap."""
-    start = max(signal.time_s[0] for signal in signals.values())
-    end = min(signal.time_s[-1] for signal in signals.values())
-    step = max(float(np.median(np.diff(signal.time_s))) for signal in signals.values())
-    step = max(step, 1.0 / MAX_RATE_HZ)
+    spacing = {key: float(np.median(np.diff(signal.time_s))) for key, signal in signals.items()}
+    step = max(*spacing.values(), 1.0 / MAX_RATE_HZ)
+    # A faster signal is averaged over each step: the window must not reach beyond its ends.
+    margin = {key: 0.5 * step if round(step / spacing[key]) > 1 else 0.0 for key in signals}
+    start = max(signal.time_s[0] + margin[key] for key, signal in signals.items())
+    end = min(signal.time_s[-1] - margin[key] for key, signal in signals.items())
     count = int((end - start) / step) + 1 if end > start else 0
     if count < 20:
         raise DataError(f"{name}: the channels share {max(end - start, 0.0):.2f} s, expected at least {20 * step:.1f} s")

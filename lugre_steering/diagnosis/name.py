@@ -26,6 +26,8 @@ WHOLE = 0.75
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
 TIE_T = 2.5
+TIE_GAIN = 0.93
+"""A rival must gain at least this share of what the best gains to be tied with it."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,7 @@ def search(
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
         steps.append((best.fit, Found(best.score, names, tuple(trials), before - best.cost), gained))
         current = best.fit
+        steps, current = _prune(steps, problem, weight, samples, current)
         if best.cost - samples < OWN_ERROR * samples:
             break
     kept = _keep(steps, problem, weight, start_cost, samples)
@@ -124,6 +127,22 @@ def search(
         baseline, final, tuple(found for _, found, _ in steps[:kept]), excess / samples, float(np.clip(explained, 0.0, 1.0)),
         kept > 0 or not steps, first_scores, tuple(all_trials),
     )  # fmt: skip
+
+
+def _prune(
+    steps: list[tuple[Fit, Found, float]], problem: Problem, weight: Array, samples: float, current: Fit
+) -> tuple[list[tuple[Fit, Found, float]], Fit]:
+    """Drop earlier effects that the latest one has made superfluous."""
+    for index in range(len(steps) - 2, -1, -1):
+        rest = [effect for i, effect in enumerate(current.effects) if i != index]
+        without = fit(problem, weight, rest, current.x, evaluations=8)
+        if cost(problem, without, weight) - cost(problem, current, weight) < OWN_ERROR * samples:
+            dropped = steps[index][1]
+            current = without
+            last = steps[-1][1]
+            # Together they explained what the latest now explains alone, so the energy is its own.
+            steps = [*steps[:index], *steps[index + 1 : -1], (without, replace(last, gain=last.gain + dropped.gain), steps[-1][2])]
+    return steps, current
 
 
 def _keep(steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float) -> int:
@@ -214,7 +233,8 @@ def tied(
             continue
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
-        if t < TIE_T or other.cost - best.cost < 0.1 * misfit + 10.0:
+        close = before - other.cost > TIE_GAIN * (before - best.cost)
+        if (close and t < TIE_T) or other.cost - best.cost < 0.1 * misfit + 10.0:
             found.append(other)
     return found
 

@@ -8,10 +8,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
 
 from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.model import Model, build_model
@@ -32,8 +34,13 @@ def in_threads(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     """Map over threads (the compiled chain releases the interpreter lock), results in order."""
     if len(items) < 2:
         return [function(item) for item in items]
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return list(pool.map(function, items))
+    return list(_pool().map(function, items))
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    """One pool for the process; the mapped functions never map themselves."""
+    return ThreadPoolExecutor(os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)
@@ -261,24 +268,56 @@ def fit(
     def prediction(p: Array) -> Array:
         return problem.predict_all(*unpack(p))
 
-    def residual(p: Array) -> Array:
-        return np.concatenate([(prediction(p) - problem.measured) * weight, p * prior])
-
-    def jacobian(p: Array) -> Array:
-        base = prediction(p)
+    def jacobian(p: Array, base: Array) -> Array:
         columns = in_threads(lambda j: _column(problem, unpack, p, j, n, low, high, base), range(p.size))
-        return np.vstack([np.column_stack(columns) * weight[:, None], np.diag(prior)])
+        return np.column_stack(columns) * weight[:, None]
 
-    solution = least_squares(
-        residual, np.clip(p0, low + 1e-9, high - 1e-9), jac=jacobian, bounds=(low, high), max_nfev=evaluations,
-        loss="soft_l1" if robust else "linear", f_scale=ROBUST, xtol=1e-5, ftol=1e-7, gtol=1e-8,
-    )  # fmt: skip
-    x, fitted = unpack(solution.x)
-    final = jacobian(solution.x)
-    plain = residual(solution.x)
-    normal = final.T @ final
-    covariance = np.linalg.pinv(normal, rcond=1e-12) * np.outer(scale, scale)
-    return Fit(x, tuple(fitted), prediction(solution.x), float(plain @ plain), final[: weight.size] / scale, covariance)
+    p = np.clip(p0, low, high)
+    base = prediction(p)
+    damping = 1e-3
+    for _ in range(evaluations):
+        slope = jacobian(p, base)
+        error = (base - problem.measured) * weight
+        influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2) if robust else np.ones_like(error)
+        normal = slope.T @ (slope * influence[:, None]) + np.diag(prior**2)
+        gradient = slope.T @ (error * influence) + prior**2 * p
+        before = _cost(error, p * prior, robust)
+        while damping < 1e6:
+            trial = np.clip(p + _bounded_step(normal, gradient, damping, low - p, high - p), low, high)
+            moved = prediction(trial)
+            after = _cost((moved - problem.measured) * weight, trial * prior, robust)
+            if after < before:
+                break
+            damping *= 8.0
+        else:
+            break
+        p, base, damping = trial, moved, max(damping / 6.0, 1e-9)
+        if before - after < 1e-6 * after:
+            break
+    x, fitted = unpack(p)
+    final = jacobian(p, base)
+    covariance = np.linalg.pinv(final.T @ final + np.diag(prior**2), rcond=1e-12) * np.outer(scale, scale)
+    return Fit(x, tuple(fitted), base, _cost((base - problem.measured) * weight, p * prior, False), final / scale, covariance)
+
+
+def _cost(error: Array, prior_error: Array, robust: bool) -> float:
+    """Sum of squares, or its soft L1 form beyond ROBUST."""
+    if robust:
+        return float(2.0 * ROBUST**2 * np.sum(np.sqrt(1.0 + (error / ROBUST) ** 2) - 1.0) + prior_error @ prior_error)
+    return float(error @ error + prior_error @ prior_error)
+
+
+def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
+    """Levenberg-Marquardt step that respects bounds: min 1/2 d'(A + damping diag A) d + g'd, low <= d <= high.
+
+    The small normal equations keep the cost of a step independent of the number of samples.
+    """
+    diagonal = np.diag(normal)
+    damped = normal + np.diag(damping * diagonal + 1e-9 * max(float(diagonal.max()), 1e-30))
+    factor = np.linalg.cholesky(damped)
+    span = np.maximum(high - low, 1e-12)
+    target = solve_triangular(factor, -gradient, lower=True)
+    return np.asarray(lsq_linear(factor.T, target, (low, low + span), method="bvls").x)
 
 
 def _column(

@@ -32,8 +32,13 @@ EFFECTS = (
     ),
     Effect(
         "back_pressure", "measurement", 2, "Back pressure of the return line",
-        "M = torque sgn(omega)", "Merritt 1967", "opposes motion, vanishes at rest", "direction",
-        (Parameter("torque", "N m", "of the vehicle", 300.0, 0.0, 2e4),), ("cylinder_friction",),
+        "M = torque (1 + flow |omega|) sgn(omega)", "Merritt 1967", "opposes motion, vanishes at rest", "direction",
+        (
+            Parameter("torque", "N m", "of the vehicle", 300.0, 0.0, 2e4),
+            Parameter("flow", "s/rad", "growth with the return flow", 3.0, 0.0, 100.0, optional=True),
+            Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.3, optional=True),
+        ),
+        ("cylinder_friction",),
     ),
     Effect(
         "relief_saturation", "measurement", 2, "Relief valve limits the torque",

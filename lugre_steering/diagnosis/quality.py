@@ -1,0 +1,318 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Faulty sensors, found before any physics is named: each channel against itself, then all of them against the nominal model.
+
+What a fault spoils is left out of the recording that diagnosis uses, never repaired; every removal is a finding. Thresholds
+are multiples of the channel's own noise, never below the sheet's noise or one step of its resolution, so that noise-free
+and coarsely quantised recordings stay silent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
+
+from lugre_steering.diagnosis import wiring
+from lugre_steering.diagnosis.dataset import GAP_S, angle_noise
+from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
+from lugre_steering.vehicle import Vehicle
+
+Mask = NDArray[np.bool_]
+Intervals = tuple[tuple[float, float], ...]
+
+STUCK_S = 1.0
+"""An exact repeat longer than this is a stuck sensor, where noise or a jump shows that the value should have moved."""
+CLIPPED_SAMPLES = 5
+"""So many repeats in a row of a noisy channel's extreme value are a limit of the sensor, not chance."""
+SPIKE_SIGMA = 8.0
+SPIKE_SAMPLES = 3
+"""Longer excursions are not isolated samples, and may be physics."""
+NOISE_RATIO = 2.0
+NOISE_S = 2.0
+NOISE_RATE_HZ = 20.0
+"""Slower channels cannot tell noise from motion."""
+WINDOW_S = 1.0
+LATE_S = 1.0
+"""A channel that starts later or ends earlier than the others by more than this is missing there."""
+FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+"""Fourth difference: blind to motion and to pump ripple far below the sampling rate, sqrt(70) times white noise."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What is wrong with a recording, and the recording without the samples that may not be used."""
+
+    findings: tuple[Finding, ...]
+    recording: Recording
+
+    @property
+    def blocking(self) -> tuple[Finding, ...]:
+        """Findings that make any verdict about physics meaningless."""
+        return tuple(finding for finding in self.findings if finding.finding in wiring.BLOCKING)
+
+
+def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
+    """All findings about one recording of ``vehicle``, and what diagnosis may use of it."""
+    findings = list(recording.findings) + _rejected(recording)
+    signals = {c: s for c in vehicle.channels if (s := _signal(recording, c)) is not None and s.time_s.size >= 20}
+    span = (min(s.time_s[0] for s in signals.values()), max(s.time_s[-1] for s in signals.values())) if signals else (0, 0)
+    looks = {c: _Look.of(s, _sheet_noise(vehicle, c)) for c, s in signals.items() if c.kind is not Kind.AIR_TEMPERATURE}
+    clean: dict[Channel, Signal] = {}
+    for channel, look in looks.items():
+        others = [other for c, other in looks.items() if c is not channel and c.kind is channel.kind]
+        found, keep = _examine(channel, look, others, span, vehicle.sensors.pressure_range_Pa)
+        findings += found
+        clean[channel] = Signal(look.time[keep], look.value[keep])
+    usable = _with_signals(recording, clean)
+    return Quality((*findings, *wiring.inspect(usable, vehicle)), usable)
+
+
+def _signal(recording: Recording, channel: Channel) -> Signal | None:
+    if channel.kind is Kind.ANGLE:
+        return recording.angle.get(channel.name)
+    if channel.kind is Kind.PRESSURE:
+        return recording.pressure.get(channel.name)
+    return recording.measured_torque if channel.kind is Kind.TORQUE else None
+
+
+def _with_signals(recording: Recording, clean: Mapping[Channel, Signal]) -> Recording:
+    """The recording with these signals; rates only where the angle beside them was kept."""
+    of = {kind: {c.name: signal for c, signal in clean.items() if c.kind is kind} for kind in Kind}
+    rate = {}
+    for name, signal in recording.rate.items():
+        kept = np.isin(signal.time_s, of[Kind.ANGLE].get(name, signal).time_s)
+        rate[name] = Signal(signal.time_s[kept], signal.value[kept])
+    return replace(
+        recording, rate=rate, angle={**recording.angle, **of[Kind.ANGLE]}, pressure={**recording.pressure, **of[Kind.PRESSURE]},
+        measured_torque=next(iter(of[Kind.TORQUE].values()), recording.measured_torque),
+    )  # fmt: skip
+
+
+def _rejected(recording: Recording) -> list[Finding]:
+    """One finding per topic of which reading left something out."""
+    found = []
+    for topic, reasons in recording.rejected.items():
+        count = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in reasons.items())
+        statement = f"{topic}: {sum(reasons.values())} messages cannot be used ({count}); look at the driver and its clock"
+        found.append(Finding("rejected_samples", topic, statement))
+    return found
+
+
+def _sheet_noise(vehicle: Vehicle, channel: Channel) -> float:
+    """Standard deviation of one sample as the vehicle file says, in the channel's unit."""
+    if channel.kind is Kind.ANGLE:
+        return angle_noise(vehicle)
+    if channel.kind is Kind.TORQUE and vehicle.torque_sensor is not None:
+        return vehicle.torque_sensor.noise_Nm
+    return vehicle.sensors.pressure_noise_Pa
+
+
+@dataclass(frozen=True)
+class _Look:
+    """One channel (n,) with what it shows of itself.
+
+    ``period`` [s], ``resolution`` smallest step, ``sheet`` its noise by the vehicle file, ``sigma`` (n,) white noise around
+    each sample beyond what stamp jitter explains, ``flickers`` (n,) where noise turns the signal around at every other sample.
+    """
+
+    time: Array
+    value: Array
+    period: float
+    resolution: float
+    sheet: float
+    sigma: Array
+    flickers: Mask
+
+    @staticmethod
+    def of(signal: Signal, sheet: float) -> _Look:
+        time, value = signal.time_s, signal.value
+        spacing = np.diff(time)
+        period = float(np.median(spacing))
+        levels = np.diff(np.unique(value))
+        # Of a continuous signal this is next to nothing; of a quantised one its step, even if spikes lie off the grid.
+        resolution = float(np.quantile(levels, 0.1)) if levels.size else 0.0
+        sigma = _white_noise(time, value, period)
+        turns = np.zeros(value.size)
+        step = np.diff(value)
+        turns[1:-1] = step[1:] * step[:-1] < 0.0
+        loud = sigma > max(resolution, 1e-6 * float(np.ptp(value)), 0.05 * sheet)
+        flickers = (uniform_filter1d(turns, _samples(0.5, period)) > 0.35) & loud
+        return _Look(time, value, period, resolution, sheet, sigma, flickers)
+
+    @property
+    def noisy(self) -> bool:
+        """The sensor shows noise well above its resolution somewhere, so it cannot repeat a value for long."""
+        return float(self.flickers.sum()) * self.period >= 1.0
+
+    @property
+    def floor(self) -> float:
+        """Level below which nothing counts as noise."""
+        return max(self.sheet, 0.5 * self.resolution, 1e-9 * float(np.abs(self.value).max()))
+
+    def runs(self, mask: Mask, bridge_s: float = 0.0) -> list[tuple[int, int]]:
+        """(first, last) sample of each stretch of ``mask``; stretches less than ``bridge_s`` apart count as one."""
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+        merged: list[tuple[int, int]] = []
+        for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+            if merged and self.time[first] - self.time[merged[-1][1]] < bridge_s:
+                merged[-1] = (merged[-1][0], last)
+            else:
+                merged.append((first, last))
+        return merged
+
+    def intervals(self, runs: list[tuple[int, int]]) -> Intervals:
+        """Stretches [s], half a period around their samples."""
+        half = 0.5 * self.period
+        return tuple((float(self.time[a] - half), float(self.time[b] + half)) for a, b in runs)
+
+
+def _samples(duration_s: float, period: float) -> int:
+    return max(3, round(duration_s / period))
+
+
+def _white_noise(time: Array, value: Array, period: float) -> Array:
+    """Standard deviation (n,) of the white part around each sample, from fourth differences over WINDOW_S.
+
+    What stamp jitter makes of a slope is taken off; windows with a lost message do not count.
+    """
+    width = _samples(WINDOW_S, period)
+    spacing = np.diff(time)
+    regular = np.zeros(value.size)
+    regular[2:-2] = np.lib.stride_tricks.sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
+    size = np.zeros(value.size)
+    size[2:-2] = np.abs(np.convolve(value, FOURTH, mode="valid"))
+    share = uniform_filter1d(regular, width)
+    mean = uniform_filter1d(size * regular, width) / np.maximum(share, 0.1)
+    sigma = mean * np.sqrt(np.pi / 2.0) / np.sqrt(FOURTH @ FOURTH)
+    jitter = 1.4826 * float(np.median(np.abs(spacing - period)))
+    slope = np.sqrt(uniform_filter1d(np.gradient(uniform_filter1d(value, _samples(0.1, period)), time) ** 2, width))
+    return np.sqrt(np.maximum(sigma**2 - (jitter * slope) ** 2, 0.0))
+
+
+def _examine(
+    channel: Channel, look: _Look, others: list[_Look], span: tuple[float, float], pressure_range: float
+) -> tuple[list[Finding], Mask]:
+    """Findings about one channel by itself, and which of its samples may be used."""
+    topic, found, keep = channel.topic, [], np.ones(look.value.size, bool)
+
+    def report(name: str, intervals: Intervals, statement: str) -> None:
+        if intervals:
+            found.append(Finding(name, topic, f"{topic}: {statement}", intervals))
+
+    gaps = _gaps(look, span)
+    report("dropout", gaps, f"no samples for {_total(gaps):.2f} s; check the cable, the driver and the load of the logger")
+
+    stuck, clipped = _held(look, others, None if channel.kind is not Kind.PRESSURE else pressure_range, channel.kind)
+    at = look.intervals(stuck)
+    report("stuck_sensor", at, f"repeats one value exactly for {_total(at):.1f} s; not used there, replace the sensor or its driver")
+    at = look.intervals(clipped)
+    name, extreme = ("clipped_angle", "end") if channel.kind is Kind.ANGLE else ("saturation", "upper limit")
+    report(name, at, f"stands at the {extreme} of its range for {_total(at):.1f} s; the true value lies beyond, not used there")
+    for first, last in stuck + clipped:
+        keep[first : last + 1] = False
+
+    spikes = look.runs(_spikes(look) & keep)
+    spikes = [(a, b) for a, b in spikes if b - a < SPIKE_SAMPLES]
+    for first, last in spikes:
+        keep[first : last + 1] = False
+    report("spikes", look.intervals(spikes), f"{len(spikes)} isolated outliers, not used; check shielding and connectors")
+
+    noisy = _noise_change(look, keep)
+    at = look.intervals(noisy)
+    for first, last in noisy:
+        keep[first : last + 1] = False
+    report(
+        "noise_change", at,
+        f"noise more than {NOISE_RATIO:g} times that of the rest of the run for {_total(at):.1f} s; not used there",
+    )  # fmt: skip
+    return found, keep
+
+
+def _total(intervals: Intervals) -> float:
+    return sum(end - start for start, end in intervals)
+
+
+def _gaps(look: _Look, span: tuple[float, float]) -> Intervals:
+    """Stretches without samples: those that diagnosis cannot bridge, and a late start or early end."""
+    time, limit = look.time, max(GAP_S, 3.0 * look.period)
+    at = np.flatnonzero(np.diff(time) > limit)
+    gaps = [(float(time[i]), float(time[i + 1])) for i in at]
+    if time[0] - span[0] > LATE_S:
+        gaps.insert(0, (float(span[0]), float(time[0])))
+    if span[1] - time[-1] > LATE_S:
+        gaps.append((float(time[-1]), float(span[1])))
+    return tuple(gaps)
+
+
+def _held(
+    look: _Look, others: list[_Look], upper: float | None, kind: Kind
+) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Stretches of a repeated value: (stuck, clipped). A constant value alone is no fault: parked vehicles have them."""
+    value, low, high = look.value, float(look.value.min()), float(look.value.max())
+    if low == high:
+        alive = any(other.noisy or _moved(other, look.time[0], look.time[-1]) for other in others)
+        return ([(0, value.size - 1)] if alive else []), []
+    repeats = np.zeros(value.size, bool)
+    repeats[1:] = np.diff(value) == 0.0
+    repeats[:-1] |= repeats[1:]
+    starts = np.flatnonzero(repeats & (np.diff(value, prepend=np.nan) != 0.0))
+    stuck, pinned = [], np.zeros(value.size, bool)
+    if upper is not None:
+        pinned |= value >= 0.999 * upper
+    ends = np.append(np.flatnonzero(np.diff(value) != 0.0), value.size - 1)
+    for first in starts.tolist():
+        last = int(ends[np.searchsorted(ends, first)])
+        jumps = _jumps(look, first, last)
+        if value[first] in (low, high) and look.noisy and not jumps:
+            # A pressure sensor that cannot read below zero rests at zero: no fault.
+            pinned[first : last + 1] |= last - first + 1 >= CLIPPED_SAMPLES and not (kind is Kind.PRESSURE and value[first] <= 0.0)
+        elif look.time[last] - look.time[first] > STUCK_S and (
+            look.noisy or jumps or (kind is Kind.ANGLE and any(_moved(o, look.time[first], look.time[last]) for o in others))
+        ):
+            stuck.append((first, last))
+    return stuck, [run for run in look.runs(pinned, GAP_S) if run[1] - run[0] + 1 >= CLIPPED_SAMPLES]
+
+
+def _jumps(look: _Look, first: int, last: int) -> bool:
+    """The value jumps into or out of a stretch, far beyond noise and beyond how quickly it moves just outside."""
+    value, time = look.value, look.time
+    for inside, outside, beyond in ((first, first - 1, slice(max(first - 11, 0), first)), (last, last + 1, slice(last + 1, last + 12))):
+        if 0 <= outside < value.size and abs(time[outside] - time[inside]) < 3.0 * look.period:
+            usual = float(np.abs(np.diff(value[beyond])).max(initial=0.0))
+            if abs(value[outside] - value[inside]) > max(10.0 * look.floor, 10.0 * look.resolution, 5.0 * usual):
+                return True
+    return False
+
+
+def _moved(look: _Look, start: float, end: float) -> bool:
+    """Far beyond its noise within [start, end] s."""
+    part = look.value[(look.time >= start) & (look.time <= end)]
+    return part.size > 0 and float(np.ptp(part)) > 40.0 * max(look.floor, look.resolution)
+
+
+def _spikes(look: _Look) -> Mask:
+    """Samples off the running median by SPIKE_SIGMA of the local scatter, more than the slope there can make."""
+    middle = median_filter(look.value, 2 * SPIKE_SAMPLES + 1, mode="nearest")
+    off = np.abs(look.value - middle)
+    scatter = 1.4826 * median_filter(off, _samples(WINDOW_S, look.period), mode="nearest")
+    slope = np.abs(np.gradient(middle, look.time)) * look.period
+    steepest = uniform_filter1d(slope, 2 * SPIKE_SAMPLES + 1) * SPIKE_SAMPLES
+    found: Mask = off > SPIKE_SIGMA * np.maximum(scatter, max(look.floor, look.resolution)) + steepest
+    return found
+
+
+def _noise_change(look: _Look, keep: Mask) -> list[tuple[int, int]]:
+    """Stretches longer than NOISE_S with more than NOISE_RATIO times the noise of the quieter part of the run."""
+    if look.period > 1.0 / NOISE_RATE_HZ or keep.sum() < 2 * _samples(WINDOW_S, look.period):
+        return []
+    sigma = np.zeros(look.value.size)
+    sigma[keep] = _white_noise(look.time[keep], look.value[keep], look.period)
+    quiet = max(float(np.quantile(sigma[keep], 0.25)), look.floor)
+    return [
+        (first, last) for first, last in look.runs(sigma > NOISE_RATIO * quiet, 0.5 * WINDOW_S)
+        if look.time[last] - look.time[first] > NOISE_S
+    ]  # fmt: skip
