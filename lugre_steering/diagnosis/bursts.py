@@ -56,8 +56,8 @@ class Bursts:
         longest = max(end - start for start, end in self.intervals)
         series = "" if self.period_s is None else f", every {self.period_s:.2f} s"
         return (
-            f"{len(self.peaks)} short bursts (longest {longest:.2f} s){series} hold {100 * self.share:.0f} % of what the "
-            "model leaves over, and do not come again when the joint comes back to the same angle and rate: "
+            f"{len(self.peaks)} short bursts (longest {longest:.2f} s){series} hold {100 * self.share:.0f} % of what "
+            "the model leaves over, and do not come again when the joint comes back to the same angle and rate: "
             "a disturbance from outside, not a law of the motion"
         )
 

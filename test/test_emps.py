@@ -1,0 +1,137 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A real ball screw drive, the EMPS benchmark; needs the user's own copy of the data (folder in LUGRE_STEERING_EMPS).
+
+Published reference model (Janot, Gautier, Brunot 2019): M = 95.11 kg, Fv = 203.5 N s/m, Fc = 20.39 N, offset -3.16 N.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.bag import read_recording
+from lugre_steering.diagnosis.bursts import all_bursts
+from lugre_steering.diagnosis.dataset import Run, prepare
+from lugre_steering.diagnosis.name import Search, search
+from lugre_steering.diagnosis.noise import noise_model
+from lugre_steering.diagnosis.problem import Problem, fit
+from lugre_steering.diagnosis.split import Split, split
+from lugre_steering.importing import import_table
+from lugre_steering.simulate.manoeuvres import BUILT_IN, motion_of
+from lugre_steering.simulate.run import sensing_of, simulate
+
+ROOT = Path(__file__).parents[1]
+DATA = Path(os.environ.get("LUGRE_STEERING_EMPS", ROOT.parent / "shared" / "real" / "emps"))
+VEHICLE = ROOT / "config" / "emps_vehicle.yaml"
+QUIET, PULSES = "DATA_EMPS", "DATA_EMPS_PULSES"
+
+needs_data = pytest.mark.skipif(not (DATA / f"{QUIET}.mat").is_file(), reason="no EMPS data (LUGRE_STEERING_EMPS)")
+
+
+def test_the_shipped_vehicle_file_describes_a_linear_axis_without_inertia() -> None:
+    vehicle = vehicle_file.load(VEHICLE)
+    assert (vehicle.coordinate.unit, vehicle.coordinate.force_unit) == ("m", "N")
+    run = simulate(vehicle, motion_of(BUILT_IN["small-loops"], vehicle), sensing_of(vehicle))
+    assert float(np.abs(run.truth.torque).max()) < 25.0  # friction alone
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
+    vehicle, folder, found = vehicle_file.load(VEHICLE), tmp_path_factory.mktemp("emps"), {}
+    for name in (QUIET, PULSES):
+        import_table(DATA / f"{name}.mat", ROOT / "config" / "emps_map.yaml", folder / name)
+        found[name] = prepare(read_recording(folder / name, vehicle.channels), vehicle)
+    return found
+
+
+def diagnosed(runs: Sequence[Run]) -> tuple[Problem, Split, Search]:
+    problem = Problem(vehicle_file.load(VEHICLE), runs)
+    roles = split(problem)
+    baseline = fit(problem, roles.fit / np.concatenate([run.sigma for run in runs]))
+    noise = noise_model(problem, baseline.x, (), draws=12, seed=1)
+    baseline = fit(problem, roles.fit / noise.sigma, start=baseline.x)
+    return problem, roles, search(problem, noise, roles, baseline)
+
+
+def residual(problem: Problem, found: Search) -> np.ndarray:
+    return problem.measured - found.final.prediction
+
+
+@pytest.fixture(scope="module")
+def quiet(runs: dict[str, Run]) -> tuple[Problem, Split, Search]:
+    return diagnosed([runs[QUIET]])
+
+
+def values(problem: Problem, found: Search) -> dict[str, float]:
+    """Mass, viscous friction, Coulomb friction and offset, whatever of equal rivals was named."""
+    result = {"Fc": float(problem.fields(found.final.x)["coulomb_torque"])}
+    for candidate, numbers in found.final.effects:
+        name = candidate.effect.id
+        if name == "yaw_inertia":
+            result["M"] = numbers["inertia"]
+        elif name in ("viscous_friction", "line_loss_linear"):
+            result["Fv"] = next(iter(numbers.values()))
+        elif name == "direction_asymmetry":  # friction that differs by direction is an offset while the axis moves
+            result["offset"] = numbers["asymmetry"] * result["Fc"]
+        elif name == "slope_bias":
+            result["offset"] = numbers["torque"]
+    return result
+
+
+def check_published(found: dict[str, float]) -> None:
+    """Within a few per cent of numbers that others got from the same recording with another method."""
+    assert found["M"] == pytest.approx(95.11, rel=0.03)
+    assert found["Fv"] == pytest.approx(203.5, rel=0.05)
+    assert found["Fc"] == pytest.approx(20.39, rel=0.06)
+    assert found["offset"] == pytest.approx(-3.16, abs=0.3)
+
+
+@needs_data
+def test_it_discovers_what_the_literature_needed(quiet: tuple[Problem, Split, Search]) -> None:
+    problem, roles, found = quiet
+    check_published(values(problem, found))
+    held = roles.held
+    before = float(np.sqrt(np.mean((problem.measured - found.baseline.prediction)[held] ** 2)))
+    after = float(np.sqrt(np.mean(residual(problem, found)[held] ** 2)))
+    assert after < 0.08 * before
+    last = found.found[-1]
+    assert {found.final.effects[-1][0].effect.id, *last.rivals} >= {
+        "direction_asymmetry",
+        "slope_bias",
+    }  # a tie, and said so
+
+
+@needs_data
+def test_it_predicts_unseen_data_as_well_as_the_published_model(quiet: tuple[Problem, Split, Search]) -> None:
+    problem, roles, found = quiet
+    run = problem.runs[0]
+    published = 95.11 * run.alpha[0] + 203.5 * run.omega[0] + 20.39 * np.sign(run.omega[0]) - 3.16
+    reference = float(np.sqrt(np.mean((run.measured - published)[roles.held] ** 2)))
+    assert float(np.sqrt(np.mean(residual(problem, found)[roles.held] ** 2))) < 1.05 * reference
+
+
+@needs_data
+def test_the_second_recording_holds_pulses_where_its_own_channel_says(
+    runs: dict[str, Run], quiet: tuple[Problem, Split, Search]
+) -> None:
+    assert all_bursts(quiet[0].runs, [residual(quiet[0], quiet[2])]) == [None]
+    problem, _, found = diagnosed([runs[PULSES]])
+    (bursts,) = all_bursts(problem.runs, [residual(problem, found)])
+    assert bursts is not None
+    assert bursts.period_s == pytest.approx(0.5, abs=0.01)
+    content = loadmat(DATA / f"{PULSES}.mat", squeeze_me=True)
+    edges = content["t"][np.flatnonzero(np.diff(content["pulses_N"].astype(int)))]
+    middle = np.array([0.5 * (a + b) for a, b in bursts.intervals])
+    assert np.mean(np.abs(middle[:, None] - edges).min(axis=1) < 0.03) > 0.9
+    assert np.mean(np.abs(edges[:, None] - middle).min(axis=1) < 0.03) > 0.8
+    clean = replace(runs[PULSES], valid=runs[PULSES].valid & ~bursts.covers(runs[PULSES].time))
+    problem, _, found = diagnosed([clean])
+    check_published(values(problem, found))  # the axis is the same
