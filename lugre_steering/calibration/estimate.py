@@ -120,7 +120,8 @@ def step_error(problem: Problem, x: Array, effects: Effects = ()) -> Array:
 
 
 def _every_second(run: Run) -> Run:
-    time, theta = run.time[::2], run.theta[:, ::2]
+    # Contiguous, or the compiled chain is compiled once more for another memory layout.
+    time, theta = run.time[::2].copy(), run.theta[:, ::2].copy()
     omega, alpha = motion(time, theta)
     return replace(run, time=time, theta=theta, omega=omega, alpha=alpha)
 
