@@ -1,0 +1,161 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures of a diagnosis as PNG."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.diagnosis.result import BagTrace, Diagnosis
+from lugre_steering.report import diagnosis_plots as plots
+from lugre_steering.report import shown
+from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, figure
+
+EVIDENCE_ROWS = 14
+POINTS = 6000
+
+
+def draw_all(diagnosis: Diagnosis, folder: Path) -> dict[str, Path]:
+    """Every picture that this diagnosis has something to show in, by what it shows."""
+    found: dict[str, Path] = {}
+
+    def draw(key: str, name: str, picture: Callable[[Path], None]) -> None:
+        stem, count = re.sub(r"[^\w.-]+", "_", name), 1
+        while (file := folder / (f"{stem}.png" if count == 1 else f"{stem}_{count}.png")) in found.values():
+            count += 1
+        picture(file)
+        found[key] = file
+
+    for i, trace in enumerate(diagnosis.traces):
+        draw(f"bag {i}", f"before_after_{trace.name}", partial(_before_after, diagnosis, trace))
+    for effect in diagnosis.json["effects"]:
+        if any(effect["id"] in trace.contributions for trace in diagnosis.traces):
+            draw(f"effect {effect['id']}", f"residual_{effect['id']}", partial(_residual, diagnosis, effect))
+    if diagnosis.evidence:
+        draw("evidence", "evidence", partial(_evidence, diagnosis))
+    if plots.heldout_rows(diagnosis):
+        draw("heldout", "heldout", partial(_heldout, diagnosis))
+    return found
+
+
+def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
+    colour, vehicle = plots.colours(diagnosis), diagnosis.vehicle
+    parts = {name: part for name, part in trace.contributions.items() if name in colour}
+    torque, left = (shown.torque_axis(vehicle, v) for v in (trace.measured, trace.measured - trace.baseline))
+    added = shown.torque_axis(vehicle, *parts.values())
+    caption = f"Bag {trace.name}. {diagnosis.json['statement']}"
+    if parts:
+        caption += " Shaded: where each effect acts."
+
+    def line(ax: Any, values: Any, scale: float, **style: Any) -> None:
+        points, width = shown.thin(values, POINTS)
+        ax.plot(
+            trace.time[0] + np.arange(points.size) * width * (trace.time[1] - trace.time[0]), points * scale, **style
+        )
+
+    with figure(3 if parts else 2, 1, caption, file, row_inches=2.2) as axes:
+        top, middle = axes[0, 0], axes[1, 0]
+        line(top, trace.measured, torque.scale, **MEASURED, label="measured")
+        line(top, trace.baseline, torque.scale, **ORIGINAL, label="recalibrated baseline")
+        line(
+            middle,
+            trace.measured - trace.baseline,
+            left.scale,
+            **{**ORIGINAL, "linestyle": "-", "linewidth": 0.9},
+            label="before",
+        )
+        if parts:
+            line(top, trace.augmented, torque.scale, **IMPROVED, label="with the effects found")
+            after = trace.measured - trace.augmented
+            line(middle, after, left.scale, **{**IMPROVED, "linestyle": "-", "linewidth": 0.9}, label="after")
+        for ax, title, unit in ((top, "torque", torque.label), (middle, "residual", left.label)):
+            ax.set_title(title)
+            ax.set_ylabel(unit)
+        for name, part in parts.items():
+            line(axes[2, 0], part, added.scale, color=colour[name], label=name)
+            for ax in axes[:, 0]:
+                for start, end in trace.intervals.get(name, ()):
+                    ax.axvspan(start, end, color=colour[name], alpha=0.13, linewidth=0)
+        if parts:
+            axes[2, 0].set_title("what each effect adds")
+            axes[2, 0].set_ylabel(added.label)
+        for ax in axes[:, 0]:
+            ax.set_xlim(float(trace.time[0]), float(trace.time[-1]))
+            ax.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+        axes[-1, 0].set_xlabel("time since the first stamp (s)")
+
+
+def _residual(diagnosis: Diagnosis, effect: dict[str, Any], file: Path) -> None:
+    cloud, colour = plots.Cloud.of(diagnosis, effect), plots.colours(diagnosis)[effect["id"]]
+    x, scale = cloud.x * cloud.axis.scale, cloud.torque.scale
+    lx, ly = (x, cloud.law) if cloud.discrete else shown.broken(x, cloud.law)
+    caption = (
+        f"{effect['statement']} Left: blue, what the recalibrated baseline leaves over; grey, what the rest of the "
+        "augmented model leaves to this effect; line, its fitted law. Right: what is left with everything found; band, "
+        "two noise floors."
+    )
+    with figure(1, 2, caption, file, row_inches=3.4) as axes:
+        before, after = axes[0]
+        before.plot(x, cloud.before * scale, ".", markersize=2, color="#a9bce6", rasterized=True)
+        before.plot(x, cloud.partial * scale, ".", markersize=2, color="#5b6169", rasterized=True)
+        before.plot(lx, ly * scale, "." if cloud.discrete else "-", color=colour, linewidth=1.8)
+        after.plot(x, cloud.after * scale, ".", markersize=2, color=plots.AUGMENTED, rasterized=True)
+        floor = 2.0 * diagnosis.json["noise_floor_Nm"] * scale
+        after.axhspan(-floor, floor, color=plots.QUIET, alpha=0.25, linewidth=0)
+        after.set_ylim(before.get_ylim())
+        for ax, title in ((before, f"before, with the law of {effect['id']}"), (after, "after")):
+            ax.set_title(title)
+            ax.set_xlabel(cloud.axis.label)
+            ax.set_ylabel(cloud.torque.label)
+
+
+def _evidence(diagnosis: Diagnosis, file: Path) -> None:
+    rows = diagnosis.evidence[:EVIDENCE_ROWS]
+    colour = plots.colours(diagnosis)
+    caption = (
+        "Share of the residual's energy that each candidate's fingerprint could explain before any fit (bar), and how "
+        "much it then lowered the held-out error when fitted (diamond; none: not tried)."
+    )
+    with figure(1, 1, caption, file, row_inches=0.7 + 0.3 * len(rows)) as axes:
+        ax = axes[0, 0]
+        for i, row in enumerate(rows):
+            shade = colour.get(row.label.split("[")[0], "#c4c8ce") if row.verdict == "named" else "#c4c8ce"
+            ax.barh(i, 100.0 * row.energy_share, color=shade, height=0.6)
+            if row.heldout_gain is not None:
+                ax.plot(100.0 * max(row.heldout_gain, 0.0), i, "D", color="black", markersize=5)
+        ax.set_yticks(range(len(rows)), [f"{row.label} ({row.verdict})" for row in rows])
+        ax.set_ylim(len(rows) - 0.4, -0.6)
+        ax.set_xlim(left=0.0)
+        ax.set_xlabel("%")
+        ax.grid(axis="y", visible=False)
+        ax.set_title("evidence")
+
+
+def _heldout(diagnosis: Diagnosis, file: Path) -> None:
+    rows, unit = plots.heldout_rows(diagnosis), diagnosis.vehicle.coordinate.force_unit
+    floor = diagnosis.json["noise_floor_Nm"]
+    caption = (
+        "Error on stretches that neither search nor fit saw, before and after; bar: 95 % interval of the improvement."
+    )
+    with figure(1, 1, caption, file, row_inches=3.4, width=max(6.0, 1.6 * len(rows))) as axes:
+        ax = axes[0, 0]
+        for i, (_, before, after, spread) in enumerate(rows):
+            ax.bar(i - 0.18, before, 0.34, color=plots.BASELINE, label="recalibrated baseline" if i == 0 else None)
+            ax.bar(i + 0.18, after, 0.34, color=plots.AUGMENTED, label="with the effects found" if i == 0 else None)
+            if spread is not None:
+                ends = [[max(after - spread[0], 0.0)], [max(spread[1] - after, 0.0)]]
+                ax.errorbar(i + 0.18, after, yerr=ends, color="black", capsize=5, linewidth=1.4)
+        ax.axhline(
+            floor, color="black", linestyle=":", linewidth=1.2, label=f"noise floor {shown.number(floor, 3)} {unit}"
+        )
+        ax.set_xticks(range(len(rows)), [row[0] for row in rows])
+        ax.set_xlim(-0.7, max(len(rows) - 0.3, 0.7))
+        ax.set_ylabel(f"held-out RMSE ({unit})")
+        ax.grid(axis="x", visible=False)
+        ax.legend()

@@ -1,0 +1,131 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How numbers, quantities and curves are shown to people, the same in every picture and page."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lugre_steering import units
+from lugre_steering.diagnosis.locate import UNITS
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import Vehicle
+
+EFFECT_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31")
+"""One per named effect; apart from the black, blue and red of measured, baseline and augmented torque."""
+
+_HANDIER = (("rad", "deg", 180.0 / math.pi), ("m", "mm", 1e3), ("Pa", "MPa", 1e-6))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A quantity on an axis: its label with unit, and what to multiply SI values by."""
+
+    label: str
+    scale: float
+
+
+def torque_axis(vehicle: Vehicle, *values: Array) -> Axis:
+    """Torque (or force) in N m, or in kN m where the values are large."""
+    unit = vehicle.coordinate.force_unit
+    top = max((float(np.nanmax(np.abs(v))) for v in values if v.size), default=0.0)
+    return Axis(f"k{unit}", 1e-3) if top >= 2000.0 else Axis(unit, 1.0)
+
+
+def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
+    """A coordinate of ``locate.UNITS`` in the words and units of this vehicle, angles in degrees."""
+    if name == "torque":
+        return Axis(f"{name} [k{vehicle.coordinate.force_unit}]", 1e-3)
+    unit, scale = units.label(vehicle, UNITS.get(name, "")), 1.0
+    for plain, handy, factor in _HANDIER:
+        if re.match(rf"{plain}(?!\w)|{plain}/", unit):
+            unit, scale = handy + unit[len(plain) :], factor
+            break
+    words = coordinate_name(vehicle, name)
+    return Axis(words if unit in ("", "1") else f"{words} [{unit}]", scale)
+
+
+def coordinate_name(vehicle: Vehicle, name: str) -> str:
+    """'steering rate' of a linear axis called position: 'position rate'."""
+    if vehicle.coordinate.unit == "rad":
+        return name.replace("steering angle", vehicle.coordinate.name)
+    name = name.replace("steering angle", vehicle.coordinate.name).replace("steering", vehicle.coordinate.name)
+    return name.replace("angle since", "travel since")
+
+
+def law_coordinate(effect: Mapping[str, Any], told_by: str, coordinates: Collection[str]) -> str:
+    """Name of the recorded coordinate an effect is drawn along: the catalogue's, else the one it was located by."""
+    found = [entry.get("coordinate") for entry in effect["where"]]
+    return next((name for name in (told_by, *found) if name in coordinates), "time")
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Plain text with ``digits`` significant digits; '-' where there is none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    decimals = digits - 1 - math.floor(math.log10(abs(value)))
+    if not -4 <= decimals <= 6:
+        return f"{value:.{digits - 1}e}"
+    text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u2009")
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def estimate(value: float | None, ends: Sequence[float | None] | None) -> tuple[str, str]:
+    """Value and interval, both with as many digits as tell the ends of the interval apart."""
+    if value is None or ends is None or None in ends or not ends[0] < ends[1]:  # type: ignore[operator]
+        return number(value), "-" if ends is None else " … ".join(number(end) for end in ends)
+    largest = max(abs(value), *(abs(end) for end in ends if end is not None))
+    digits = min(max(math.floor(math.log10(largest / (ends[1] - ends[0]))) + 3, 3), 9)  # type: ignore[operator]
+    return number(value, digits), " … ".join(number(end, digits) for end in ends)
+
+
+def percent(share: float | None) -> str:
+    if share is None or not math.isfinite(share):
+        return "-"
+    size = abs(100.0 * share)
+    if size < 0.05:
+        return "0 %"
+    return f"{100.0 * share:.1f} %" if size < 10.0 else f"{100.0 * share:.0f} %"
+
+
+def chance(p: float | None) -> str:
+    if p is None:
+        return "-"
+    return "< 0.001" if p < 0.001 else f"{p:.2g}"
+
+
+def spans(intervals: Sequence[Sequence[float]], most: int = 10) -> str:
+    """'12.1-16.3, 20-24.5 s'."""
+    shown = ", ".join(f"{number(a, 3)}–{number(b, 3)}" for a, b in intervals[:most])
+    more = f" and {len(intervals) - most} more" if len(intervals) > most else ""
+    return f"{shown} s{more}" if shown else "-"
+
+
+def thin(values: Array, limit: int) -> tuple[Array, int]:
+    """A curve of at most ``limit`` points that keeps every peak (smallest and largest of each bin, in their order), and
+    how many samples one point stands for."""
+    if values.size <= limit:
+        return values, 1
+    width = 2 * math.ceil(values.size / limit)
+    rows = np.pad(values, (0, -values.size % width), mode="edge").reshape(-1, width)
+    first, last = np.sort(np.stack([rows.argmin(axis=1), rows.argmax(axis=1)]), axis=0)
+    at = np.arange(len(rows))
+    return np.stack([rows[at, first], rows[at, last]], axis=1).ravel(), width // 2
+
+
+def broken(x: Array, y: Array) -> tuple[Array, Array]:
+    """A line with gaps where x jumps, so that no stroke joins what time does not join."""
+    jumps = np.flatnonzero(np.abs(np.diff(x)) > 0.05 * float(np.ptp(x))) + 1
+    return np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan)
+
+
+def is_discrete(values: Array) -> bool:
+    return np.unique(values[:: max(1, values.size // 2000)]).size <= 5
