@@ -31,7 +31,9 @@ def run(
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise LugreSteeringError(f"{out}: cannot be made: {error.strerror or error}; expected a writable folder") from error
+        raise LugreSteeringError(
+            f"{out}: cannot be made: {error.strerror or error}; expected a writable folder"
+        ) from error
     result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
     (out / "diagnosis.json").write_text(json.dumps(result.json, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     save(result.vehicle, out / "augmented.yaml")

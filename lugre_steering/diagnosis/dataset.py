@@ -111,7 +111,9 @@ def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tup
     end = min(signal.time_s[-1] - margin[key] for key, signal in signals.items())
     count = int((end - start) / step) + 1 if end > start else 0
     if count < 20:
-        raise DataError(f"{name}: the channels share {max(end - start, 0.0):.2f} s, expected at least {20 * step:.1f} s")
+        raise DataError(
+            f"{name}: the channels share {max(end - start, 0.0):.2f} s, expected at least {20 * step:.1f} s"
+        )
     time = start + step * np.arange(count)
     valid = np.ones(count, bool)
     for signal in signals.values():

@@ -24,6 +24,7 @@ from lugre_steering.diagnosis.split import Split, split
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording
+from lugre_steering.simulate.manoeuvres import BUILT_IN
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
 NULL_DRAWS = 16
@@ -37,7 +38,12 @@ Progress = Callable[[str], None]
 
 
 def diagnose(
-    bags: Sequence[Path], vehicle: Vehicle, *, seed: int = 1, material: float = MATERIAL_SHARE, progress: Progress = lambda _: None
+    bags: Sequence[Path],
+    vehicle: Vehicle,
+    *,
+    seed: int = 1,
+    material: float = MATERIAL_SHARE,
+    progress: Progress = lambda _: None,
 ) -> Diagnosis:
     """Read and diagnose bags of one vehicle together."""
     recordings = []
@@ -48,7 +54,12 @@ def diagnose(
 
 
 def diagnose_recordings(
-    recordings: Sequence[Recording], vehicle: Vehicle, *, seed: int = 1, material: float = MATERIAL_SHARE, progress: Progress = lambda _: None
+    recordings: Sequence[Recording],
+    vehicle: Vehicle,
+    *,
+    seed: int = 1,
+    material: float = MATERIAL_SHARE,
+    progress: Progress = lambda _: None,
 ) -> Diagnosis:
     """Diagnose recordings of one vehicle together; effects that the vehicle file already has stay in the baseline."""
     progress("checking the data")
@@ -56,7 +67,9 @@ def diagnose_recordings(
     findings = _findings(qualities)
     blocking = [f"{q.recording.name}: {f.statement}" for q in qualities for f in q.blocking]
     if blocking:
-        return _insufficient(qualities, vehicle, findings, "The data must be put right first. " + " ".join(blocking), None)
+        return _insufficient(
+            qualities, vehicle, findings, "The data must be put right first. " + " ".join(blocking), None
+        )
     progress("estimating the motion")
     try:
         problem = Problem(vehicle, [prepare(quality.recording, vehicle) for quality in qualities])
@@ -66,7 +79,7 @@ def diagnose_recordings(
     roles = split(problem)
     if travel < MIN_SLIDING or roles.fit.sum() < 500:
         advice = {
-            "manoeuvre": "double-cycle: " + experiment.BUILT_IN["double-cycle"].description,
+            "manoeuvre": "double-cycle: " + BUILT_IN["double-cycle"].description,
             "separates": ["friction level", "stiffness"],
             "why": f"the recording turns the contact by only {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed",
         }
@@ -112,7 +125,7 @@ class _Conclusion:
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         whole = fit(problem, weight, final.effects, final.x, evaluations=12)
         residual = problem.measured - final.prediction
-        left, left_text, structured = self._left_over(final, residual)
+        left, left_text, structured = self._left_over(residual)
         if named:
             verdict = "missing_physics"
         elif structured:
@@ -121,9 +134,19 @@ class _Conclusion:
             verdict = "consistent"
         effects = self._effects(whole) if named else []
         vehicle = self._vehicle(whole, effects)
-        baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": verify.rmse(problem, found.baseline, roles.held)}
-        augmented = {"rmse_Nm": verify.rmse(problem, final, problem.valid), "heldout_rmse_Nm": verify.rmse(problem, final, roles.held)}
-        augmented |= {"improvement": gain, "improvement_ci95": list(interval)} if named else {"improvement": 0.0, "improvement_ci95": [0.0, 0.0]}
+        baseline = {
+            "rmse_Nm": verify.rmse(problem, found.baseline, problem.valid),
+            "heldout_rmse_Nm": verify.rmse(problem, found.baseline, roles.held),
+        }
+        augmented: dict[str, Any] = {
+            "rmse_Nm": verify.rmse(problem, final, problem.valid),
+            "heldout_rmse_Nm": verify.rmse(problem, final, roles.held),
+        }
+        augmented |= (
+            {"improvement": gain, "improvement_ci95": list(interval)}
+            if named
+            else {"improvement": 0.0, "improvement_ci95": [0.0, 0.0]}
+        )
         self.progress("next experiment")
         json = {
             "schema": SCHEMA,
@@ -139,7 +162,13 @@ class _Conclusion:
             "data_quality": findings,
             "next_experiment": self._next(verdict, whole),
         }
-        return Diagnosis(finite(json), vehicle, self._traces(whole, final), self._evidence(effects), {e["id"]: CATALOGUE[e["id"]].coordinate for e in effects})
+        return Diagnosis(
+            finite(json),
+            vehicle,
+            self._traces(whole, final),
+            self._evidence(effects),
+            {e["id"]: CATALOGUE[e["id"]].coordinate for e in effects},
+        )
 
     def _effects(self, whole: Fit) -> list[dict[str, Any]]:
         problem, found = self.problem, self.found
@@ -189,8 +218,8 @@ class _Conclusion:
             })  # fmt: skip
         return entries
 
-    def _left_over(self, final: Fit, residual: Array) -> tuple[dict[str, Any], str, bool]:
-        """What remains after ``final``: contract entry, one sentence, and whether it is structure worth a verdict."""
+    def _left_over(self, residual: Array) -> tuple[dict[str, Any], str, bool]:
+        """What remains after the final fit: contract entry, one sentence, and whether it is structure worth a verdict."""
         problem = self.problem
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         parts = [slice(a, b) for a, b in zip(problem.edges, problem.edges[1:], strict=False)]
@@ -206,7 +235,16 @@ class _Conclusion:
         in_motion = float(energy[used & moving].mean()) - max(rest, 1.0) if (used & moving).any() else 0.0
         structured = excess > UNLISTED_EXCESS and (in_motion > UNLISTED_EXCESS or (share > 0.1 and p < 0.1))
         if not structured:
-            return {"structured": False, "description": "what is left is within noise and the simulation's own error", "formula": None, "where": None}, "", False
+            return (
+                {
+                    "structured": False,
+                    "description": "what is left is within noise and the simulation's own error",
+                    "formula": None,
+                    "where": None,
+                },
+                "",
+                False,
+            )
         formula = None
         held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
@@ -242,7 +280,11 @@ class _Conclusion:
             if score.candidate.effect.id not in best or smallest < best[score.candidate.effect.id][0]:
                 best[score.candidate.effect.id] = (smallest, score)
         return {
-            key: {"parameter": score.candidate.free[0], "smallest": smallest, "unit": score.candidate.parameter(score.candidate.free[0]).unit}
+            key: {
+                "parameter": score.candidate.free[0],
+                "smallest": smallest,
+                "unit": score.candidate.parameter(score.candidate.free[0]).unit,
+            }
             for key, (smallest, score) in sorted(best.items())
         }
 
@@ -295,18 +337,25 @@ class _Conclusion:
                 verdict = "not significant"
             else:
                 verdict = "explains too little to be tried"
-            rows.append(Evidence(label, score.candidate.effect.title, score.share, score.masked_share, score.p_value, gain, verdict))
+            rows.append(
+                Evidence(
+                    label, score.candidate.effect.title, score.share, score.masked_share, score.p_value, gain, verdict
+                )
+            )
         return tuple(rows)
 
     def _traces(self, whole: Fit, final: Fit) -> tuple[BagTrace, ...]:
         problem, found = self.problem, self.found
-        parts = {candidate.effect.id: locate.contribution(problem, whole, i) for i, (candidate, _) in enumerate(whole.effects)}
+        parts = {
+            candidate.effect.id: locate.contribution(problem, whole, i)
+            for i, (candidate, _) in enumerate(whole.effects)
+        }
         traces = []
         for bag, run in enumerate(problem.runs):
             piece = slice(problem.edges[bag], problem.edges[bag + 1])
             traces.append(BagTrace(
                 run.name, run.time, run.measured, found.baseline.prediction[piece], final.prediction[piece],
-                self.roles.held[piece], {key: part[piece] for key, part in parts.items()},
+                self.roles.held[piece].astype(float), {key: part[piece] for key, part in parts.items()},
                 {key: locate.intervals(run.time, part[piece]) for key, part in parts.items()}, locate.coordinates(run, run.measured),
             ))  # fmt: skip
         return tuple(traces)
@@ -317,12 +366,15 @@ class _Conclusion:
             rivals = [trial for trial in item.trials if trial.candidate.effect.id in item.rivals]
             if rivals:
                 chosen = whole.effects[index]
-                energies = experiment.separation(self.problem, whole, [chosen], [rivals[0].fit.effects[-1]], self.noise.floor)
+                energies = experiment.separation(
+                    self.problem, whole, [chosen], [rivals[0].fit.effects[-1]], self.noise.floor
+                )
                 best, description, energy = experiment.recommend(energies)
+                others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
                 return {
                     "manoeuvre": f"{best}: {description}", "separates": [chosen[0].effect.id, rivals[0].candidate.effect.id],
                     "why": f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
-                    f"more than in any other manoeuvre tried ({', '.join(f'{k} {np.sqrt(e):.0f}' for k, e in energies.items() if k != best)})",
+                    f"more than in any other manoeuvre tried ({others})",
                 }  # fmt: skip
         if verdict == "unlisted_physics":
             return {
@@ -332,12 +384,19 @@ class _Conclusion:
             }
         return None
 
-    def _statement(self, verdict: str, effects: Sequence[dict[str, Any]], baseline: dict[str, float], augmented: dict[str, Any], left: str) -> str:
+    def _statement(
+        self,
+        verdict: str,
+        effects: Sequence[dict[str, Any]],
+        baseline: dict[str, float],
+        augmented: dict[str, Any],
+        left: str,
+    ) -> str:
         floor = f"{self.noise.floor:.0f} N m"
         if verdict == "consistent":
             return (
-                f"After recalibration the published model explains the recording: held-out error {baseline['heldout_rmse_Nm']:.0f} N m at a "
-                f"noise floor of {floor}. No missing physics is needed; see detection_limits for what could have gone unseen."
+                f"After recalibration the published model explains the recording: held-out error "
+                f"{baseline['heldout_rmse_Nm']:.0f} N m at a noise floor of {floor}. No missing physics is needed; see detection_limits for what could have gone unseen."
             )
         if verdict == "unlisted_physics":
             return (
@@ -345,7 +404,11 @@ class _Conclusion:
                 f"entry of the catalogue explains it: {left}. The physics is unlisted; see unexplained for where it lives."
             )
         names = " and ".join(CATALOGUE[effect["id"]].title.lower() + f" ({effect['id']})" for effect in effects)
-        ties = [f"{effect['id']} cannot be told from {', '.join(effect['indistinguishable_from'])}" for effect in effects if effect["indistinguishable_from"]]
+        ties = [
+            f"{effect['id']} cannot be told from {', '.join(effect['indistinguishable_from'])}"
+            for effect in effects
+            if effect["indistinguishable_from"]
+        ]
         return (
             f"The model leaves out {names}. With it the held-out error falls from {baseline['heldout_rmse_Nm']:.0f} to "
             f"{augmented['heldout_rmse_Nm']:.0f} N m (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
@@ -367,7 +430,11 @@ def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:
 
 
 def _insufficient(
-    qualities: Sequence[Quality], vehicle: Vehicle, findings: list[dict[str, Any]], statement: str, advice: dict[str, Any] | None
+    qualities: Sequence[Quality],
+    vehicle: Vehicle,
+    findings: list[dict[str, Any]],
+    statement: str,
+    advice: dict[str, Any] | None,
 ) -> Diagnosis:
     """The verdict when nothing can be concluded: the vehicle stays as it was."""
     floor = 1.0

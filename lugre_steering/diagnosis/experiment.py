@@ -32,7 +32,9 @@ def _run(problem: Problem, manoeuvre: Manoeuvre, sigma: float) -> Run:
     )  # fmt: skip
 
 
-def separation(problem: Problem, fit: Fit, first: Sequence[Named], second: Sequence[Named], sigma: float) -> dict[str, float]:
+def separation(
+    problem: Problem, fit: Fit, first: Sequence[Named], second: Sequence[Named], sigma: float
+) -> dict[str, float]:
     """Energy per manoeuvre by which two explanations would differ there, after recalibration, in noise variances."""
     found = {}
     for manoeuvre in BUILT_IN.values():

@@ -79,7 +79,9 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
             found += [Candidate(effect, (), line, free=free) for line in lines]
         else:
             grids = [
-                [(p.name, value * _unit(problem, p.relative_to)) for value in p.grid] for p in effect.parameters if p.is_shape
+                [(p.name, value * _unit(problem, p.relative_to)) for value in p.grid]
+                for p in effect.parameters
+                if p.is_shape
             ]
             found += [Candidate(effect, shapes, free=free) for shapes in itertools.product(*grids)]
     return found
@@ -123,13 +125,11 @@ def _windows(problem: Problem, effect: Effect) -> list[Candidate]:
     return found
 
 
-def signature(
-    problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate
-) -> Array:
+def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate) -> Array:
     """Change of the prediction (n, k), one column per free parameter at its scale (or the whole effect if none is free)."""
     shapes = dict(candidate.shapes)
     trials: list[Values] = [
-        {**{n: 0.0 for n in candidate.free}, **shapes, name: candidate.parameter(name).scale} for name in candidate.free
+        {**dict.fromkeys(candidate.free, 0.0), **shapes, name: candidate.parameter(name).scale} for name in candidate.free
     ] or [shapes]
     columns = np.zeros((problem.measured.size, len(trials)))
     for bag in range(len(problem.runs)):
@@ -145,7 +145,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
 
     ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
     """
-    basis, _ = np.linalg.qr(_tangent(problem, fit) * weight[:, None])
+    basis, _ = np.linalg.qr(_tangent(fit) * weight[:, None])
     residuals = np.vstack([problem.measured - fit.prediction, draws]) * weight
     residuals = residuals - (residuals @ basis) @ basis.T
     base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
@@ -205,7 +205,7 @@ def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals:
     return None
 
 
-def _tangent(problem: Problem, fit: Fit) -> Array:
+def _tangent(fit: Fit) -> Array:
     """Jacobian columns (n, q) of everything already free, without those that do nothing."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
     kept: Array = fit.jacobian[:, norms > 0.0] / norms[norms > 0.0]

@@ -82,7 +82,9 @@ def search(
     start_cost = cost(problem, baseline, weight)
     excess = start_cost - samples
     steps: list[tuple[Fit, Found, float]] = []
-    current, first_scores, all_trials, restarts = baseline, (), [], 0
+    current, restarts = baseline, 0
+    first_scores: tuple[Score, ...] = ()
+    all_trials: list[Trial] = []
     while len(steps) < MAX_EFFECTS:
         progress("fingerprints")
         taken = [candidate.effect.id for candidate, _ in current.effects]
@@ -141,11 +143,17 @@ def _prune(
             current = without
             last = steps[-1][1]
             # Together they explained what the latest now explains alone, so the energy is its own.
-            steps = [*steps[:index], *steps[index + 1 : -1], (without, replace(last, gain=last.gain + dropped.gain), steps[-1][2])]
+            steps = [
+                *steps[:index],
+                *steps[index + 1 : -1],
+                (without, replace(last, gain=last.gain + dropped.gain), steps[-1][2]),
+            ]
     return steps, current
 
 
-def _keep(steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float) -> int:
+def _keep(
+    steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float
+) -> int:
     """How many steps of the build-up stand: the fewest that explain the whole, unless the next explains most of the rest."""
     kept = 0
     for i, (result, _, gained) in enumerate(steps):
@@ -190,7 +198,9 @@ def _parsimony(new: Score, old: Score) -> float:
 def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
     """Joint fit of calibration, earlier effects and this candidate, its shapes set free as well."""
     candidate = score.candidate
-    free = tuple(p.name for p in candidate.effect.parameters if p.name in candidate.free or p.name in dict(candidate.shapes))
+    free = tuple(
+        p.name for p in candidate.effect.parameters if p.name in candidate.free or p.name in dict(candidate.shapes)
+    )
     effects = [*current.effects, (replace(candidate, free=free), score.values)]
     result = fit(problem, weight, effects, current.x, evaluations=8)
     return Trial(score, result, cost(problem, result, weight))

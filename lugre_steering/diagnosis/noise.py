@@ -50,7 +50,9 @@ def standstill(run: Run, minimum_s: float = 1.0) -> list[slice]:
     still = (np.abs(run.omega).max(axis=0) < REST_RATE_RAD_S) & run.valid
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     skip = round(0.3 / dt)
-    return [slice(a + skip, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a - skip) * dt >= minimum_s]
+    return [
+        slice(a + skip, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a - skip) * dt >= minimum_s
+    ]
 
 
 def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
@@ -123,4 +125,3 @@ def noise_model(
 
     parts = in_threads(repeat, range(len(problem.runs)))
     return Noise(np.concatenate([sigma for sigma, _ in parts]), np.concatenate([draw for _, draw in parts], axis=1))
-

@@ -103,7 +103,9 @@ Values = Mapping[str, float]
 class Problem:
     """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, effect parameters)."""
 
-    def __init__(self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None) -> None:
+    def __init__(
+        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None
+    ) -> None:
         self.vehicle = vehicle
         self.runs = list(runs)
         self.model: Model = build_model(vehicle)
@@ -187,20 +189,22 @@ class Problem:
         """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
         name = candidate.effect.id
         if name == "pressure_lag":
-            return _lagged(torque, run.time[1] - run.time[0], values["tau"])
-        if name == "time_delay":
-            return np.interp(run.time - values["delay"], run.time, torque)
-        if name in ("pressure_offset", "pressure_drift"):
+            changed = _lagged(torque, run.time[1] - run.time[0], values["tau"])
+        elif name == "time_delay":
+            changed = np.interp(run.time - values["delay"], run.time, torque)
+        elif name in ("pressure_offset", "pressure_drift"):
             gain = run.torque_per_line[self._lines.index(candidate.line)]
-            return torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * run.time)
-        if name == "angle_offset":
-            return torque + values["offset"] * run.side_slope.sum(axis=0)
-        if name == "angle_scale":
-            return torque + values["scale"] * (run.theta * run.side_slope).sum(axis=0)
-        if name == "moment_arm_error":
+            changed = torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * run.time)
+        elif name == "angle_offset":
+            changed = torque + values["offset"] * run.side_slope.sum(axis=0)
+        elif name == "angle_scale":
+            changed = torque + values["scale"] * (run.theta * run.side_slope).sum(axis=0)
+        elif name == "moment_arm_error":
             factor = values.get("linear", 0.0) * run.theta + values.get("quadratic", 0.0) * run.theta**2
-            return torque - (factor * run.side_torque).sum(axis=0)
-        return torque
+            changed = torque - (factor * run.side_torque).sum(axis=0)
+        else:
+            changed = torque
+        return np.asarray(changed)
 
     def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:
         return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects), range(len(self.runs))))
@@ -269,7 +273,7 @@ def fit(
         return problem.predict_all(*unpack(p))
 
     def jacobian(p: Array, base: Array) -> Array:
-        columns = in_threads(lambda j: _column(problem, unpack, p, j, n, low, high, base), range(p.size))
+        columns = in_threads(lambda j: _column(problem, unpack, p, j, n, high, base), range(p.size))
         return np.column_stack(columns) * weight[:, None]
 
     p = np.clip(p0, low, high)
@@ -296,8 +300,10 @@ def fit(
             break
     x, fitted = unpack(p)
     final = jacobian(p, base)
-    covariance = np.linalg.pinv(final.T @ final + np.diag(prior**2), rcond=1e-12) * np.outer(scale, scale)
-    return Fit(x, tuple(fitted), base, _cost((base - problem.measured) * weight, p * prior, False), final / scale, covariance)
+    covariance = np.asarray(np.linalg.pinv(final.T @ final + np.diag(prior**2), rcond=1e-12) * np.outer(scale, scale), float)
+    return Fit(
+        x, tuple(fitted), base, _cost((base - problem.measured) * weight, p * prior, False), final / scale, covariance
+    )
 
 
 def _cost(error: Array, prior_error: Array, robust: bool) -> float:
@@ -326,7 +332,6 @@ def _column(
     p: Array,
     j: int,
     nuisances: int,
-    low: Array,
     high: Array,
     base: Array,
 ) -> Array:

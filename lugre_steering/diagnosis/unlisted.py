@@ -64,12 +64,14 @@ def propose(coordinates: Mapping[str, Array], residual: Array, fit_weight: Array
     target = residual * fit_weight
     held_start = float(np.sum((residual * held_weight) ** 2))
     chosen: list[int] = []
-    values, best_held, left = np.zeros(0), held_start, target
+    values: Array = np.zeros(0)
+    best_held = held_start
+    left: Array = target
     while len(chosen) < MAX_TERMS and held_start > 0.0:
         correlation = np.abs((matrix * fit_weight[:, None]).T @ left) / np.where(usable, norms, np.inf)
         correlation[chosen] = 0.0
         trial = [*chosen, int(np.argmax(correlation))]
-        trial_values = np.linalg.lstsq(matrix[:, trial] * fit_weight[:, None], target, rcond=None)[0]
+        trial_values: Array = np.linalg.lstsq(matrix[:, trial] * fit_weight[:, None], target, rcond=None)[0]
         held = float(np.sum(((residual - matrix[:, trial] @ trial_values) * held_weight) ** 2))
         if held > best_held - 0.02 * held_start:
             break

@@ -8,7 +8,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.problem import Fit, Problem
 from lugre_steering.diagnosis.split import Split
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, IntArray
 
 RESAMPLES = 2000
 
@@ -19,7 +19,9 @@ def rmse(problem: Problem, result: Fit, mask: np.ndarray[tuple[int], np.dtype[np
     return float(np.sqrt(np.mean(error**2))) if error.size else float("nan")
 
 
-def improvement(problem: Problem, baseline: Fit, augmented: Fit, split: Split, seed: int) -> tuple[float, tuple[float, float]]:
+def improvement(
+    problem: Problem, baseline: Fit, augmented: Fit, split: Split, seed: int
+) -> tuple[float, tuple[float, float]]:
     """1 - augmented / baseline held-out RMSE, with a 95 % interval from a bootstrap of whole clusters."""
     held = split.held
     if not held.any():
@@ -35,7 +37,7 @@ def improvement(problem: Problem, baseline: Fit, augmented: Fit, split: Split, s
     return float(1.0 - np.sqrt(after_sum.sum() / before_sum.sum())), (float(low), float(high))
 
 
-def robust_covariance(problem: Problem, result: Fit, weight: Array, cluster: Array) -> Array:
+def robust_covariance(problem: Problem, result: Fit, weight: Array, cluster: IntArray) -> Array:
     """Covariance of all fitted values (cluster-robust sandwich; Liang and Zeger 1986), at least the homoscedastic one."""
     scores = result.jacobian * ((problem.measured - result.prediction) * weight**2)[:, None]
     count = int(cluster.max()) + 1
