@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lugre_steering.diagnosis.bursts import all_bursts, find_bursts
+from lugre_steering.diagnosis.bursts import all_bursts, find_bursts, set_aside
 from lugre_steering.diagnosis.dataset import Run, motion
 
 STEP_S = 0.01
@@ -47,6 +47,11 @@ def test_a_regular_series_of_kicks_is_found_where_it_is() -> None:
     assert found.covers(joint.time)[np.rint(middle / STEP_S).astype(int)].all()
     assert np.mean(found.covers(joint.time)) < 0.2
     assert "every 1.70 s" in found.statement
+    residual = noise(joint.time.size) + kicks(joint.time, times, signs, 30.0)
+    (cleaned, calm), findings = set_aside([joint, joint], [residual, noise(joint.time.size)])
+    assert not (cleaned.valid & found.covers(joint.time)).any()
+    assert calm is joint
+    assert [finding.intervals_s for finding in findings.values()] == [found.intervals]
 
 
 def test_irregular_kicks_have_no_period() -> None:

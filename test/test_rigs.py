@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,12 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.simulate.manoeuvres import BUILT_IN, ackermann, motion_of
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
-from lugre_steering.units import label
+from lugre_steering.units import label, title
 
 CONFIG = Path(__file__).parents[1] / "config"
 EXAMPLES = ("single_joint_example", "linear_axis_example", "one_angle_sensor_example")
@@ -146,6 +148,15 @@ def test_units_of_a_linear_axis(unit: str, axis: str) -> None:
     )
     assert label(linear, unit) == axis
     assert label(joint, unit) == unit
+
+
+def test_titles_of_a_single_joint_speak_of_no_track() -> None:
+    joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    tracks = vehicle_file.load(CONFIG / "one_angle_sensor_example.yaml")
+    for effect in CATALOGUE.values():
+        assert title(tracks, effect) == effect.title
+        if effect.id in ("yaw_inertia", "viscous_friction", "slope_bias", "direction_asymmetry", "kingpin_jacking"):
+            assert not re.search("track|kingpin|rubber|steer|turn|slope", title(joint, effect), re.IGNORECASE)
 
 
 def test_a_linear_axis_in_other_units_names_its_own_mass() -> None:

@@ -10,14 +10,14 @@ state space, as Eckmann, Kamphorst, Ruelle, Europhys. Lett. 4 (1987) 973), and o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from lugre_steering.diagnosis.dataset import Run
-from lugre_steering.recording import Array, IntArray
+from lugre_steering.recording import Array, Finding, IntArray
 
 THRESHOLD = 6.0
 """In robust standard deviations of what is left after a running median."""
@@ -129,3 +129,15 @@ def all_bursts(runs: Sequence[Run], residuals: Sequence[Array]) -> list[Bursts |
     """``find_bursts`` of each run, where they matter."""
     found = [find_bursts(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     return [item if item is not None and item.matter else None for item in found]
+
+
+def set_aside(runs: Sequence[Run], residuals: Sequence[Array]) -> tuple[list[Run], dict[str, Finding]]:
+    """The runs with their bursts marked as not valid, and a finding for each run that has any, by its name."""
+    cleaned, findings = [], {}
+    for run, bursts in zip(runs, all_bursts(runs, residuals), strict=True):
+        if bursts is None:
+            cleaned.append(run)
+            continue
+        cleaned.append(replace(run, valid=run.valid & ~bursts.covers(run.time)))
+        findings[run.name] = Finding("outside_disturbance", "", bursts.statement, bursts.intervals)
+    return cleaned, findings
