@@ -137,8 +137,8 @@ def test_mistakes_in_such_vehicle_files_are_named(name: str, change: dict, messa
 @pytest.mark.parametrize(
     ("unit", "axis"),
     [
-        ("N m", "N"), ("N m s/rad", "N s/m"), ("N m s2/rad2", "N s2/m2"), ("rad", "m"), ("rad/s", "m/s"), ("N m/rad", "N/m"),  # noqa: E501
-        ("N m/rad^3", "N/m^3"), ("kg m2", "kg"), ("1/rad", "1/m"), ("1/(N m)", "1/N"), ("rad/(N m)", "m/N"), ("1/rad^2", "1/m^2"),  # noqa: E501
+        ("N m", "N"), ("N m s/rad", "N s/m"), ("N m s2/rad2", "N s2/m2"), ("rad", "m"), ("rad/s", "m/s"), ("N m/rad", "N/m"),
+        ("N m/rad^3", "N/m^3"), ("kg m2", "kg"), ("1/rad", "1/m"), ("1/(N m)", "1/N"), ("rad/(N m)", "m/N"), ("1/rad^2", "1/m^2"),
         ("s", "s"), ("1", "1"), ("Pa", "Pa"), ("K/W", "K/W"), ("rad2/s2", "m2/s2"), ("J/K", "J/K"), ("N m2", "N m2"),
     ],
 )  # fmt: skip

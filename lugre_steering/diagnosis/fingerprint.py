@@ -21,6 +21,8 @@ from lugre_steering.effects.entry import Effect
 from lugre_steering.recording import Array
 
 WINDOW_EDGES = 9
+HYDRAULIC = ("moment_arm_error", "relief_saturation", "line_loss_linear", "line_loss_quadratic", "back_pressure")
+"""Nothing of a joint that is driven and measured without oil."""
 CEILINGS = (0.8, 0.88, 0.94, 0.98)
 
 
@@ -91,7 +93,7 @@ def _applies(problem: Problem, effect: Effect) -> bool:
     """Thermal effects need rubber; hydraulic ones need hydraulics; nothing else is excluded beforehand."""
     if effect.stage == "thermal" and problem.vehicle.rubber is None:
         return False
-    return not (effect.id in ("moment_arm_error", "relief_saturation") and problem.vehicle.hydraulics is None)
+    return not (effect.id in HYDRAULIC and problem.vehicle.hydraulics is None)
 
 
 def _unit(problem: Problem, relative_to: str) -> float:
