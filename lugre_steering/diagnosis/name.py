@@ -21,8 +21,9 @@ SHORTLIST = 7
 FALSE_DISCOVERY_RATE = 0.01
 OWN_ERROR = 0.04
 """Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
-WHOLE = 0.75
-"""Share of the excess that named physics must explain together; below, the physics is unlisted."""
+WHOLE = (0.75, 0.09, 0.93)
+"""Share of the excess that named physics must explain together, else it is unlisted: at an excess of one noise variance, per
+decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
 TIE_T = 2.5
@@ -123,12 +124,47 @@ def search(
         if best.cost - samples < OWN_ERROR * samples:
             break
     kept = _keep(steps, problem, weight, start_cost, samples)
-    final = steps[kept - 1][0] if kept else baseline
+    final, found = (steps[kept - 1][0], [item for _, item, _ in steps[:kept]]) if kept else (baseline, [])
+    for index in range(kept):
+        progress(f"rivals of {found[index].score.candidate.label}")
+        final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples)
     explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
     return Search(
-        baseline, final, tuple(found for _, found, _ in steps[:kept]), excess / samples, float(np.clip(explained, 0.0, 1.0)),
-        kept > 0 or not steps, first_scores, tuple(all_trials),
+        baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), kept > 0 or not steps,
+        first_scores, tuple(all_trials),
     )  # fmt: skip
+
+
+def _confront(
+    problem: Problem, noise: Noise, weight: Array, split: Split, final: Fit, index: int, item: Found, samples: float
+) -> tuple[Fit, Found]:
+    """One accepted effect against its known and met rivals, everything else of the final model in place."""
+    own, values = final.effects[index]
+    rest = [effect for i, effect in enumerate(final.effects) if i != index]
+    without = fit(problem, weight, rest, final.x, evaluations=6)
+    scores = screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest])
+    strongest = [score.candidate.effect.id for score in scores[:3]]
+    names = {*own.effect.rivals, *item.rivals, *strongest} - {own.effect.id}
+    best: dict[str, Score] = {}
+    for score in scores:
+        best.setdefault(score.candidate.effect.id, score)
+    before = cost(problem, without, weight)
+    # The effect under question stands last, where trials keep theirs.
+    ordered = replace(final, effects=(*rest, (own, values)))
+    champion = Trial(best.get(own.effect.id, item.score), ordered, cost(problem, final, weight))
+    trials = [
+        refine(problem, weight, try_effect(problem, weight, without, best[name]))
+        for name in sorted(names)
+        if name in best and best[name].explained > 0.3 * champion.score.explained
+    ]
+    group = sorted([champion, *trials], key=lambda trial: trial.cost)
+    rivals = tied(problem, weight, split, group[0], group[1:], before, samples)
+    chosen, rivals = simplest(group[0], rivals)
+    names_left = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
+    effects = list(chosen.fit.effects)
+    effects.insert(index, effects.pop())
+    known = (*item.trials, *trials)
+    return replace(chosen.fit, effects=tuple(effects)), Found(chosen.score, names_left, known, before - chosen.cost)
 
 
 def _prune(
@@ -156,10 +192,12 @@ def _keep(
 ) -> int:
     """How many steps of the build-up stand: the fewest that explain the whole, unless the next explains most of the rest."""
     kept = 0
+    excess = max((start - samples) / samples, 1.0)
+    needed = min(WHOLE[0] + WHOLE[1] * float(np.log10(excess)), WHOLE[2])
     for i, (result, _, gained) in enumerate(steps):
         after = cost(problem, result, weight)
         whole = (start - after) / max(start - samples * (1.0 + OWN_ERROR), start - after, 1e-9)
-        if whole >= WHOLE and gained >= LAST:
+        if whole >= needed and gained >= LAST:
             kept = i + 1
     return kept
 
