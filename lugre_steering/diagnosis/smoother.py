@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 from scipy.linalg import solveh_banded
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from lugre_steering.recording import Array
 
@@ -21,6 +22,10 @@ _WIDTH_SIGMA = {1: 1e-3, 3: 3e-3}
 ITERATIONS = 15
 SETTLE_SIGMA = 0.02
 """Half width of the final dead band in units of the sensor noise."""
+PARKED_SIGMA = 0.25
+"""The same while parked: friction near its limit is a ratchet that turns any wander of the angle into a drift of torque."""
+PARKED_SAMPLES = 100
+"""Parked is where the smoothed angle spans less than the parked dead band over so many samples."""
 
 
 def smooth_angle(angle: Array, sigma: float) -> Array:
@@ -42,16 +47,18 @@ def smooth_angle(angle: Array, sigma: float) -> Array:
         for order in weights:
             step = np.diff(estimate, n=order)
             weights[order] = _WEIGHT[order] / ((_WIDTH_SIGMA[order] * sigma) ** 2 + step**2)
-    return _settled(np.asarray(estimate), SETTLE_SIGMA * sigma)
+    span = maximum_filter1d(estimate, PARKED_SAMPLES) - minimum_filter1d(estimate, PARKED_SAMPLES)
+    half_width = sigma * np.where(span < 2.0 * PARKED_SIGMA * sigma, PARKED_SIGMA, SETTLE_SIGMA)
+    return _settled(np.asarray(estimate), half_width)
 
 
 @njit(cache=True)
-def _settled(angle: Array, half_width: float) -> Array:
-    """Play operator against the last traces of noise at standstill: what moves less than ``half_width`` [rad] does not move at all."""
+def _settled(angle: Array, half_width: Array) -> Array:
+    """Play operator against the last traces of noise: what moves less than ``half_width`` [rad] (n,) does not move."""
     out = np.empty_like(angle)
     center = angle[0]
     for i in range(angle.size):
-        center = min(max(center, angle[i] - half_width), angle[i] + half_width)
+        center = min(max(center, angle[i] - half_width[i]), angle[i] + half_width[i])
         out[i] = center
     return out
 
