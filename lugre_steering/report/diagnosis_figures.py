@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -39,7 +40,7 @@ def draw_all(diagnosis: Diagnosis, folder: Path) -> dict[str, Path]:
             draw(f"effect {effect['id']}", f"residual_{effect['id']}", partial(_residual, diagnosis, effect))
     if diagnosis.evidence:
         draw("evidence", "evidence", partial(_evidence, diagnosis))
-    if plots.heldout_rows(diagnosis):
+    if diagnosis.json["effects"] and plots.heldout_rows(diagnosis):
         draw("heldout", "heldout", partial(_heldout, diagnosis))
     return found
 
@@ -51,7 +52,7 @@ def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
     added = shown.torque_axis(vehicle, *parts.values())
     caption = f"Bag {trace.name}. {diagnosis.json['statement']}"
     if parts:
-        caption += " Shaded: where each effect acts."
+        caption += " Shaded: where an effect acts (unless it acts nearly everywhere)."
 
     def line(ax: Any, values: Any, scale: float, **style: Any) -> None:
         points, width = shown.thin(values, POINTS)
@@ -79,8 +80,8 @@ def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
             ax.set_ylabel(unit)
         for name, part in parts.items():
             line(axes[2, 0], part, added.scale, color=colour[name], label=name)
-            for ax in axes[:, 0]:
-                for start, end in trace.intervals.get(name, ()):
+            for ax in axes[:, 0] if shown.is_local(trace, name) else ():
+                for start, end in trace.intervals[name]:
                     ax.axvspan(start, end, color=colour[name], alpha=0.13, linewidth=0)
         if parts:
             axes[2, 0].set_title("what each effect adds")
@@ -94,7 +95,7 @@ def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
 def _residual(diagnosis: Diagnosis, effect: dict[str, Any], file: Path) -> None:
     cloud, colour = plots.Cloud.of(diagnosis, effect), plots.colours(diagnosis)[effect["id"]]
     x, scale = cloud.x * cloud.axis.scale, cloud.torque.scale
-    lx, ly = (x, cloud.law) if cloud.discrete else shown.broken(x, cloud.law)
+    lx, ly = shown.broken(x, cloud.law)
     caption = (
         f"{effect['statement']} Left: blue, what the recalibrated baseline leaves over; grey, what the rest of the "
         "augmented model leaves to this effect; line, its fitted law. Right: what is left with everything found; band, "
@@ -104,7 +105,7 @@ def _residual(diagnosis: Diagnosis, effect: dict[str, Any], file: Path) -> None:
         before, after = axes[0]
         before.plot(x, cloud.before * scale, ".", markersize=2, color="#a9bce6", rasterized=True)
         before.plot(x, cloud.partial * scale, ".", markersize=2, color="#5b6169", rasterized=True)
-        before.plot(lx, ly * scale, "." if cloud.discrete else "-", color=colour, linewidth=1.8)
+        before.plot(lx, ly * scale, color=colour, linewidth=1.8)
         after.plot(x, cloud.after * scale, ".", markersize=2, color=plots.AUGMENTED, rasterized=True)
         floor = 2.0 * diagnosis.json["noise_floor_Nm"] * scale
         after.axhspan(-floor, floor, color=plots.QUIET, alpha=0.25, linewidth=0)
@@ -119,8 +120,8 @@ def _evidence(diagnosis: Diagnosis, file: Path) -> None:
     rows = diagnosis.evidence[:EVIDENCE_ROWS]
     colour = plots.colours(diagnosis)
     caption = (
-        "Share of the residual's energy that each candidate's fingerprint could explain before any fit (bar), and how "
-        "much it then lowered the held-out error when fitted (diamond; none: not tried)."
+        "Share of the residual's energy that each candidate's fingerprint could explain before any fit (bar), and by "
+        "how much the fit that tried it lowered the held-out error (diamond; none: not tried)."
     )
     with figure(1, 1, caption, file, row_inches=0.7 + 0.3 * len(rows)) as axes:
         ax = axes[0, 0]
@@ -143,7 +144,7 @@ def _heldout(diagnosis: Diagnosis, file: Path) -> None:
     caption = (
         "Error on stretches that neither search nor fit saw, before and after; bar: 95 % interval of the improvement."
     )
-    with figure(1, 1, caption, file, row_inches=3.4, width=max(6.0, 1.6 * len(rows))) as axes:
+    with figure(1, 1, caption, file, row_inches=3.4, width=min(max(7.0, 2.0 * len(rows)), 20.0)) as axes:
         ax = axes[0, 0]
         for i, (_, before, after, spread) in enumerate(rows):
             ax.bar(i - 0.18, before, 0.34, color=plots.BASELINE, label="recalibrated baseline" if i == 0 else None)
@@ -154,8 +155,8 @@ def _heldout(diagnosis: Diagnosis, file: Path) -> None:
         ax.axhline(
             floor, color="black", linestyle=":", linewidth=1.2, label=f"noise floor {shown.number(floor, 3)} {unit}"
         )
-        ax.set_xticks(range(len(rows)), [row[0] for row in rows])
+        ax.set_xticks(range(len(rows)), ["\n".join(textwrap.wrap(row[0], 20)) for row in rows])
         ax.set_xlim(-0.7, max(len(rows) - 0.3, 0.7))
         ax.set_ylabel(f"held-out RMSE ({unit})")
         ax.grid(axis="x", visible=False)
-        ax.legend()
+        ax.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)

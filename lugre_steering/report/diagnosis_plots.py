@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -91,24 +92,26 @@ def torque_plot(diagnosis: Diagnosis, trace: BagTrace) -> Spec:
     if parts:
         data.insert(2, curve(trace.augmented, torque.scale, "y", "with the effects found", new))
         data.append(curve(after, left.scale, "y2", "after", new | thin, showlegend=False))
-    shapes = [_band(span, QUIET, 0.55, y0=1.0, y1=1.012) for span in stretches(trace.time, trace.held)]
+    shapes = _strip(0, stretches(trace.time, trace.held), QUIET)
     data += [_key(QUIET, 0.55, "held out from search and fit")] if shapes else []
-    for name, part in parts.items():
+    for lane, (name, part) in enumerate(parts.items(), 1):
         line = {"color": colour[name], "width": 1.5}
         data.append(curve(part, added.scale, "y3", f"torque of {html.escape(name)}", line, showlegend=False))
-        data.append(_key(colour[name], 0.3, f"{html.escape(name)} acts"))
-        shapes += [_band(span, colour[name], 0.14) for span in trace.intervals.get(name, ())]
+        data.append(_key(colour[name], 0.6, f"{html.escape(name)} acts"))
+        shapes += _strip(lane, trace.intervals.get(name, ()), colour[name])
+        if shown.is_local(trace, name):
+            shapes += [_band(span, colour[name], 0.14) for span in trace.intervals[name]]
     time = _axis("time since the first stamp [s]", anchor="y3" if parts else "y2", domain=[0, 1])
     titles = [f"torque [{torque.label}]", f"residual [{left.label}]", f"effect [{added.label}]"]
     axes = {
         f"yaxis{'' if i == 0 else i + 1}": _axis(title, domain=list(row), fixedrange=False)
         for i, (title, row) in enumerate(zip(titles, rows, strict=False))
     }
-    height = 700 if parts else 540
+    height = 740 if parts else 560
     return {
         "data": data,
-        "layout": _layout(xaxis=time, **axes, shapes=shapes, height=height, legend=_legend(1.03), hovermode="x unified",
-                          margin={"l": 78, "r": 18, "t": 54, "b": 48}),
+        "layout": _layout(xaxis=time, **axes, shapes=shapes, height=height, hovermode="x unified",
+                          legend=_legend(1.03 + 0.016 * len(parts)), margin={"l": 78, "r": 18, "t": 84, "b": 48}),
     }  # fmt: skip
 
 
@@ -123,6 +126,11 @@ def _band(span: tuple[float, float], colour: str, opacity: float, y0: float = 0.
         "type": "rect", "xref": "x", "yref": "paper", "x0": round(span[0], 3), "x1": round(span[1], 3), "y0": y0,
         "y1": y1, "fillcolor": colour, "opacity": opacity, "line": {"width": 0}, "layer": "below",
     }  # fmt: skip
+
+
+def _strip(lane: int, spans: Sequence[tuple[float, float]], colour: str) -> list[Spec]:
+    """Solid bars above the plot, one lane per subject, so that overlapping stretches stay apart."""
+    return [_band(span, colour, 0.6, y0=1.004 + 0.016 * lane, y1=1.016 + 0.016 * lane) for span in spans]
 
 
 def _key(colour: str, opacity: float, name: str) -> Spec:
@@ -142,12 +150,11 @@ def residual_plot(diagnosis: Diagnosis, effect: dict[str, Any]) -> Spec:
                 "yaxis": f"y{axis}", "x": rounded(cloud.x, cloud.axis.scale), "y": rounded(y, cloud.torque.scale),
                 "hoverinfo": "skip"}  # fmt: skip
 
-    x, y = (cloud.x, cloud.law) if cloud.discrete else shown.broken(cloud.x, cloud.law)
+    x, y = shown.broken(cloud.x, cloud.law)
     law = {
-        "type": "scatter", "mode": "markers" if cloud.discrete else "lines",
-        "name": f"fitted law of {html.escape(effect['id'])}",
+        "type": "scatter", "mode": "lines", "name": f"fitted law of {html.escape(effect['id'])}",
         "x": rounded(x, cloud.axis.scale), "y": rounded(y, cloud.torque.scale), "xaxis": "x", "yaxis": "y",
-        "line": {"color": colour, "width": 2.2}, "marker": {"color": colour, "size": 5},
+        "line": {"color": colour, "width": 2.2},
     }  # fmt: skip
     data = [
         dots(cloud.before, "", "residual of the recalibrated baseline", "#a9bce6"),
@@ -176,7 +183,6 @@ class Cloud:
     def __init__(self, name: str, axis: shown.Axis, torque: shown.Axis, columns: Array) -> None:
         self.name, self.axis, self.torque = name, axis, torque
         self.x, self.before, self.partial, self.after, self.law = columns
-        self.discrete = shown.is_discrete(self.x)
 
     @classmethod
     def of(cls, diagnosis: Diagnosis, effect: dict[str, Any]) -> Cloud:
@@ -220,7 +226,7 @@ def heldout_rows(diagnosis: Diagnosis) -> list[tuple[str, float, float, tuple[fl
 def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
     """Bars of the held-out error before and after, the noise floor as a line."""
     rows, unit = heldout_rows(diagnosis), diagnosis.vehicle.coordinate.force_unit
-    if not rows:
+    if not rows or not diagnosis.json["effects"]:
         return None
     names = [html.escape(row[0]) for row in rows]
     reach = [

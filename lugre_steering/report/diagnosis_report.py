@@ -17,6 +17,7 @@ from typing import Any
 
 from lugre_steering import units
 from lugre_steering.calibration.calibrate import KEYS
+from lugre_steering.diagnosis.problem import calibrations_for
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError
@@ -139,9 +140,9 @@ class _Drawing:
 def _sections(diagnosis: Diagnosis, drawing: _Drawing) -> list[Section]:
     return [
         Section("next", "Next steps", "What to do next", _next_steps(diagnosis)),
-        Section("torque", "Torque", "Torque before and after", _torque(diagnosis, drawing)),
+        Section("torque", "Torque", "Torque, measured and modelled", _torque(diagnosis, drawing)),
         Section("effects", "Found", "What was found", _effects(diagnosis, drawing)),
-        Section("heldout", "Held out", "Proof on held-out data", _heldout(diagnosis, drawing)),
+        Section("heldout", "Held out", "Error on held-out data", _heldout(diagnosis, drawing)),
         Section("evidence", "Evidence", "Evidence for and against each candidate", _evidence(diagnosis)),
         Section("left", "Left over", "What is left", _left(diagnosis)),
         Section("experiment", "Experiment", "The next experiment", _experiment(diagnosis)),
@@ -160,19 +161,28 @@ def _text(value: object) -> str:
     return html.escape(str(value), quote=True).replace(" N m", "\u00a0N\u00a0m")
 
 
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence[int] = ()) -> str:
+def _table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence[int] = (), narrow: bool = False
+) -> str:
     """Cells are HTML already; ``numeric`` columns are set flush right."""
-    return _table_of(header, [("", row) for row in rows], numeric)
+    return _table_of(header, [("", row) for row in rows], numeric, narrow)
 
 
-def _table_of(header: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]], numeric: Sequence[int] = ()) -> str:
+def _table_of(
+    header: Sequence[str],
+    rows: Sequence[tuple[str, Sequence[str]]],
+    numeric: Sequence[int] = (),
+    narrow: bool = False,
+) -> str:
+    """The same with attributes for each row."""
     style = [' class="n"' if i in numeric else "" for i in range(len(header))]
     head = "".join(f"<th{s}>{cell}</th>" for s, cell in zip(style, header, strict=True))
     body = "".join(
         f"<tr{marks}>{''.join(f'<td{s}>{cell}</td>' for s, cell in zip(style, row, strict=True))}</tr>\n"
         for marks, row in rows
     )
-    return f"<table><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>\n"
+    style_of_table = ' class="narrow"' if narrow else ""
+    return f"<table{style_of_table}><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>\n"
 
 
 def _pairs(rows: Sequence[tuple[str, str]]) -> str:
@@ -262,8 +272,9 @@ def _torque(diagnosis: Diagnosis, drawing: _Drawing) -> str:
     found = bool(diagnosis.json["effects"])
     parts = [
         '<p class="note">Drag to zoom, double-click to go back; click a legend entry to hide a curve. '
-        + ("Shaded: where an effect acts. " if found else "")
-        + "Grey strip on top: stretches that neither search nor fit saw.</p>\n"
+        + "Bars on top: grey, stretches that neither search nor fit saw"
+        + ("; coloured, where an effect acts, shaded below unless that is nearly everywhere" if found else "")
+        + ".</p>\n"
     ]
     for i, trace in enumerate(diagnosis.traces):
         words = f"Measured torque of bag {trace.name}, the models' torque and the residuals over time"
@@ -342,20 +353,20 @@ def _place(diagnosis: Diagnosis, entry: Mapping[str, Any]) -> list[str]:
 
 
 def _heldout(diagnosis: Diagnosis, drawing: _Drawing) -> str:
-    spec = plots.heldout_plot(diagnosis)
-    if spec is None:
+    before, after = diagnosis.json["baseline"], diagnosis.json["augmented"]
+    if before["heldout_rmse_Nm"] is None:
         return ""
     unit = _text(diagnosis.vehicle.coordinate.force_unit)
-    before, after = diagnosis.json["baseline"], diagnosis.json["augmented"]
-    rows = [
-        ["recalibrated baseline", shown.number(before["rmse_Nm"]), shown.number(before["heldout_rmse_Nm"])],
-        ["with the effects found", shown.number(after["rmse_Nm"]), shown.number(after["heldout_rmse_Nm"])],
-    ]
+    rows = [["recalibrated baseline", shown.number(before["rmse_Nm"]), shown.number(before["heldout_rmse_Nm"])]]
+    if diagnosis.json["effects"]:
+        rows.append(["with the effects found", shown.number(after["rmse_Nm"]), shown.number(after["heldout_rmse_Nm"])])
+    rows.append(["noise floor", shown.number(diagnosis.json["noise_floor_Nm"]), ""])
+    spec = plots.heldout_plot(diagnosis)
     return (
         "<p>Root mean square torque error on stretches kept away from both the search and the fit, with a gap to them "
-        "longer than the memory of the friction. Bar: 95 % interval of the improvement.</p>\n"
+        f"longer than the memory of the friction.{' Bar: 95 % interval of the improvement.' if spec else ''}</p>\n"
         + drawing.place("heldout", spec, "Held-out error before and after", "half")
-        + _table(["", f"RMSE, all data [{unit}]", f"RMSE, held out [{unit}]"], rows, numeric=(1, 2))
+        + _table(["", f"RMSE, all data [{unit}]", f"RMSE, held out [{unit}]"], rows, (1, 2), narrow=True)
     )
 
 
@@ -424,7 +435,8 @@ def _limits(diagnosis: Diagnosis) -> str:
                      shown.number(limit["smallest"], 3), _text(unit)])  # fmt: skip
     table = _table(["effect", "", "parameter", "smallest that would have shown", "unit"], rows, numeric=(3,))
     if len(rows) > EVIDENCE_SHOWN:
-        table = f"<details><summary>{len(rows)} effects</summary>{table}</details>\n"
+        opened = " open" if diagnosis.json["verdict"] == "consistent" else ""
+        table = f"<details{opened}><summary>{len(rows)} effects</summary>{table}</details>\n"
     return "<p>An effect smaller than this could be present without these recordings showing it.</p>\n" + table
 
 
@@ -441,15 +453,16 @@ def _quality(diagnosis: Diagnosis) -> str:
 
 def _baseline(diagnosis: Diagnosis) -> str:
     vehicle, rows = diagnosis.vehicle, []
+    calibrated = {calibration.name for calibration in calibrations_for(vehicle)}
     for key in KEYS:
-        if (value := key.read(vehicle)) is not None:
+        if key.calibration in calibrated and (value := key.read(vehicle)) is not None:
             unit = units.label(vehicle, key.unit)
             rows.append([f"<code>{_text(key.key)}</code>", shown.number(value), "" if unit == "1" else _text(unit)])
     made = [(_text(name.replace("_", " ")), _plain(value)) for name, value in vehicle.provenance.items()]
     return (
         "<p>The published model with these values is what missing physics was judged against, so that a wrong friction "
         "level is never reported as physics. They stand in <code>augmented.yaml</code>.</p>\n"
-        + (_table(["key of the vehicle file", "value", "unit"], rows, numeric=(1,)) if rows else "")
+        + (_table(["key of the vehicle file", "value", "unit"], rows, (1,), narrow=True) if rows else "")
         + (_pairs(made) if made else "")
     )
 
@@ -474,7 +487,10 @@ _GLOSSARY = _pairs(
         ("noise floor", "what sensor noise and the error of the estimated motion alone would leave as residual"),
         ("energy share", "share of the residual's energy that the effect explains"),
         ("masked share", "share of an effect's trace that recalibrating the baseline imitates, and so hides"),
-        ("held-out gain", "by how much an effect, fitted alone, lowers the held-out error (1 &minus; after / before)"),
+        (
+            "held-out gain",
+            "by how much the fit that tried it, with the effects accepted before it, lowers the held-out error",
+        ),
         ("p", "chance that noise of this kind explains as much, all variants of the effect tried being paid for"),
         (
             "95 % interval",

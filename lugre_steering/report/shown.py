@@ -14,11 +14,15 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.locate import UNITS
+from lugre_steering.diagnosis.result import BagTrace
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
 EFFECT_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31")
 """One per named effect; apart from the black, blue and red of measured, baseline and augmented torque."""
+
+WIDESPREAD = 0.6
+"""Share of a bag's duration above which shading would cover nearly everything."""
 
 _HANDIER = (("rad", "deg", 180.0 / math.pi), ("m", "mm", 1e3), ("Pa", "MPa", 1e-6))
 
@@ -60,9 +64,19 @@ def coordinate_name(vehicle: Vehicle, name: str) -> str:
 
 
 def law_coordinate(effect: Mapping[str, Any], told_by: str, coordinates: Collection[str]) -> str:
-    """Name of the recorded coordinate an effect is drawn along: the catalogue's, else the one it was located by."""
+    """Name of the recorded coordinate an effect is drawn along: the catalogue's, else the one it was located by.
+
+    A law of the direction is drawn along the angle, where it opens into a loop.
+    """
     found = [entry.get("coordinate") for entry in effect["where"]]
-    return next((name for name in (told_by, *found) if name in coordinates), "time")
+    name = next((name for name in (told_by, *found) if name in coordinates), "time")
+    return "steering angle" if name == "direction" else name
+
+
+def is_local(trace: BagTrace, effect_id: str) -> bool:
+    """Whether an effect acts for so little of a bag that shading it tells something."""
+    acts = sum(end - start for start, end in trace.intervals.get(effect_id, ()))
+    return 0.0 < acts < WIDESPREAD * float(trace.time[-1] - trace.time[0])
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -125,7 +139,3 @@ def broken(x: Array, y: Array) -> tuple[Array, Array]:
     """A line with gaps where x jumps, so that no stroke joins what time does not join."""
     jumps = np.flatnonzero(np.abs(np.diff(x)) > 0.05 * float(np.ptp(x))) + 1
     return np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan)
-
-
-def is_discrete(values: Array) -> bool:
-    return np.unique(values[:: max(1, values.size // 2000)]).size <= 5
