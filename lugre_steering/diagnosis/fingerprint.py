@@ -21,8 +21,11 @@ from lugre_steering.effects.entry import Effect
 from lugre_steering.recording import Array
 
 WINDOW_EDGES = 9
-HYDRAULIC = ("moment_arm_error", "relief_saturation", "line_loss_linear", "line_loss_quadratic", "back_pressure")
-"""Nothing of a joint that is driven and measured without oil."""
+HYDRAULIC = (
+    "moment_arm_error", "relief_saturation", "line_loss_linear", "line_loss_quadratic", "back_pressure", "trapped_pressure",
+    "cylinder_friction",
+)  # fmt: skip
+"""Nothing of a joint that is driven and measured without oil (friction between drive and joint is its own friction)."""
 CEILINGS = (0.8, 0.88, 0.94, 0.98)
 
 
