@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from lugre_steering.diagnosis import wiring
 from lugre_steering.diagnosis.dataset import GAP_S, angle_noise
+from lugre_steering.diagnosis.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
 
@@ -52,7 +52,7 @@ class Quality:
     @property
     def blocking(self) -> tuple[Finding, ...]:
         """Findings that make any verdict about physics meaningless."""
-        return tuple(finding for finding in self.findings if finding.finding in wiring.BLOCKING)
+        return tuple(finding for finding in self.findings if finding.finding in BLOCKING)
 
 
 def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
@@ -68,7 +68,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
         findings += found
         clean[channel] = Signal(look.time[keep], look.value[keep])
     usable = _with_signals(recording, clean)
-    return Quality((*findings, *wiring.inspect(usable, vehicle)), usable)
+    return Quality((*findings, *inspect_wiring(usable, vehicle)), usable)
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:
@@ -189,8 +189,9 @@ def _white_noise(time: Array, value: Array, period: float) -> Array:
     mean = uniform_filter1d(size * regular, width) / np.maximum(share, 0.1)
     sigma = mean * np.sqrt(np.pi / 2.0) / np.sqrt(FOURTH @ FOURTH)
     jitter = 1.4826 * float(np.median(np.abs(spacing - period)))
-    slope = np.sqrt(uniform_filter1d(np.gradient(uniform_filter1d(value, _samples(0.1, period)), time) ** 2, width))
-    return np.sqrt(np.maximum(sigma**2 - (jitter * slope) ** 2, 0.0))
+    slope = np.gradient(uniform_filter1d(value, _samples(0.1, period)), time)
+    excess = sigma**2 - jitter**2 * uniform_filter1d(slope**2, width)
+    return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
 
 
 def _examine(

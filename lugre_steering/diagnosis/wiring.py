@@ -1,0 +1,310 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Wrong wiring, found by comparing the recording with the nominal model: signs, units, exchanged channels, clocks, zeros.
+
+Each suspicion is a hypothesis: the recording as it would be with that one fault undone. It is reported when the nominal
+model then agrees very much better and well, which no physics of the catalogue brings about; hypotheses that agree equally
+well are named together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import correlate
+from scipy.stats import theilslopes
+
+from lugre_steering.chain.hydraulics import line_gains
+from lugre_steering.chain.model import Model, build_model
+from lugre_steering.chain.step import torque_side
+from lugre_steering.diagnosis.dataset import Run, angle_noise, prepare
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.vehicle import Vehicle
+
+BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
+
+GAIN = 1.6
+"""The nominal level may be wrong by this factor; units and lost circuits are further off."""
+BETTER, GOOD = 0.5, 0.45
+"""A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
+TIE = 1.15
+OPPOSED = -0.5
+"""Correlation of measured and nominal torque, with negative work, that is a flipped sign however poor the model."""
+ABSURD_SHARE = 0.05
+"""So many angles beyond half a turn are not glitches but another unit."""
+TURNED_RAD = np.pi / 2.0
+"""No steered track turns this far."""
+SKEW_S = 0.1
+"""Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted."""
+SKEW_RANGE_S = 5.0
+SKEW_ENERGY = 0.5
+SKEW_RATE_HZ = 50.0
+SOFTER = (0.5, 0.7, 1.0, 1.4)
+PLAY = (0.0, 0.1, 0.3, 0.6)
+"""Stiffness factors and backlash (in presliding lengths) that may explain a late torque in place of a clock."""
+DRIFT_SHARE = 0.02
+"""Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
+PRESSURE_UNITS = {"kPa": 1e3, "psi": 6894.757, "bar": 1e5, "MPa": 1e6}
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """One fault undone: the relative error (0 ... 1 and more) that the nominal model then leaves."""
+
+    finding: str
+    topics: tuple[str, ...]
+    statement: str
+    error: float
+
+
+def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Findings about signs, units, exchanged channels, clocks and zeros; ``recording`` without bad samples."""
+    whole = _span(recording)
+    found = _angle_unit(recording, vehicle)
+    if found is None:
+        try:
+            run = prepare(recording, vehicle)
+        except DataError:
+            return ()
+        if float(np.ptp(run.theta)) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
+            return ()
+        found = _wrong(recording, vehicle, run)
+    if found is not None:
+        return (Finding(found.finding, ", ".join(found.topics), found.statement, whole),)
+    return tuple(
+        replace(finding, intervals_s=whole) for check in (_skew, _drifts) for finding in check(vehicle, run)
+    )
+
+
+def _span(recording: Recording) -> tuple[tuple[float, float], ...]:
+    signals = [*recording.angle.values(), *recording.pressure.values()]
+    signals += [recording.measured_torque] if recording.measured_torque is not None else []
+    ends = [(float(s.time_s[0]), float(s.time_s[-1])) for s in signals if s.time_s.size]
+    return ((min(start for start, _ in ends), max(end for _, end in ends)),) if ends else ()
+
+
+def _topics(vehicle: Vehicle, kind: Kind) -> dict[str, str]:
+    return {channel.name: channel.topic for channel in vehicle.channels if channel.kind is kind}
+
+
+def _foreign_unit(vehicle: Vehicle) -> tuple[str, float]:
+    """The unit that an angle (or a linear coordinate) would most likely be given in by mistake, and its factor to SI."""
+    return ("degrees", float(np.pi / 180.0)) if vehicle.coordinate.unit == "rad" else ("mm", 1e-3)
+
+
+def _angle_unit(recording: Recording, vehicle: Vehicle) -> _Hypothesis | None:
+    """Angles by their magnitude alone."""
+    unit, factor = _foreign_unit(vehicle)
+    wrong = []
+    for side, topic in _topics(vehicle, Kind.ANGLE).items():
+        signal = recording.angle.get(side)
+        count = 0 if signal is None else signal.time_s.size
+        absurd = recording.rejected.get(topic, {}).get("absurd_value", 0)
+        turned = 0.0 if signal is None or not count else float(np.abs(signal.value).max())
+        if absurd > ABSURD_SHARE * (count + absurd) or (vehicle.track is not None and turned > TURNED_RAD):
+            wrong.append(topic)
+    if not wrong:
+        return None
+    statement = f"{' and '.join(wrong)}: far beyond any steering angle; probably in {unit} (multiply by {factor:.6g})"
+    return _Hypothesis("unit_suspect", tuple(wrong), statement, 0.0)
+
+
+def _torques(model: Model, run: Run) -> Array:
+    """Nominal torque of each side (sides, n) [N m]."""
+    rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
+    return np.array([torque_side(p, model.rubber, run.time, *row) for p, *row in rows])
+
+
+def _error(run: Run, measured: Array, expected: Array) -> float:
+    """Relative error of the expected torque, both about their means, with a gain within GAIN."""
+    a, b = measured[run.valid] - measured[run.valid].mean(), expected[run.valid] - expected[run.valid].mean()
+    gain = np.clip(a @ b / max(float(b @ b), 1e-30), 1.0 / GAIN, GAIN)
+    return float(np.linalg.norm(a - gain * b) / max(np.linalg.norm(a), 1e-30))
+
+
+def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | None:
+    """The simplest hypothesis among the best, if it is convincing."""
+    if (exchanged := _exchanged_angles(vehicle, run)) is not None:
+        return exchanged
+    model = build_model(vehicle)
+    expected = _torques(model, run)
+    total = expected.sum(axis=0)
+    as_is = _error(run, run.measured, total)
+    hypotheses = [*_signals_wrong(vehicle, run, total), *_signs(vehicle, run, expected)]
+    if as_is > GOOD and vehicle.coordinate.unit:
+        hypotheses += _angle_units(recording, vehicle, model)
+    convincing = [h for h in hypotheses if h.error < min(GOOD, BETTER * as_is)]
+    if not convincing:
+        opposed = float(np.corrcoef(run.measured[run.valid], total[run.valid])[0, 1]) < OPPOSED
+        work = float(np.sum((run.measured * run.omega.mean(axis=0))[run.valid]))
+        convincing = [h for h in hypotheses if h.finding == "sign_flipped" and h.error < as_is] if opposed and work < 0.0 else []
+    if not convincing:
+        return None
+    best = min(h.error for h in convincing)
+    tied = [h for h in convincing if h.error <= TIE * best + 0.01]
+    first = min(tied, key=lambda h: len(h.topics))
+    rivals = "".join(f" The same data would come from this: {h.statement}." for h in tied if h is not first)
+    agrees = f" (relative error of the nominal model {as_is:.2f} as recorded, {first.error:.2f} with that undone)"
+    return replace(first, statement=first.statement + agrees + "." + rivals)
+
+
+def _signals_wrong(vehicle: Vehicle, run: Run, total: Array) -> Iterator[_Hypothesis]:
+    """Exchanged lines, and units of pressures or of the torque sensor."""
+    gains = run.torque_per_line
+    if vehicle.hydraulics is None:
+        (topic,) = _topics(vehicle, Kind.TORQUE).values()
+        yield _Hypothesis("sign_flipped", (topic,), f"{topic}: the sign is flipped", _error(run, -run.measured, total))
+        force = vehicle.coordinate.force_unit
+        statement = f"{topic}: probably in k{force} (multiply by 1000)"
+        yield _Hypothesis("unit_suspect", (topic,), statement, _error(run, 1e3 * run.measured, total))
+        return
+    topics = list(_topics(vehicle, Kind.PRESSURE).values())
+    for i, j in combinations(range(len(topics)), 2):
+        measured = run.measured + (gains[i] - gains[j]) * (run.pressure[j] - run.pressure[i])
+        statement = f"{topics[i]} and {topics[j]} are exchanged; check the plugs of the two sensors"
+        yield _Hypothesis("swapped_lines", (topics[i], topics[j]), statement, _error(run, measured, total))
+    for unit, factor in PRESSURE_UNITS.items():
+        statement = f"probably in {unit} (multiply by {factor:g})"
+        every = f"{', '.join(topics)}: {statement}"
+        yield _Hypothesis("unit_suspect", tuple(topics), every, _error(run, factor * run.measured, total))
+        for topic, gain, pressure in zip(topics, gains, run.pressure, strict=True):
+            if factor * float(np.abs(pressure).max()) < 1.1 * vehicle.sensors.pressure_range_Pa:
+                measured = run.measured + gain * (factor - 1.0) * pressure
+                yield _Hypothesis("unit_suspect", (topic,), f"{topic}: {statement}", _error(run, measured, total))
+
+
+def _signs(vehicle: Vehicle, run: Run, expected: Array) -> Iterator[_Hypothesis]:
+    """Flipped angles, one or all; the chain is not quite odd (gravity), so flipped motion runs through it again."""
+    topics = _topics(vehicle, Kind.ANGLE)
+    turned = replace(run, theta=-run.theta, omega=-run.omega, alpha=-run.alpha)
+    flipped = _torques(build_model(vehicle), turned)
+    choices = [{side} for side in vehicle.sides] + ([set(vehicle.sides)] if len(vehicle.sides) > 1 else [])
+    for choice in choices:
+        flip = np.array([side in choice for side in vehicle.sides])[:, None]
+        theta = np.where(flip, -run.theta, run.theta)
+        measured = run.measured
+        if vehicle.hydraulics is not None:
+            measured = np.einsum("slt,lt->t", line_gains(vehicle, theta), run.pressure)
+        named = tuple(topics[side] for side in vehicle.sides if side in choice)
+        statement = f"{' and '.join(named)}: the sign is flipped (positive turns the track to the left)"
+        if len(choice) == len(vehicle.sides) > 1:
+            statement += ", or the lines of every circuit are exchanged" if vehicle.hydraulics is not None else ""
+        error = _error(run, measured, np.where(flip, flipped, expected).sum(axis=0))
+        yield _Hypothesis("sign_flipped", named, statement, error)
+
+
+def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterator[_Hypothesis]:
+    """Angles in another unit, too small to see it by magnitude: smoothed again, since their noise scales with them."""
+    unit, factor = _foreign_unit(vehicle)
+    topics = _topics(vehicle, Kind.ANGLE)
+    choices = [vehicle.sides] + ([(side,) for side in vehicle.sides] if len(vehicle.sides) > 1 else [])
+    for choice in choices:
+        scaled = {
+            side: Signal(s.time_s, s.value * factor) if side in choice else s for side, s in recording.angle.items()
+        }
+        run = prepare(replace(recording, angle=scaled), vehicle)
+        named = tuple(topics[side] for side in choice)
+        statement = f"{' and '.join(named)}: probably in {unit} (multiply by {factor:.6g})"
+        error = _error(run, run.measured, _torques(model, run).sum(axis=0))
+        yield _Hypothesis("unit_suspect", named, statement, error)
+
+
+def _exchanged_angles(vehicle: Vehicle, run: Run) -> _Hypothesis | None:
+    """Left and right by the steering geometry alone: the inner track turns further, cot(left) - cot(right) = -b / L.
+
+    The torque hardly tells them apart. Primary source: Ackermann condition, e.g. Gillespie 1992, chapter 8.
+    """
+    if vehicle.axle is None or set(vehicle.sides) != {"left", "right"}:
+        return None
+    left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
+    t, ratio = np.tan(left), vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
+    as_is = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
+    exchanged = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 - ratio * t)) ** 2)))
+    if as_is < np.radians(0.5) or exchanged > as_is / 3.0:
+        return None
+    topics = tuple(_topics(vehicle, Kind.ANGLE).values())
+    statement = (
+        f"{' and '.join(topics)} are exchanged: the outer track would turn further than the inner one (error of the steering "
+        f"geometry {np.degrees(as_is):.1f} deg as recorded, {np.degrees(exchanged):.1f} deg exchanged)"
+    )
+    return _Hypothesis("swapped_angles", topics, statement, 0.0)
+
+
+def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
+    """Torque stamped late or early against the angles, by more than softer springs or play could imitate.
+
+    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness and play in SOFTER and PLAY. A
+    clock shifts starts and stops alike at any rate; play and compliance do not, so one of the variants fits better there.
+    """
+    model = build_model(vehicle)
+    stride = max(1, round(1.0 / SKEW_RATE_HZ / (run.time[1] - run.time[0])))
+    dt = stride * (run.time[1] - run.time[0])
+    reach = int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt)
+    if reach * dt < 2.0 * SKEW_S:
+        return
+
+    def slope(torque: Array) -> Array:
+        return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
+
+    measured = slope(run.measured)
+    window = measured.size - 2 * reach
+    energy = np.convolve(measured**2, np.ones(window), mode="valid")
+    presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
+
+    def match(softer: float, play: float) -> tuple[float, float, float]:
+        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the model."""
+        trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
+        for record in trial.parameters:
+            record["sigma_0"] *= softer
+            record["backlash_width"] += play * presliding
+        expected = slope(_torques(trial, run).sum(axis=0))[reach : reach + window]
+        power = max(float(expected @ expected), 1e-30)
+        overlap = correlate(measured, expected, mode="valid")
+        gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
+        left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(energy, 1e-30)
+        return float(left.min()), float((left.argmin() - reach) * dt), float(left[reach])
+
+    if abs(match(1.0, 0.0)[1]) <= SKEW_S:
+        return
+    matches = [match(softer, play) for softer in SOFTER for play in PLAY]
+    best, shift, _ = min(matches)
+    unshifted = min(left for _, _, left in matches)
+    if abs(shift) > SKEW_S and best < min(SKEW_ENERGY * unshifted, GOOD**2):
+        kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
+        topics = ", ".join(_topics(vehicle, kind).values())
+        late = "late" if shift > 0.0 else "early"
+        yield Finding(
+            "clock_skew", topics,
+            f"{topics}: stamped {abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
+            f"{unshifted:.2f} as recorded, {best:.2f} shifted); synchronise the clocks of the devices",
+        )  # fmt: skip
+
+
+def _drifts(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
+    """Lines whose level drifts while the other side of their cylinders does the work."""
+    if vehicle.hydraulics is None:
+        return
+    expected = _torques(build_model(vehicle), run).sum(axis=0)
+    limit = max(DRIFT_SHARE * vehicle.sensors.pressure_range_Pa, 10.0 * vehicle.sensors.pressure_noise_Pa)
+    idle = np.abs(expected) > 0.2 * np.abs(expected).max()
+    for (line, topic), gain, pressure in zip(
+        _topics(vehicle, Kind.PRESSURE).items(), run.torque_per_line, run.pressure, strict=True
+    ):
+        at = np.flatnonzero(idle & run.valid & (gain * expected < 0.0))
+        duration = float(run.time[-1] - run.time[0])
+        if at.size < 100 or run.time[at[-1]] - run.time[at[0]] < 0.5 * duration:
+            continue
+        pieces = np.array_split(at, 20)
+        level = np.array([np.median(pressure[piece]) for piece in pieces])
+        slope, _, low, high = theilslopes(level, [run.time[piece].mean() for piece in pieces])
+        if abs(slope) * duration > limit and low * high > 0.0 and high - low < abs(slope):
+            yield Finding(
+                "zero_drift", topic,
+                f"{topic}: the unloaded level of line '{line}' drifts by {slope * duration / 1e5:+.1f} bar over the run; check the "
+                "sensor's zero (the catalogue effect pressure_drift describes the same and may be named for it)",
+            )  # fmt: skip
