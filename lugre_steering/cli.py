@@ -229,13 +229,14 @@ def diagnose(
     material: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,
+    report: Annotated[bool, typer.Option(help="write report.html and pictures")] = True,
     as_json: Json = False,
 ) -> None:
     """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
     from lugre_steering.diagnosis.command import run
 
     with spinner() as progress:
-        result = run(bags, vehicle, out, seed=seed, material=material, progress=progress)
+        result = run(bags, vehicle, out, seed=seed, material=material, report=report, progress=progress)
     if as_json:
         print_json(result)
     else:

@@ -21,9 +21,10 @@ def run(
     *,
     seed: int = 1,
     material: float = MATERIAL_SHARE,
+    report: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Diagnose and write DIR/diagnosis.json, augmented.yaml, report.html and pictures; returns the JSON."""
+    """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the JSON."""
     vehicle = load(vehicle_file)
     for bag in bags:
         if not bag.exists():
@@ -37,8 +38,9 @@ def run(
     result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
     (out / "diagnosis.json").write_text(json.dumps(result.json, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     save(result.vehicle, out / "augmented.yaml")
-    progress("writing the report")
-    from lugre_steering.report.diagnosis_report import write_report
+    if report:
+        progress("writing the report")
+        from lugre_steering.report.diagnosis_report import write_report
 
-    write_report(result, out)
+        write_report(result, out)
     return result.json

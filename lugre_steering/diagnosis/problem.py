@@ -39,8 +39,9 @@ def in_threads(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    """One pool for the process; the mapped functions never map themselves."""
-    return ThreadPoolExecutor(os.cpu_count() or 1)
+    """One pool for the process; the mapped functions never map themselves. LUGRE_STEERING_THREADS limits its size."""
+    wanted = os.environ.get("LUGRE_STEERING_THREADS", "")
+    return ThreadPoolExecutor(int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)
