@@ -243,6 +243,27 @@ def diagnose(
         print(f"{result['verdict']}: {result['statement']}\nresults in {out}")
 
 
+@command()
+def effects(
+    effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
+    out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,
+    as_json: Json = False,
+) -> None:
+    """List the physics that diagnosis knows, or explain one effect: law, source, parameters, how it shows."""
+    from lugre_steering.effects import catalogue
+    from lugre_steering.report import effect_card as card
+
+    if not effect_id:
+        if out is not None:
+            raise DataError("effects --out: needs the id of one effect; 'lugre-steering effects' lists them")
+        print_json([card.describe(e) for e in catalogue.CATALOGUE.values()]) if as_json else card.show_list(Console())
+        return
+    effect = catalogue.effect(effect_id)
+    traces = card.traces(effect)
+    result = card.explain(effect, traces, card.draw(traces, out) if out is not None and traces else None)
+    print_json(result) if as_json else card.show_effect(Console(), effect, result)
+
+
 def main() -> None:
     """Entry point of ``lugre-steering``."""
     app()

@@ -1,0 +1,254 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an entry of the catalogue is: tables for the terminal, and a picture of the trace it leaves in a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.chain.hydraulics import line_gains
+from lugre_steering.diagnosis import locate
+from lugre_steering.diagnosis.dataset import Run
+from lugre_steering.diagnosis.fingerprint import candidates
+from lugre_steering.diagnosis.problem import Candidate, Problem
+from lugre_steering.diagnosis.result import finite
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.entry import Effect
+from lugre_steering.recording import Array
+from lugre_steering.report import shown
+from lugre_steering.resources import config_folder
+from lugre_steering.simulate import plant
+from lugre_steering.simulate.actuation import line_pressures, total_gains
+from lugre_steering.simulate.command import make_folder
+from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
+from lugre_steering.vehicle import Vehicle
+
+REFERENCE = "double-cycle"
+"""Manoeuvre that sizes the example: it reaches the limits, slides and warms."""
+SAMPLE_S = 0.02
+NUDGE = 0.02
+"""Finite-difference step of the calibration values."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One manoeuvre of the shipped test vehicle with and without an effect at its typical size; no sensor noise."""
+
+    manoeuvre: Manoeuvre
+    problem: Problem
+    candidate: Candidate
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters of the effect: typical amplitudes, the middle of what is tried for shapes."""
+        typical = {name: self.candidate.parameter(name).scale for name in self.candidate.free}
+        return {**dict(self.candidate.shapes), **typical}
+
+    @property
+    def run(self) -> Run:
+        return self.problem.runs[0]
+
+    @cached_property
+    def without(self) -> Array:
+        """Torque that the sensors would show, baseline (n,) [N m]."""
+        return self.problem.predict(0, self.problem.start())
+
+    @cached_property
+    def difference(self) -> Array:
+        """What the effect changes in it (n,) [N m]."""
+        with_effect = self.problem.predict(0, self.problem.start(), [(self.candidate, self.values)])
+        return with_effect - self.without
+
+    @cached_property
+    def visible(self) -> Array:
+        """The part of the difference that recalibrating the baseline cannot imitate (n,) [N m]."""
+        start = self.problem.start()
+        moved = [self.problem.predict(0, start + NUDGE * unit) - self.without for unit in np.eye(start.size)]
+        tangent = np.column_stack([column for column in moved if np.any(column)])
+        return self.difference - tangent @ np.linalg.lstsq(tangent, self.difference, rcond=None)[0]
+
+    @property
+    def visible_rms(self) -> float:
+        return float(np.sqrt(np.mean(self.visible**2)))
+
+
+def traces(effect: Effect) -> list[Trace]:
+    """The effect in every built-in manoeuvre, the most telling first; empty if the standard topics cannot show it."""
+    if not effect.observable:
+        return []
+    vehicle = vehicle_file.load(config_folder() / "test_vehicle.yaml")
+    problems = {name: Problem(vehicle, [_ideal_run(vehicle, manoeuvre)]) for name, manoeuvre in BUILT_IN.items()}
+    others = [name for name in CATALOGUE if name != effect.id]
+    variants = [variant for variant in candidates(problems[REFERENCE], others) if variant.bags is None]
+    example = variants[len(variants) // 2]
+    found = [Trace(BUILT_IN[name], problem, example) for name, problem in problems.items()]
+    return sorted(found, key=lambda trace: -trace.visible_rms)
+
+
+def _ideal_run(vehicle: Vehicle, manoeuvre: Manoeuvre) -> Run:
+    """A manoeuvre of the baseline as a run, seen by perfect sensors."""
+    motion = motion_of(manoeuvre, vehicle)
+    keep = slice(None, None, round(SAMPLE_S / float(motion.time[1] - motion.time[0])))
+    torque = plant.run(vehicle, motion).torque
+    pressure = line_pressures(torque, total_gains(vehicle, motion.theta))[:, keep]
+    theta, count = motion.theta[:, keep], motion.time[keep].size
+    gains, turned = line_gains(vehicle, theta), line_gains(vehicle, theta + 1e-4)
+    return Run(
+        name=manoeuvre.name, time=motion.time[keep], theta=theta, omega=motion.rate[:, keep],
+        alpha=motion.acceleration[:, keep], gains=gains, pressure=pressure,
+        side_torque=np.einsum("slt,lt->st", gains, pressure),
+        side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure),
+        measured=torque[keep], sigma=np.ones(count), valid=np.ones(count, bool),
+    )  # fmt: skip
+
+
+def describe(effect: Effect) -> dict[str, Any]:
+    """An entry as plain data for JSON; unbounded ends are null."""
+    entry = {
+        "id": effect.id, "stage": effect.stage, "tier": effect.tier, "title": effect.title, "equation": effect.equation,
+        "trace": effect.trace, "coordinate": effect.coordinate, "source": effect.source, "rivals": list(effect.rivals),
+        "observable": effect.observable, "needs": effect.needs or None, "per_line": effect.per_line,
+        "parameters": [
+            {"name": p.name, "unit": p.unit, "meaning": p.meaning, "typical": p.scale, "low": p.low, "high": p.high,
+             "optional": p.optional}
+            for p in effect.parameters
+        ],
+    }  # fmt: skip
+    result = finite(entry)
+    assert isinstance(result, dict)
+    return result
+
+
+def explain(effect: Effect, found: Sequence[Trace], picture: Path | None) -> dict[str, Any]:
+    """The same with the manoeuvres that show the effect, best first, and the picture that was drawn."""
+    shows = [
+        {
+            "manoeuvre": trace.manoeuvre.name,
+            "description": trace.manoeuvre.description,
+            "rms_Nm": float(np.sqrt(np.mean(trace.difference**2))),
+            "visible_rms_Nm": trace.visible_rms,
+        }
+        for trace in found
+    ]
+    example = found[0].values if found else None
+    return {**describe(effect), "example": example, "shown_by": shows, "picture": picture and str(picture)}
+
+
+def draw(found: Sequence[Trace], out: Path) -> Path:
+    """Picture of the signature in the most telling manoeuvre: torque with and without, difference, telling coordinate."""
+    from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, figure  # needs matplotlib
+
+    best = found[0]
+    effect, run, vehicle = best.candidate.effect, best.run, best.problem.vehicle
+    torque = shown.torque_axis(vehicle, best.without)
+    change = shown.torque_axis(vehicle, best.difference)
+    coordinates = locate.coordinates(run, best.without)
+    name = "steering angle" if effect.coordinate == "direction" else effect.coordinate
+    along = name in coordinates and name != "time"
+    values = ", ".join(f"{key} = {shown.number(value)}" for key, value in best.values.items())
+    line = f" on line {best.candidate.line}" if best.candidate.line else ""
+    caption = (
+        f"SIMULATED: test vehicle, manoeuvre '{best.manoeuvre.name}', no sensor noise. {effect.title} ({effect.id}){line} with "
+        f"{values} (SI). Law: {effect.equation}. How it shows: {effect.trace}. Thin line: the part of the difference that "
+        "recalibrating the baseline cannot imitate; only that part can be seen in a recording."
+    )
+    make_folder(out)
+    file = out / f"{effect.id}.png"
+    with figure(3 if along else 2, 1, caption, file, row_inches=2.2) as axes:
+        top, middle = axes[0, 0], axes[1, 0]
+        top.plot(run.time, best.without * torque.scale, **MEASURED, label="without")
+        top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label=f"with {effect.id}")
+        middle.plot(run.time, best.difference * change.scale, color=SERIES[0], label="difference")
+        middle.plot(run.time, best.visible * change.scale, color=SERIES[1], linewidth=0.9, label="after recalibration")
+        for ax, title, unit in ((top, "torque", torque.label), (middle, "what the effect changes", change.label)):
+            ax.set_title(title)
+            ax.set_ylabel(unit)
+            ax.set_xlabel("time (s)")
+            ax.set_xlim(0.0, float(run.time[-1]))
+            ax.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+        if along:
+            axis = shown.coordinate_axis(vehicle, name)
+            x, y = shown.broken(coordinates[name] * axis.scale, best.difference * change.scale)
+            axes[2, 0].plot(x, y, color=SERIES[0], linewidth=1.1)
+            axes[2, 0].set_title("difference along the coordinate that tells it")
+            axes[2, 0].set_xlabel(axis.label)
+            axes[2, 0].set_ylabel(change.label)
+    return file
+
+
+# ----------------------------------------------------------------- terminal
+
+
+def show_list(console: Console) -> None:
+    """The catalogue as a table, one stage after the other."""
+    table = Table(title="Physics that the baseline leaves out", title_justify="left", title_style="bold")
+    table.add_column("id", no_wrap=True)
+    table.add_column("stage", no_wrap=True)
+    table.add_column("tier", justify="right")
+    table.add_column("what it is", overflow="fold")
+    table.add_column("how it shows, or what it would need", overflow="fold")
+    stage = ""
+    for effect in CATALOGUE.values():
+        if stage and effect.stage != stage:
+            table.add_section()
+        stage = effect.stage
+        shows = effect.trace if effect.observable else f"[yellow]not observable: needs {effect.needs}[/yellow]"
+        table.add_row(effect.id, effect.stage, str(effect.tier), effect.title, shows)
+    console.print(table)
+    console.print("'lugre-steering effects ID' explains one; with --out DIR it draws its signature.", highlight=False)
+
+
+def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> None:
+    """One entry in full."""
+    console.print(f"[bold]{effect.title}[/bold] ({effect.id})", highlight=False)
+    facts = Table.grid(padding=(0, 2))
+    facts.add_column(no_wrap=True, style="dim")
+    facts.add_column(overflow="fold")
+    for name, text in (
+        ("stage", f"{effect.stage}, tier {effect.tier}"),
+        ("law", effect.equation),
+        ("how it shows", effect.trace),
+        ("told by", effect.coordinate),
+        ("source", effect.source),
+        ("easily taken for", ", ".join(effect.rivals)),
+        ("would need", effect.needs),
+    ):
+        if text:
+            facts.add_row(name, text)
+    console.print(facts, highlight=False, markup=False)
+    if effect.parameters:
+        table = Table("parameter", "unit", "meaning", title="Parameters", title_justify="left", title_style="bold")
+        for column in ("typical", "lowest", "highest"):
+            table.add_column(column, justify="right")
+        for p in effect.parameters:
+            name = f"{p.name} (for each line, by its name)" if effect.per_line else p.name
+            meaning = f"{p.meaning} (refinement)" if p.optional else p.meaning
+            scaled = f"{p.relative_to.replace('_', ' ')} times {', '.join(map(shown.number, p.grid))}"
+            typical = scaled if p.relative_to else shown.number(p.grid[len(p.grid) // 2] if p.grid else p.scale)
+            table.add_row(name, p.unit, meaning, typical, shown.number(p.low), shown.number(p.high))
+        console.print(table)
+    if result["shown_by"]:
+        table = Table(
+            "manoeuvre", "what is driven", title="Shown by (simulated)", title_justify="left", title_style="bold"
+        )
+        table.add_column("trace [N m rms]", justify="right")
+        table.add_column("after recalibration", justify="right")
+        for row in result["shown_by"]:
+            sizes = [shown.number(row[key], 3) for key in ("rms_Nm", "visible_rms_Nm")]
+            table.add_row(row["manoeuvre"], row["description"], *sizes)
+        console.print(table)
+        values = ", ".join(f"{key} = {shown.number(value)}" for key, value in result["example"].items())
+        console.print(f"Traces are for {values}.", highlight=False)
+    else:
+        console.print("No manoeuvre shows it with the standard topics; there is no picture.", highlight=False)
+    if result["picture"]:
+        console.print(f"picture in {result['picture']}", highlight=False)
