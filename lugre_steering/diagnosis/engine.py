@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis import experiment, locate, name, unlisted, verify
 from lugre_steering.diagnosis.apply import apply_calibration
@@ -127,6 +128,16 @@ class _Conclusion:
     material: float
     progress: Progress
 
+    def _unit(self, unit: str) -> str:
+        return units.label(self.problem.vehicle, unit)
+
+    def _title(self, effect: str) -> str:
+        return units.title(self.problem.vehicle, CATALOGUE[effect])
+
+    def _torque(self, value: float) -> str:
+        digits = f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+        return f"{digits} {self.problem.vehicle.coordinate.force_unit}"
+
     def diagnosis(self, findings: list[dict[str, Any]]) -> Diagnosis:
         problem, roles, found = self.problem, self.roles, self.found
         gain, interval = verify.improvement(problem, found.baseline, found.final, roles, self.seed)
@@ -193,7 +204,7 @@ class _Conclusion:
                 sd = float(np.sqrt(max(covariance[position, position], 0.0)))
                 label = candidate.line if candidate.effect.per_line else key
                 parameters[label] = {
-                    "value": values[key], "ci95": [values[key] - 1.96 * sd, values[key] + 1.96 * sd], "unit": candidate.parameter(key).unit,
+                    "value": values[key], "ci95": [values[key] - 1.96 * sd, values[key] + 1.96 * sd], "unit": self._unit(candidate.parameter(key).unit),
                 }  # fmt: skip
                 position += 1
             part = locate.contribution(problem, whole, index)
@@ -205,7 +216,7 @@ class _Conclusion:
             entries.append({
                 "id": candidate.effect.id, "stage": candidate.effect.stage,
                 "statement": (
-                    f"{candidate.effect.title}: {candidate.effect.equation}. Up to {size:.0f} N m ({100 * size / amplitude:.1f} % of the "
+                    f"{self._title(candidate.effect.id)}: {candidate.effect.equation}. Up to {self._torque(size)} ({100 * size / amplitude:.1f} % of the "
                     f"torque amplitude, {label})" + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
                 ),
                 "p_value": item.score.p_value, "parameters": parameters, "where": where, "energy_share": share,
@@ -224,7 +235,7 @@ class _Conclusion:
             axis = candidate.effect.coordinate if candidate.effect.coordinate in axes else "time"
             entries.append({
                 "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                "range": list(locate.active_range(axes[axis], piece)), "unit": locate.UNITS[axis],
+                "range": list(locate.active_range(axes[axis], piece)), "unit": self._unit(locate.UNITS[axis]),
             })  # fmt: skip
         return entries
 
@@ -269,7 +280,7 @@ class _Conclusion:
             if spans:
                 where.append({
                     "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                    "range": list(locate.active_range(values[axis], residual[part] * (smooth > 1.6))), "unit": locate.UNITS[axis],
+                    "range": list(locate.active_range(values[axis], residual[part] * (smooth > 1.6))), "unit": self._unit(locate.UNITS[axis]),
                 })  # fmt: skip
         text = (
             f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
@@ -293,7 +304,7 @@ class _Conclusion:
             key: {
                 "parameter": score.candidate.free[0],
                 "smallest": smallest,
-                "unit": score.candidate.parameter(score.candidate.free[0]).unit,
+                "unit": self._unit(score.candidate.parameter(score.candidate.free[0]).unit),
             }
             for key, (smallest, score) in sorted(best.items())
         }
@@ -349,7 +360,13 @@ class _Conclusion:
                 verdict = "explains too little to be tried"
             rows.append(
                 Evidence(
-                    label, score.candidate.effect.title, score.share, score.masked_share, score.p_value, gain, verdict
+                    label,
+                    self._title(score.candidate.effect.id),
+                    score.share,
+                    score.masked_share,
+                    score.p_value,
+                    gain,
+                    verdict,
                 )
             )
         return tuple(rows)
@@ -402,26 +419,27 @@ class _Conclusion:
         augmented: dict[str, Any],
         left: str,
     ) -> str:
-        floor = f"{self.noise.floor:.0f} N m"
+        floor, number = self._torque(self.noise.floor), self._torque
         if verdict == "consistent":
             return (
                 f"After recalibration the published model explains the recording: held-out error "
-                f"{baseline['heldout_rmse_Nm']:.0f} N m at a noise floor of {floor}. No missing physics is needed; see detection_limits for what could have gone unseen."
+                f"{number(baseline['heldout_rmse_Nm'])} at a noise floor of {floor}. No missing physics is needed; "
+                "see detection_limits for what could have gone unseen."
             )
         if verdict == "unlisted_physics":
             return (
-                f"The recalibrated model leaves {baseline['heldout_rmse_Nm']:.0f} N m on held-out data at a noise floor of {floor}, and no "
+                f"The recalibrated model leaves {number(baseline['heldout_rmse_Nm'])} on held-out data at a noise floor of {floor}, and no "
                 f"entry of the catalogue explains it: {left}. The physics is unlisted; see unexplained for where it lives."
             )
-        names = " and ".join(CATALOGUE[effect["id"]].title.lower() + f" ({effect['id']})" for effect in effects)
+        names = " and ".join(self._title(effect["id"]).lower() + f" ({effect['id']})" for effect in effects)
         ties = [
             f"{effect['id']} cannot be told from {', '.join(effect['indistinguishable_from'])}"
             for effect in effects
             if effect["indistinguishable_from"]
         ]
         return (
-            f"The model leaves out {names}. With it the held-out error falls from {baseline['heldout_rmse_Nm']:.0f} to "
-            f"{augmented['heldout_rmse_Nm']:.0f} N m (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
+            f"The model leaves out {names}. With it the held-out error falls from {number(baseline['heldout_rmse_Nm'])} to "
+            f"{number(augmented['heldout_rmse_Nm'])} (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
             f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
             + (f" {'; '.join(ties).capitalize()} with these data." if ties else "")
             + (f" Structure is left: {left}." if left else "")
