@@ -6,11 +6,12 @@ The fit is an M-estimator: its covariance is the sandwich A^-1 M A^-1 (Huber 196
 of the score. White residuals would make M = A; here M is the larger, direction by direction, of two estimates: from the
 residuals, their scores summed over blocks longer than their memory (clusters; Liang and Zeger 1986), and from repeated
 draws of sensor noise through smoother and chain, which also hold the bias of the smoother that residuals cannot show.
-The error of the chain's finite time step is added.
+The error of the chain's finite time step is taken out, and a quarter of it kept as uncertain.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -30,6 +31,8 @@ BLOCK_S = 2.0
 MEMORIES = 4.0
 """Block length in correlation times of the residual."""
 FEWEST_BLOCKS = 12
+STEP_REMAINDER = 0.25
+"""Share of the time step's error that may be left after it was taken out."""
 
 Effects = Sequence[tuple[Candidate, Values]]
 
@@ -69,7 +72,7 @@ class Estimate:
         scores = influence(self.draws * self.weight) @ weighted
         # Few draws leave directions unseen; nothing is less noisy than white noise there.
         drawn = scores.T @ scores / len(scores) + 1e-3 * curvature
-        step = weighted.T @ (self.step_error * self.weight)
+        step = STEP_REMAINDER * (weighted.T @ (self.step_error * self.weight))
         return curvature, _larger(drawn, clustered) + np.outer(step, step)
 
 
@@ -87,15 +90,18 @@ def estimate(
     first = fit(problem, weight, effects, evaluations=EVALUATIONS, robust=True, priors=priors)
     noise = noise_model(problem, first.x, effects, draws=draws, seed=seed)
     weight = valid / noise.sigma
-    final = fit(problem, weight, effects, first.x, evaluations=EVALUATIONS, robust=True, priors=priors)
-    residual = problem.measured - final.prediction
+    step = step_error(problem, first.x, effects)
+    refined = copy.copy(problem)
+    refined.measured = problem.measured - step  # the same as adding the error to every prediction
+    final = fit(refined, weight, effects, first.x, evaluations=EVALUATIONS, robust=True, priors=priors)
+    residual = refined.measured - final.prediction
     cluster = _clusters(problem, residual * weight)
     scales = problem.scales()
     # Same information as the prior rows of the fit; initial bristles have a wide one of their own.
     information = np.where(np.arange(scales.size) < len(problem.calibrations), float(priors), 0.3) ** 2 / scales**2
     blocks = np.unique(cluster[weight > 0.0]).size
     result = Estimate(
-        final, weight, noise.floor, residual, noise.draws, step_error(problem, final.x, effects), cluster, information,
+        final, weight, noise.floor, residual, noise.draws, step, cluster, information,
         np.empty(0), float(stats.t.ppf(0.975, max(blocks - scales.size, 3))),
     )  # fmt: skip
     curvature, score = result.information(physical_jacobian(result))
