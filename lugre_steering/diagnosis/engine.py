@@ -33,6 +33,8 @@ NULL_DRAWS = 16
 MIN_SLIDING = 2.0
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart."""
 UNLISTED_EXCESS = 0.25
+LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
+"""Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""
 
@@ -146,7 +148,7 @@ class _Conclusion:
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         whole = fit(problem, weight, final.effects, final.x, evaluations=12)
         residual = problem.measured - final.prediction
-        left, left_text, structured = self._left_over(residual)
+        left, left_text, structured = self._left_over(residual, final)
         if named:
             verdict = "missing_physics"
         elif structured:
@@ -204,7 +206,8 @@ class _Conclusion:
                 sd = float(np.sqrt(max(covariance[position, position], 0.0)))
                 label = candidate.line if candidate.effect.per_line else key
                 parameters[label] = {
-                    "value": values[key], "ci95": [values[key] - 1.96 * sd, values[key] + 1.96 * sd], "unit": self._unit(candidate.parameter(key).unit),
+                    "value": values[key], "ci95": [values[key] - 1.96 * sd, values[key] + 1.96 * sd],
+                    "unit": self._unit(candidate.parameter(key).unit),
                 }  # fmt: skip
                 position += 1
             part = locate.contribution(problem, whole, index)
@@ -216,8 +219,8 @@ class _Conclusion:
             entries.append({
                 "id": candidate.effect.id, "stage": candidate.effect.stage,
                 "statement": (
-                    f"{self._title(candidate.effect.id)}: {candidate.effect.equation}. Up to {self._torque(size)} ({100 * size / amplitude:.1f} % of the "
-                    f"torque amplitude, {label})" + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
+                    f"{self._title(candidate.effect.id)}: {candidate.effect.equation}. Up to {self._torque(size)} "
+                    f"({100 * size / amplitude:.1f} % of the torque amplitude, {label})" + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
                 ),
                 "p_value": item.score.p_value, "parameters": parameters, "where": where, "energy_share": share,
                 "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,
@@ -239,7 +242,7 @@ class _Conclusion:
             })  # fmt: skip
         return entries
 
-    def _left_over(self, residual: Array) -> tuple[dict[str, Any], str, bool]:
+    def _left_over(self, residual: Array, final: Fit) -> tuple[dict[str, Any], str, bool]:
         """What remains after the final fit: contract entry, one sentence, and whether it is structure worth a verdict."""
         problem = self.problem
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
@@ -266,6 +269,13 @@ class _Conclusion:
                 "",
                 False,
             )
+        if not final.effects:
+            # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
+            sound = fit(problem, np.where(self.roles.fit, weight, 0.0), (), final.x, robust=True, evaluations=25)
+            residual = problem.measured - sound.prediction
+            axis, share, _ = locate.telling_coordinate(
+                axes, [residual[s] for s in parts], [weight[s] for s in parts], [self.noise.draws[:, s] for s in parts]
+            )
         formula = None
         held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
@@ -276,11 +286,13 @@ class _Conclusion:
         where = []
         for run, part, values in zip(problem.runs, parts, axes, strict=True):
             smooth = np.sqrt(np.convolve((residual[part] * weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
-            spans = locate.intervals(run.time, np.where(smooth > 1.6, smooth, 0.0))
+            limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
+            spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
             if spans:
                 where.append({
                     "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                    "range": list(locate.active_range(values[axis], residual[part] * (smooth > 1.6))), "unit": self._unit(locate.UNITS[axis]),
+                    "range": list(locate.active_range(values[axis], residual[part] * (smooth > limit))),
+                    "unit": self._unit(locate.UNITS[axis]),
                 })  # fmt: skip
         text = (
             f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
