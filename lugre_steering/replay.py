@@ -63,7 +63,8 @@ def replay(
     """
     vehicle = load(vehicle_file)
     names = _names(bags, out)
-    summary: dict[str, Any] = {"schema": SCHEMA, "vehicle": str(vehicle_file), "bags": []}
+    unit = vehicle.coordinate.force_unit
+    summary: dict[str, Any] = {"schema": SCHEMA, "vehicle": str(vehicle_file), "torque_unit": unit, "bags": []}
     overall = Fit()
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -81,6 +82,7 @@ def replay(
 
 def describe(summary: Mapping[str, Any]) -> Iterator[str]:
     """The summary in a few lines of text."""
+    unit = summary["torque_unit"]
     for bag in summary["bags"]:
         yield f"{bag['name']}: {bag['estimates']} torques from {bag['messages']} messages in {bag['duration_s']:.1f} s"
         fit = bag["fit"]
@@ -88,7 +90,7 @@ def describe(summary: Mapping[str, Any]) -> Iterator[str]:
             yield f"  {bag['fit_note']}"
         else:
             r2 = "" if fit["r2"] is None else f", R2 {fit['r2']:.5f}"
-            yield f"  against cylinder torque: RMSE {fit['rmse_Nm']:.1f} N m{r2}, bias {fit['bias_Nm']:+.1f} N m"
+            yield f"  against cylinder torque: RMSE {fit['rmse_Nm']:.1f} {unit}{r2}, bias {fit['bias_Nm']:+.1f} {unit}"
         for label, counts in bag["samples"].items():
             if counts["rejected"]:
                 reasons = ", ".join(f"{count} {reason}" for reason, count in counts["rejected"].items())
