@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -85,13 +85,18 @@ def traces(effect: Effect) -> list[Trace]:
     """The effect in every built-in manoeuvre, the most telling first; empty if the standard topics cannot show it."""
     if not effect.observable:
         return []
-    vehicle = vehicle_file.load(config_folder() / "test_vehicle.yaml")
-    problems = {name: Problem(vehicle, [_ideal_run(vehicle, manoeuvre)]) for name, manoeuvre in BUILT_IN.items()}
+    problems = _problems()
     others = [name for name in CATALOGUE if name != effect.id]
     variants = [variant for variant in candidates(problems[REFERENCE], others) if variant.bags is None]
     example = variants[len(variants) // 2]
     found = [Trace(BUILT_IN[name], problem, example) for name, problem in problems.items()]
     return sorted(found, key=lambda trace: -trace.visible_rms)
+
+
+@cache
+def _problems() -> dict[str, Problem]:
+    vehicle = vehicle_file.load(config_folder() / "test_vehicle.yaml")
+    return {name: Problem(vehicle, [_ideal_run(vehicle, manoeuvre)]) for name, manoeuvre in BUILT_IN.items()}
 
 
 def _ideal_run(vehicle: Vehicle, manoeuvre: Manoeuvre) -> Run:

@@ -1,0 +1,503 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a diagnosis, read as HTML and in a real browser. All data are synthetic."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from typer.testing import CliRunner
+
+from lugre_steering.cli import app
+from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.report import diagnosis_plots as plots
+from lugre_steering.report import effect_card as card
+from lugre_steering.report import shown
+from lugre_steering.report.diagnosis_report import Written, render, write_report
+from lugre_steering.vehicle import Vehicle, load
+
+VEHICLE_FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
+HOSTILE = '<script>alert("x")</script><img src="http://example.org/x.png" onerror="alert(1)">&amp; ü'
+SECTIONS = {"verdict", "next", "torque", "effects", "heldout", "evidence", "left", "experiment", "limits", "quality",
+            "baseline", "reading"}  # fmt: skip
+ENGAGE, STIFFNESS, NOISE = 0.4, 60e3, 80.0
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+
+
+def trace(name: str, seed: int) -> BagTrace:
+    """Two minutes at 100 Hz: a stop beyond ENGAGE that a baseline has half absorbed."""
+    time = np.arange(12_000) * 0.01
+    angle = 0.55 * np.sin(0.2 * time)
+    stop = STIFFNESS * np.sign(angle) * np.maximum(np.abs(angle) - ENGAGE, 0.0)
+    friction = 45e3 * np.tanh(8.0 * np.cos(0.2 * time))
+    measured = friction + stop + NOISE * np.random.default_rng(seed).standard_normal(time.size)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (stop != 0.0).astype(int), [0]])))
+    spans = tuple((float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True))
+    return BagTrace(
+        name=name, time=time, measured=measured, baseline=friction * 1.02, augmented=friction + stop,
+        held=(time % 20.0) < 5.0, contributions={"end_stop": stop}, intervals={"end_stop": spans},
+        coordinates={"steering angle": angle, "direction": np.sign(np.cos(0.2 * time)), "time": time},
+    )  # fmt: skip
+
+
+def missing(vehicle: Vehicle, text: str = "run") -> Diagnosis:
+    """An end stop found in two bags; every free text is ``text``."""
+    traces = (trace(f"{text} a", 1), trace(f"{text} b", 2))
+    entry = {"coordinate": "steering angle", "range": [0.4, 0.55], "unit": "rad"}
+    where = [{"bag": t.name, "intervals_s": [list(s) for s in t.intervals["end_stop"]], **entry} for t in traces]
+    result: dict[str, Any] = {
+        "schema": SCHEMA, "bags": [t.name for t in traces], "verdict": "missing_physics",
+        "statement": f"{text} stands in the statement.", "noise_floor_Nm": NOISE,
+        "baseline": {"rmse_Nm": 2000.0, "heldout_rmse_Nm": 2100.0},
+        "augmented": {"rmse_Nm": 80.0, "heldout_rmse_Nm": 84.0, "improvement": 0.96, "improvement_ci95": [0.94, 0.97]},
+        "effects": [{
+            "id": "end_stop", "stage": "parallel_torque", "statement": text, "p_value": 1e-9,
+            "parameters": {
+                "engage_angle": {"value": 0.4, "ci95": [0.3996, 0.4004], "unit": "rad"},
+                "stiffness": {"value": 60e3, "ci95": [59.9e3, 60.1e3], "unit": "N m/rad"},
+            },
+            "where": where, "energy_share": 0.93, "masked_share": 0.41, "indistinguishable_from": ["soil_shear"],
+        }],
+        "unexplained": {"structured": True, "description": text, "formula": f"M = {text}", "where": where},
+        "detection_limits": {"yaw_inertia": {"parameter": "inertia", "smallest": 321.0, "unit": "kg m2"}},
+        "data_quality": [{"finding": "stuck_sensor", "topic": text, "bag": text, "intervals_s": [[0.0, 1.0]],
+                          "statement": text}],
+        "next_experiment": {"manoeuvre": text, "separates": ["end_stop", text], "why": text},
+    }  # fmt: skip
+    evidence = (
+        Evidence("end_stop", "Elastic end stop", 0.9, 0.4, 1e-9, 0.96, "named"),
+        *(Evidence(f"rival {i}", text, 0.01 * i, 0.5, 0.3, None, text) for i in range(20)),
+    )
+    provenance = {"made_by": text, "numbers": [1.25, 2.0], "nested": {"key": text}}
+    changed = vehicle.replace(name=text, provenance=provenance)
+    return Diagnosis(result, changed, traces, evidence, {"end_stop": "steering angle"})
+
+
+def consistent(vehicle: Vehicle) -> Diagnosis:
+    full = missing(vehicle)
+    fit = full.json["baseline"]
+    result = full.json | {
+        "verdict": "consistent", "effects": [], "next_experiment": None, "data_quality": [],
+        "augmented": {**fit, "improvement": 0.0, "improvement_ci95": [0.0, 0.0]},
+        "unexplained": {"structured": False, "description": "", "formula": None, "where": None},
+    }  # fmt: skip
+    traces = tuple(dataclasses.replace(t, contributions={}, intervals={}) for t in full.traces)
+    return Diagnosis(result, vehicle, traces, full.evidence[1:], {})
+
+
+def unlisted(vehicle: Vehicle) -> Diagnosis:
+    plain, full = consistent(vehicle), missing(vehicle)
+    result = plain.json | {"verdict": "unlisted_physics", "unexplained": full.json["unexplained"]}
+    return dataclasses.replace(plain, json=result)
+
+
+def insufficient(vehicle: Vehicle) -> Diagnosis:
+    nothing = {"rmse_Nm": 0.0, "heldout_rmse_Nm": None}
+    result = consistent(vehicle).json | {
+        "verdict": "insufficient_data", "baseline": nothing, "detection_limits": {},
+        "augmented": {**nothing, "improvement": None, "improvement_ci95": None},
+    }  # fmt: skip
+    return Diagnosis(result, vehicle)
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> Vehicle:
+    return load(VEHICLE_FILE)
+
+
+@pytest.fixture(scope="module")
+def hostile(vehicle: Vehicle) -> Diagnosis:
+    return missing(vehicle, HOSTILE)
+
+
+@pytest.fixture(scope="module")
+def written(hostile: Diagnosis, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    return write_report(hostile, tmp_path_factory.mktemp("report"))
+
+
+class Page(HTMLParser):
+    """What a browser would see: elements, ids, text outside scripts and styles, and everything that could be loaded."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.handlers: list[str] = []
+        self.text = ""
+        self.scripts: list[str] = []
+        self._raw = ""
+        self.feed(source)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self._raw = tag if tag in ("script", "style") else self._raw
+        if tag == "script":
+            self.scripts.append("")
+        for name, value in attributes:
+            if name == "id":
+                self.ids.append(str(value))
+            elif name in ("src", "href", "srcset", "data", "action", "poster"):
+                self.links.append(str(value))
+            elif name.startswith("on"):
+                self.handlers.append(name)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == self._raw:
+            self._raw = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._raw == "script":
+            self.scripts[-1] += data
+        elif not self._raw:
+            self.text += data
+
+
+def specs(page: Page) -> dict[str, Any]:
+    result = json.loads(page.scripts[0])
+    assert isinstance(result, dict)
+    return result
+
+
+def page_of(diagnosis: Diagnosis) -> Page:
+    return Page(render(diagnosis, "var Plotly = {newPlot: function () {}};"))
+
+
+# ----------------------------------------------------------------- the page
+
+
+def test_page_has_every_section_and_every_link_leads_somewhere(written: Written) -> None:
+    page = Page(written.files[0].read_text(encoding="utf-8"))
+    assert set(page.ids) >= SECTIONS | {"plots"}
+    assert len(page.ids) == len(set(page.ids))
+    assert {link.removeprefix("#") for link in page.links} <= set(page.ids)
+
+
+def test_text_from_outside_is_shown_as_it_is_and_never_becomes_markup(written: Written) -> None:
+    page = Page(written.files[0].read_text(encoding="utf-8"))
+    harmless = Page(render(missing(load(VEHICLE_FILE), "XYZ"), "x"))
+    assert page.tags == harmless.tags  # the same elements, whatever the texts say
+    assert page.handlers == []
+    assert page.text.count(HOSTILE) == harmless.text.count("XYZ")
+    assert f"{HOSTILE} stands in the statement." in page.text
+
+
+def test_names_inside_plots_are_escaped_because_plotly_reads_markup(hostile: Diagnosis) -> None:
+    words = json.dumps(specs(page_of(hostile)))
+    assert "<script" not in words
+    assert "<img" not in words
+    assert "&lt;script&gt;" in words  # the bag names below the bars
+
+
+def test_nothing_is_loaded_from_anywhere(written: Written) -> None:
+    source = written.files[0].read_text(encoding="utf-8")
+    page = Page(source)
+    assert all(link.startswith("#") for link in page.links)
+    assert "link" not in page.tags
+    assert "default-src 'none'" in source
+    own = source[: source.index("<script>")]
+    assert not re.search(r"url\(|@import|https?://", own.replace("http://example.org/x.png", ""))
+
+
+def test_numbers_stand_in_the_text(written: Written) -> None:
+    text = Page(written.files[0].read_text(encoding="utf-8")).text
+    for number in ("96 %", "94 % to 97 %", "93 %", "41 %", "22.918°", "0.3996 … 0.4004", "< 0.001", "321"):
+        assert number in text, number
+    assert "soil_shear" in text
+
+
+def test_page_is_small_enough_to_send(written: Written) -> None:
+    assert written.files[0].stat().st_size < 8e6
+
+
+def test_pictures_are_beside_the_page(written: Written) -> None:
+    names = [file.name for file in written.files]
+    assert names[0] == "report.html"
+    assert {"residual_end_stop.png", "evidence.png", "heldout.png"} < set(names)
+    assert sum(name.startswith("before_after_") for name in names) == 2
+    assert all(file.parent == written.files[0].parent and file.stat().st_size > 5000 for file in written.files)
+    assert written.note is None
+
+
+def test_bags_of_one_name_do_not_overwrite_each_others_pictures(vehicle: Vehicle, tmp_path: Path) -> None:
+    one = missing(vehicle)
+    same = dataclasses.replace(one, traces=tuple(dataclasses.replace(t, name="run/../x") for t in one.traces))
+    pictures = [file for file in write_report(same, tmp_path).files if file.name.startswith("before_after")]
+    assert len(set(pictures)) == 2
+    assert all(file.parent == tmp_path and file.is_file() for file in pictures)
+
+
+@pytest.mark.parametrize("make", [consistent, unlisted, insufficient])
+def test_every_verdict_has_a_page(vehicle: Vehicle, make: Callable[[Vehicle], Diagnosis]) -> None:
+    diagnosis = make(vehicle)
+    page = page_of(diagnosis)
+    assert diagnosis.json["verdict"] in page.text
+    assert "effects" not in page.ids
+    assert len(specs(page)) == len(diagnosis.traces)  # torque only: nothing was found that could be drawn
+    assert "nan" not in re.sub(r"\w{4,}", "", page.text).lower()
+
+
+def test_linear_axes_have_their_own_units(vehicle: Vehicle) -> None:
+    coordinate = dataclasses.replace(vehicle.coordinate, name="position", unit="m", force_unit="N")
+    page = page_of(missing(vehicle.replace(coordinate=coordinate)))
+    assert "N/m" in page.text
+    assert "N m" not in page.text.replace("\u00a0", " ")
+    assert "position [mm]" in page.text
+    assert "position [mm]" in page.scripts[0]
+
+
+# ----------------------------------------------------------------- the plots
+
+
+def test_plotted_curves_are_the_data(vehicle: Vehicle) -> None:
+    diagnosis = missing(vehicle)
+    one = diagnosis.traces[0]
+    spec = plots.torque_plot(diagnosis, one)
+    curves = {curve["name"]: curve for curve in spec["data"] if curve["mode"] == "lines"}
+    for name, values, scale in (
+        ("measured", one.measured, 1e-3), ("recalibrated baseline", one.baseline, 1e-3),
+        ("with the effects found", one.augmented, 1e-3), ("before", one.measured - one.baseline, 1e-3),
+        ("after", one.measured - one.augmented, 1.0 if "[N m]" in spec["layout"]["yaxis2"]["title"]["text"] else 1e-3),
+        ("torque of end_stop", one.contributions["end_stop"], 1e-3),
+    ):  # fmt: skip
+        shown_values = np.array(curves[name]["y"])
+        np.testing.assert_allclose(shown_values, values * scale, atol=1.1e-4 * np.abs(values).max() * scale)
+        assert curves[name]["dx"] == pytest.approx(0.01)
+    shades = [shape for shape in spec["layout"]["shapes"] if shape["y0"] == 0.0 and shape["y1"] == 1.0]
+    assert [(s["x0"], s["x1"]) for s in shades] == [pytest.approx(span, abs=1e-3) for span in one.intervals["end_stop"]]
+
+
+def test_fitted_law_lies_on_what_the_rest_of_the_model_leaves(vehicle: Vehicle) -> None:
+    diagnosis = missing(vehicle)
+    data = {curve["name"]: curve for curve in plots.residual_plot(diagnosis, diagnosis.json["effects"][0])["data"]}
+    law, partial = data["fitted law of end_stop"], data["what the rest of the augmented model leaves to this effect"]
+    angle, torque = (np.array(partial[key]) for key in "xy")
+    expected = STIFFNESS * np.sign(angle) * np.maximum(np.abs(np.radians(angle)) - ENGAGE, 0.0) * 1e-3
+    assert np.sqrt(np.mean((torque - expected) ** 2)) == pytest.approx(NOISE * 1e-3, rel=0.05)
+    drawn = np.array([v is not None for v in law["x"]])
+    x, y = np.array(law["x"])[drawn].astype(float), np.array(law["y"])[drawn].astype(float)
+    np.testing.assert_allclose(
+        y, STIFFNESS * np.sign(x) * np.maximum(np.abs(np.radians(x)) - ENGAGE, 0.0) * 1e-3, atol=3e-3
+    )
+
+
+def test_heldout_bars_are_the_errors_of_held_out_samples_only(vehicle: Vehicle) -> None:
+    diagnosis = missing(vehicle)
+    rows = plots.heldout_rows(diagnosis)
+    assert rows[0] == ("all bags", 2100.0, 84.0, (pytest.approx(63.0), pytest.approx(126.0)))
+    for row, one in zip(rows[1:], diagnosis.traces, strict=True):
+        error = [m - a for m, a, held in zip(one.measured, one.augmented, one.held, strict=True) if held]
+        assert row[2] == pytest.approx(np.sqrt(sum(e * e for e in error) / len(error)))
+
+
+@given(arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6)), st.integers(2, 50))
+def test_thinned_curves_keep_their_peaks(values: np.ndarray, limit: int) -> None:
+    points, width = shown.thin(values, limit)
+    assert points.size <= limit + 1
+    assert (points.min(), points.max()) == (values.min(), values.max())
+    assert points.size * width >= values.size > (points.size - 2) * width
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (None, "-"), (float("inf"), "-"), (1.0, "1"), (-0.41999, "-0.42"), (12345.6, "12\u2009350"),
+     (3.1234e-7, "3.123e-07"), (99999.0, "100\u2009000"), (0.00123456, "0.001235")],
+)  # fmt: skip
+def test_numbers_are_readable(value: float | None, text: str) -> None:
+    assert shown.number(value) == text
+
+
+def test_intervals_show_digits_that_differ() -> None:
+    value, ends = shown.estimate(0.4200123, [0.4199921, 0.4200325])
+    low, high = (float(end) for end in ends.split(" … "))
+    assert high - low == pytest.approx(0.4200325 - 0.4199921, rel=0.05)
+    assert low < float(value) < high
+
+
+# ----------------------------------------------------------------- missing libraries
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Call it with names of libraries that shall be missing."""
+    drawing = ("lugre_steering.report.style", "lugre_steering.report.diagnosis_figures")
+
+    def remove(*libraries: str) -> None:
+        for name in [m for m in sys.modules if m.split(".")[0] in libraries]:
+            monkeypatch.delitem(sys.modules, name)
+        for name in libraries:
+            monkeypatch.setitem(sys.modules, name, None)
+        for name in drawing:
+            monkeypatch.delitem(sys.modules, name, raising=False)
+
+    return remove
+
+
+def test_without_plotly_the_page_shows_the_pictures(
+    vehicle: Vehicle, tmp_path: Path, without: Callable[..., None]
+) -> None:
+    without("plotly")
+    result = write_report(missing(vehicle), tmp_path)
+    page = Page(result.files[0].read_text(encoding="utf-8"))
+    assert [link[:22] for link in page.links if not link.startswith("#")] == ["data:image/png;base64,"] * 4
+    assert "plotly" in str(result.note)
+    assert "lugre_steering[report]" in str(result.note)
+
+
+def test_without_matplotlib_the_page_is_still_interactive(
+    vehicle: Vehicle, tmp_path: Path, without: Callable[..., None]
+) -> None:
+    without("matplotlib")
+    result = write_report(missing(vehicle), tmp_path)
+    assert [file.name for file in result.files] == ["report.html"]
+    assert len(specs(Page(result.files[0].read_text(encoding="utf-8")))) == 4
+    assert "matplotlib" in str(result.note)
+
+
+def test_with_neither_words_and_tables_remain(vehicle: Vehicle, tmp_path: Path, without: Callable[..., None]) -> None:
+    without("matplotlib", "plotly")
+    result = write_report(missing(vehicle), tmp_path)
+    page = Page(result.files[0].read_text(encoding="utf-8"))
+    assert set(page.ids) >= SECTIONS
+    assert "Elastic end stop" in page.text
+
+
+# ----------------------------------------------------------------- a real browser
+
+
+@dataclasses.dataclass
+class Seen:
+    dom: str
+    console: list[str]
+    requests: set[str]
+
+
+def browse(file: Path, folder: Path) -> Seen:
+    """Open a page in headless Chromium: the document after its scripts ran, console messages, addresses asked for."""
+    assert CHROMIUM is not None
+    log = folder / "net.json"
+    command = [
+        CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+        "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
+        "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+        f"--user-data-dir={folder / 'profile'}", "--enable-logging=stderr", "--v=0", f"--log-net-log={log}",
+        "--virtual-time-budget=10000", "--window-size=1280,1200", "--dump-dom", file.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=240)
+    # Read as text: Chromium may end before it closes the list. Its own requests have no page as their initiator.
+    asked = set(re.findall(r'"initiator":"(?!not an origin").*?"url":"([^"]+)"', log.read_text(encoding="utf-8")))
+    return Seen(done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line], asked)
+
+
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+
+
+@needs_chromium
+def test_browser_draws_every_plot_without_an_error_or_a_request(written: Written, tmp_path: Path) -> None:
+    seen = browse(written.files[0], tmp_path)
+    page = Page(written.files[0].read_text(encoding="utf-8"))
+    assert seen.console == []
+    assert {address for address in seen.requests if not address.startswith("file:")} == set()
+    for name in specs(page):
+        at = seen.dom.index(f'id="{name}"')
+        assert "main-svg" in seen.dom[at : at + 5000], name
+    assert seen.dom.count('class="plot-container') == len(specs(page)) == 4
+    assert seen.dom.count("<script>alert") == 0
+
+
+@needs_chromium
+def test_browser_check_would_see_errors_and_requests(tmp_path: Path) -> None:
+    """The check itself can fail: a page that throws and that loads something is caught."""
+    file = tmp_path / "bad.html"
+    file.write_text('<img src="http://127.0.0.1:9/x.png"><script>throw new Error("broken")</script>', encoding="utf-8")
+    seen = browse(file, tmp_path)
+    assert any("broken" in line for line in seen.console)
+    assert "http://127.0.0.1:9/x.png" in seen.requests
+
+
+# ----------------------------------------------------------------- the catalogue on the command line
+
+
+def effects(*arguments: str | Path) -> Any:
+    return CliRunner().invoke(app, ["effects", *map(str, arguments)], env={"COLUMNS": "160"})
+
+
+def test_list_names_every_effect_and_what_the_unobservable_ones_need() -> None:
+    done = effects()
+    assert done.exit_code == 0
+    words = " ".join(done.stdout.split())
+    assert all(name in words for name in CATALOGUE)
+    assert "not observable: needs the drive speed" in words
+    listed = json.loads(effects("--json").stdout)
+    assert [entry["id"] for entry in listed] == list(CATALOGUE)
+    assert all(entry["source"] and entry["equation"] for entry in listed)
+
+
+def test_unknown_effect_is_refused_with_a_suggestion() -> None:
+    done = effects("endstop")
+    assert done.exit_code == 2
+    assert "did you mean 'end_stop'?" in done.output
+
+
+def test_a_picture_needs_an_effect(tmp_path: Path) -> None:
+    assert effects("--out", tmp_path).exit_code == 2
+
+
+def test_one_effect_is_explained_with_its_picture(tmp_path: Path) -> None:
+    done = effects("end_stop", "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    entry = CATALOGUE["end_stop"]
+    for text in (entry.title, "Hunt and Crossley", "engage_angle", "N m/rad", "soil_shear", "varied-rates"):
+        assert text in done.stdout, text
+    assert (tmp_path / "end_stop.png").stat().st_size > 20_000
+
+
+@pytest.mark.parametrize("effect_id", sorted(CATALOGUE))
+def test_every_effect_is_explained_and_drawn(effect_id: str, tmp_path: Path) -> None:
+    entry = CATALOGUE[effect_id]
+    done = effects(effect_id, "--json", "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    if not entry.observable:
+        assert (result["shown_by"], result["picture"]) == ([], None)
+        assert result["needs"]
+        return
+    assert Path(result["picture"]).stat().st_size > 20_000
+    sizes = [row["visible_rms_Nm"] for row in result["shown_by"]]
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] > 0.0
+    assert all(row["visible_rms_Nm"] <= row["rms_Nm"] * (1 + 1e-9) for row in result["shown_by"])
+    assert set(result["example"]) <= {p.name for p in entry.parameters}
+
+
+def test_drawn_differences_follow_the_laws() -> None:
+    """Closed forms: a stop adds k (|theta| - engage) at each track, a slope its torque, a late stamp a shift of the curve."""
+    for found in card.traces(CATALOGUE["end_stop"]):
+        values = found.values
+        beyond = np.maximum(np.abs(found.run.theta) - values["engage_angle"], 0.0)
+        expected = (values["stiffness"] * np.sign(found.run.theta) * beyond).sum(axis=0)
+        np.testing.assert_allclose(found.difference, expected, atol=1e-6 * values["stiffness"])
+    chirp = next(t for t in card.traces(CATALOGUE["end_stop"]) if t.manoeuvre.name == "chirp")
+    assert chirp.visible_rms == 0.0  # 10 deg never reach the stop
+    for found in card.traces(CATALOGUE["slope_bias"]):
+        np.testing.assert_allclose(found.difference, found.values["torque"], rtol=1e-9)
+    for found in card.traces(CATALOGUE["time_delay"]):
+        late = np.interp(found.run.time - found.values["delay"], found.run.time, found.without)
+        np.testing.assert_allclose(found.difference, late - found.without, atol=1e-6)
