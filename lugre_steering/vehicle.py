@@ -313,8 +313,10 @@ def to_mapping(vehicle: Vehicle) -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
-        items = ((item.name, getattr(value, item.name)) for item in dataclasses.fields(value))
-        return {name: _plain(inner) for name, inner in items if inner is not None and inner != {} and inner != ()}
+        items = ((item.name, _plain(getattr(value, item.name))) for item in dataclasses.fields(value))
+        return {name: inner for name, inner in items if inner is not None and inner != {} and inner != []}
+    if isinstance(value, np.generic):
+        return value.item()
     if isinstance(value, (tuple, list)):
         return [_plain(item) for item in value]
     if isinstance(value, dict):

@@ -220,7 +220,8 @@ class _Conclusion:
                 "id": candidate.effect.id, "stage": candidate.effect.stage,
                 "statement": (
                     f"{self._title(candidate.effect.id)}: {candidate.effect.equation}. Up to {self._torque(size)} "
-                    f"({100 * size / amplitude:.1f} % of the torque amplitude, {label})" + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
+                    f"({100 * size / amplitude:.1f} % of the torque amplitude, {label})"
+                    + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
                 ),
                 "p_value": item.score.p_value, "parameters": parameters, "where": where, "energy_share": share,
                 "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,

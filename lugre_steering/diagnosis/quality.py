@@ -59,12 +59,11 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
     """All findings about one recording of ``vehicle``, and what diagnosis may use of it."""
     findings = list(recording.findings) + _rejected(recording)
     signals = {c: s for c in vehicle.channels if (s := _signal(recording, c)) is not None and s.time_s.size >= 20}
-    span = (min(s.time_s[0] for s in signals.values()), max(s.time_s[-1] for s in signals.values())) if signals else (0, 0)
     looks = {c: _Look.of(s, _sheet_noise(vehicle, c)) for c, s in signals.items() if c.kind is not Kind.AIR_TEMPERATURE}
     clean: dict[Channel, Signal] = {}
     for channel, look in looks.items():
         others = [other for c, other in looks.items() if c is not channel and c.kind is channel.kind]
-        found, keep = _examine(channel, look, others, span, vehicle.sensors.pressure_range_Pa)
+        found, keep = _examine(channel, look, others, vehicle.sensors.pressure_range_Pa)
         findings += found
         clean[channel] = Signal(look.time[keep], look.value[keep])
     usable = _with_signals(recording, clean)
@@ -195,7 +194,7 @@ def _white_noise(time: Array, value: Array, period: float) -> Array:
 
 
 def _examine(
-    channel: Channel, look: _Look, others: list[_Look], span: tuple[float, float], pressure_range: float
+    channel: Channel, look: _Look, others: list[_Look], pressure_range: float
 ) -> tuple[list[Finding], Mask]:
     """Findings about one channel by itself, and which of its samples may be used."""
     topic, found, keep = channel.topic, [], np.ones(look.value.size, bool)
@@ -204,7 +203,7 @@ def _examine(
         if intervals:
             found.append(Finding(name, topic, f"{topic}: {statement}", intervals))
 
-    gaps = _gaps(look, span)
+    gaps = _gaps(look, others)
     report("dropout", gaps, f"no samples for {_total(gaps):.2f} s; check the cable, the driver and the load of the logger")
 
     stuck, clipped = _held(look, others, None if channel.kind is not Kind.PRESSURE else pressure_range, channel.kind)
@@ -216,16 +215,16 @@ def _examine(
     for first, last in stuck + clipped:
         keep[first : last + 1] = False
 
-    spikes = look.runs(_spikes(look) & keep)
-    spikes = [(a, b) for a, b in spikes if b - a < SPIKE_SAMPLES]
+    spikes = [(a, b) for a, b in look.runs(_spikes(look) & keep) if b - a < SPIKE_SAMPLES]
     for first, last in spikes:
         keep[first : last + 1] = False
-    report("spikes", look.intervals(spikes), f"{len(spikes)} isolated outliers, not used; check shielding and connectors")
-
     noisy = _noise_change(look, keep)
-    at = look.intervals(noisy)
     for first, last in noisy:
         keep[first : last + 1] = False
+    # Where the noise changes, the scatter that spikes are measured by is wrong.
+    spikes = [(a, b) for a, b in spikes if not any(first <= b and a <= last for first, last in _widened(look, noisy))]
+    report("spikes", look.intervals(spikes), f"{len(spikes)} isolated outliers, not used; check shielding and connectors")
+    at = look.intervals(noisy)
     report(
         "noise_change", at,
         f"noise more than {NOISE_RATIO:g} times that of the rest of the run for {_total(at):.1f} s; not used there",
@@ -233,13 +232,22 @@ def _examine(
     return found, keep
 
 
+def _widened(look: _Look, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    width = _samples(WINDOW_S, look.period)
+    return [(first - width, last + width) for first, last in runs]
+
+
 def _total(intervals: Intervals) -> float:
     return sum(end - start for start, end in intervals)
 
 
-def _gaps(look: _Look, span: tuple[float, float]) -> Intervals:
-    """Stretches without samples: those that diagnosis cannot bridge, and a late start or early end."""
+def _gaps(look: _Look, others: list[_Look]) -> Intervals:
+    """Stretches without samples: those that diagnosis cannot bridge, and where it starts late or ends early.
+
+    Late against channels of its kind: a whole device that starts late, or has another clock, has no dropout.
+    """
     time, limit = look.time, max(GAP_S, 3.0 * look.period)
+    span = min([time[0], *(o.time[0] for o in others)]), max([time[-1], *(o.time[-1] for o in others)])
     at = np.flatnonzero(np.diff(time) > limit)
     gaps = [(float(time[i]), float(time[i + 1])) for i in at]
     if time[0] - span[0] > LATE_S:
@@ -257,20 +265,18 @@ def _held(
     if low == high:
         alive = any(other.noisy or _moved(other, look.time[0], look.time[-1]) for other in others)
         return ([(0, value.size - 1)] if alive else []), []
-    repeats = np.zeros(value.size, bool)
-    repeats[1:] = np.diff(value) == 0.0
-    repeats[:-1] |= repeats[1:]
-    starts = np.flatnonzero(repeats & (np.diff(value, prepend=np.nan) != 0.0))
+    changes = (np.diff(value) != 0.0) | (np.diff(look.time) > max(GAP_S, 3.0 * look.period))
     stuck, pinned = [], np.zeros(value.size, bool)
     if upper is not None:
         pinned |= value >= 0.999 * upper
-    ends = np.append(np.flatnonzero(np.diff(value) != 0.0), value.size - 1)
-    for first in starts.tolist():
-        last = int(ends[np.searchsorted(ends, first)])
+    starts = np.concatenate([[0], np.flatnonzero(changes) + 1])
+    ends = np.append(starts[1:], value.size) - 1
+    long = ends - starts + 1 >= CLIPPED_SAMPLES
+    for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
         jumps = _jumps(look, first, last)
         if value[first] in (low, high) and look.noisy and not jumps:
             # A pressure sensor that cannot read below zero rests at zero: no fault.
-            pinned[first : last + 1] |= last - first + 1 >= CLIPPED_SAMPLES and not (kind is Kind.PRESSURE and value[first] <= 0.0)
+            pinned[first : last + 1] |= kind is not Kind.PRESSURE or value[first] > 0.0
         elif look.time[last] - look.time[first] > STUCK_S and (
             look.noisy or jumps or (kind is Kind.ANGLE and any(_moved(o, look.time[first], look.time[last]) for o in others))
         ):
@@ -299,10 +305,11 @@ def _spikes(look: _Look) -> Mask:
     """Samples off the running median by SPIKE_SIGMA of the local scatter, more than the slope there can make."""
     middle = median_filter(look.value, 2 * SPIKE_SAMPLES + 1, mode="nearest")
     off = np.abs(look.value - middle)
-    scatter = 1.4826 * median_filter(off, _samples(WINDOW_S, look.period), mode="nearest")
+    scatter = 1.4826 * median_filter(off, _samples(WINDOW_S, look.period), mode="reflect")
+    least = max(look.floor, look.resolution, 1.4826 * float(np.median(off)))
     slope = np.abs(np.gradient(middle, look.time)) * look.period
     steepest = uniform_filter1d(slope, 2 * SPIKE_SAMPLES + 1) * SPIKE_SAMPLES
-    found: Mask = off > SPIKE_SIGMA * np.maximum(scatter, max(look.floor, look.resolution)) + steepest
+    found: Mask = off > SPIKE_SIGMA * np.maximum(scatter, least) + steepest
     return found
 
 

@@ -123,8 +123,8 @@ def _torques(model: Model, run: Run) -> Array:
 def _error(run: Run, measured: Array, expected: Array) -> float:
     """Relative error of the expected torque, both about their means, with a gain within GAIN."""
     a, b = measured[run.valid] - measured[run.valid].mean(), expected[run.valid] - expected[run.valid].mean()
-    gain = np.clip(a @ b / max(float(b @ b), 1e-30), 1.0 / GAIN, GAIN)
-    return float(np.linalg.norm(a - gain * b) / max(np.linalg.norm(a), 1e-30))
+    gain = float(np.clip(float(a @ b) / max(float(b @ b), 1e-30), 1.0 / GAIN, GAIN))
+    return float(np.linalg.norm(a - gain * b) / max(float(np.linalg.norm(a)), 1e-30))
 
 
 def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | None:
@@ -136,7 +136,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | No
     total = expected.sum(axis=0)
     as_is = _error(run, run.measured, total)
     hypotheses = [*_signals_wrong(vehicle, run, total), *_signs(vehicle, run, expected)]
-    if as_is > GOOD and vehicle.coordinate.unit:
+    if as_is > GOOD:
         hypotheses += _angle_units(recording, vehicle, model)
     convincing = [h for h in hypotheses if h.error < min(GOOD, BETTER * as_is)]
     if not convincing:

@@ -249,7 +249,7 @@ def noise_variance(data: CaseData, bag: BagData) -> float:
 
 _CALIBRATED = (
     "static_torque_Nm", "coulomb_torque_Nm", "stiffness_Nm_rad", "stribeck_speed_rad_s", "heat_capacity_J_K",
-    "heat_loss_W_K", "aligning_torque_Nm",
+    "heat_loss_W_K",
 )
 
 

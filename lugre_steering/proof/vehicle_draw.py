@@ -157,9 +157,10 @@ def draw_vehicle(sheet: Sheet, rng: np.random.Generator, spread: float) -> TrueV
     """A vehicle whose friction, stiffness and thermal values differ from the sheet by up to ``spread`` each.
 
     Static and Coulomb friction move together (same rubber, same road) with a smaller change of their ratio, so that the
-    static level never falls below the Coulomb level. Damping follows the stiffness: sigma1 ~ sqrt(sigma0).
+    static level never falls below the Coulomb level. Geometry and loads, so the aligning torque, are as the sheet
+    measured them. Damping follows the stiffness: sigma1 ~ sqrt(sigma0).
     """
-    level, stiffness, stribeck, capacity, loss, aligning = 1.0 + rng.uniform(-spread, spread, 6)
+    level, stiffness, stribeck, capacity, loss = 1.0 + rng.uniform(-spread, spread, 5)
     ratio = 1.0 + rng.uniform(-0.2, 0.2) * spread
     n = sheet.nominal
     return n._replace(
@@ -170,5 +171,4 @@ def draw_vehicle(sheet: Sheet, rng: np.random.Generator, spread: float) -> TrueV
         stribeck_speed_rad_s=n.stribeck_speed_rad_s * stribeck,
         heat_capacity_J_K=n.heat_capacity_J_K * capacity,
         heat_loss_W_K=n.heat_loss_W_K * loss,
-        aligning_torque_Nm=n.aligning_torque_Nm * aligning,
     )

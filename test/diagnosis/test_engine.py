@@ -78,7 +78,7 @@ def test_hidden_end_stop_is_named_placed_fitted_and_runs_in_replay(tmp_path: Pat
             [*command, "replay", str(bags[0]), "--vehicle", str(vehicle), "--out", str(folder)], check=True, timeout=600
         )
         summary = json.loads((folder / "summary.json").read_text())
-        rmse[label] = summary["bags"][0]["residual"]["rmse_Nm"]
+        rmse[label] = summary["bags"][0]["fit"]["rmse_Nm"]
     assert rmse["after"] < 0.35 * rmse["before"]
 
 
