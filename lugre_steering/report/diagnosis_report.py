@@ -157,8 +157,8 @@ def _sections(diagnosis: Diagnosis, drawing: _Drawing) -> list[Section]:
 
 
 def _text(value: object) -> str:
-    """Any words as HTML; numbers are not parted from 'N m'."""
-    return html.escape(str(value), quote=True).replace(" N m", "\u00a0N\u00a0m")
+    """Any words as HTML; numbers are not parted from their unit."""
+    return html.escape(str(value), quote=True).replace(" N m", "\u00a0N\u00a0m").replace(" %", "\u00a0%")
 
 
 def _table(
@@ -321,7 +321,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
     )
     where = [_place(diagnosis, entry) for entry in effect["where"]]
     return (
-        f'<div class="effect"><h3><span class="swatch" style="background:{colour}"></span>{_text(entry.title)} '
+        f'<div class="effect"><h3><span class="swatch" style="background:{colour}"></span>{_text(units.title(vehicle, entry))} '
         f"(<code>{_text(effect['id'])}</code>)</h3>\n<p>{_text(effect['statement'])}</p>\n"
         + _table(["parameter", "value", "95 % interval", "unit", "in degrees", "meaning"], rows, numeric=(1, 2, 4))
         + facts
@@ -430,7 +430,7 @@ def _limits(diagnosis: Diagnosis) -> str:
     rows = []
     for name, limit in limits.items():
         unit = units.label(diagnosis.vehicle, limit["unit"])
-        title = CATALOGUE[name].title if name in CATALOGUE else ""
+        title = units.title(diagnosis.vehicle, CATALOGUE[name]) if name in CATALOGUE else ""
         rows.append([f"<code>{_text(name)}</code>", _text(title), f"<code>{_text(limit['parameter'])}</code>",
                      shown.number(limit["smallest"], 3), _text(unit)])  # fmt: skip
     table = _table(["effect", "", "parameter", "smallest that would have shown", "unit"], rows, numeric=(3,))
