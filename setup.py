@@ -46,6 +46,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "import": ["pyarrow>=14.0"],
         "report": ["matplotlib>=3.6", "plotly>=5.18"],
+        "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
             "pytest>=7.4",
             "hypothesis>=6.80",

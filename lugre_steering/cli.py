@@ -264,6 +264,31 @@ def effects(
     print_json(result) if as_json else card.show_effect(Console(), effect, result)
 
 
+@command()
+def prove(
+    out: OutFolder,
+    quick: Annotated[bool, typer.Option("--quick", help="a stratified few, under five minutes on two cores")] = False,
+    cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'single/end_stop/*'")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="repeat or resume the run with this seed [a new one]")] = None,
+    peers: Annotated[bool, typer.Option("--peers", help="also run other methods on the same recordings")] = False,
+    as_json: Json = False,
+) -> None:
+    """Hide physics in recordings of a second simulator, diagnose them blind, and score the answers."""
+    from lugre_steering.proof.command import run
+    from lugre_steering.proof.table import show_board
+
+    with progress_bar() as progress:
+        result = run(
+            out, quick=quick, cases=cases, seed=seed, peers=peers,
+            announce=lambda text: print(f"lugre-steering: {text}", file=sys.stderr), progress=progress,
+        )  # fmt: skip
+    if as_json:
+        print_json(result)
+    else:
+        show_board(Console(), result)
+        print(f"results in {out}")
+
+
 def main() -> None:
     """Entry point of ``lugre-steering``."""
     app()

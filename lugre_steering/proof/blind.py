@@ -38,7 +38,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 LONGEST_S = 900.0
 STRONGEST = 8.0
 """Times its typical size that an effect may be enlarged to reach the wanted ratio; beyond, it would not be the same physics."""
-ONE_THREAD = {name: "1" for name in ("LUGRE_STEERING_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+ONE_THREAD = dict.fromkeys(("LUGRE_STEERING_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 KEPT = ("verdict", "noise_floor_Nm", "baseline", "augmented", "unexplained")
 KEPT_OF_EFFECT = ("id", "p_value", "parameters", "where", "energy_share", "masked_share", "indistinguishable_from")
 
@@ -204,6 +204,8 @@ def run_all(
     progress("cases", len(rows), len(cases))
     # A fresh interpreter per worker: forking a process that has compiled code and threads is not safe.
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool, journal.open("a", encoding="utf-8") as log:
+        if journal.stat().st_size and not journal.read_bytes().endswith(b"\n"):
+            log.write("\n")  # a line cut off by an interruption must not swallow the next one
         running: set[Future[Row]] = set()
         while waiting or running:
             if budget_s is not None and time.monotonic() - begun > budget_s:

@@ -72,7 +72,7 @@ def quick(cases: Sequence[Hiding]) -> list[Hiding]:
     chosen: dict[str, list[Hiding]] = {kind: [] for kind in QUICK}
     seen: set[tuple[str, tuple[str, ...]]] = set()
     for case in cases:
-        plenty = len(chosen[case.kind]) >= QUICK[case.kind] or case.kind != "null" and case.ratio < QUICK_RATIO
+        plenty = len(chosen[case.kind]) >= QUICK[case.kind] or (case.kind != "null" and case.ratio < QUICK_RATIO)
         if plenty or (case.effects and (case.kind, case.effects) in seen):
             continue
         seen.add((case.kind, case.effects))

@@ -163,14 +163,15 @@ def parameter_errors(row: Row) -> dict[str, tuple[float, bool]]:
     Keys are 'effect.parameter'. Only effects that bear the right name count: another law's parameters mean something else.
     """
     found: dict[str, tuple[float, bool]] = {}
+    reported = {effect["id"]: effect for effect in row["diagnosis"]["effects"]} if row["diagnosis"] is not None else {}
     for hidden in row["truth"]["effects"]:
-        effects = row["diagnosis"]["effects"] if row["diagnosis"] is not None else []
-        effect = next((e for e in effects if e["id"] == hidden["id"]), None)
-        for meaning in SAME_MEANING.get(hidden["id"], ()) if effect is not None else ():
+        if hidden["id"] not in reported:
+            continue
+        for meaning in SAME_MEANING.get(hidden["id"], ()):
             key = hidden["parameters"]["line"] if meaning.reported == "line" else meaning.reported
             in_time = bool(hidden["parameters"].get("in_time", 0.0))
             other_window = (key.startswith("angle_") and in_time) or (key.startswith("time_") and not in_time)
-            value = effect["parameters"].get(key)
+            value = reported[hidden["id"]]["parameters"].get(key)
             if value is None or (hidden["id"] == "surface_patch" and other_window):
                 continue
             true = meaning.factor * hidden["parameters"][meaning.true]
@@ -235,7 +236,9 @@ def board(rows: Sequence[Row], made: Mapping[str, Any]) -> Row:
         "naming": {
             "from_0.3": proportion(outcome(row) in RIGHT for row in clear),
             "outcomes_from_0.3": dict(Counter(outcome(row) for row in clear)),
-            "tie_size": summary(float(len(row["diagnosis"]["effects"][0]["indistinguishable_from"])) for row in clear if outcome(row) in RIGHT),
+            "tie_size": summary(
+                float(len(row["diagnosis"]["effects"][0]["indistinguishable_from"])) for row in clear if outcome(row) in RIGHT
+            ),
             "confusion": _confusion(clear + unlisted_clear),
         },
         "power": [_power(ratio, [row for row in singles if ratio_of(row) == ratio]) for ratio in RATIOS],
@@ -296,7 +299,8 @@ def _effect(effect: str, rows: Sequence[Row]) -> Row:
     """One row of the table of effects: outcomes by ratio and by disguise, and what it was taken for."""
     right = ("unlisted",) if any(row["kind"] == "unlisted" for row in rows) else RIGHT
     plain = [row for row in rows if row["kind"] in ("single", "unlisted")]
-    taken = Counter(e["id"] for row in plain if outcome(row) in ("wrong name", "extra name") for e in row["diagnosis"]["effects"] if e["id"] != effect)
+    misnamed = [row for row in plain if outcome(row) in ("wrong name", "extra name")]
+    taken = Counter(e["id"] for row in misnamed for e in row["diagnosis"]["effects"] if e["id"] != effect)
     cells = {f"{ratio:g}": [row for row in plain if ratio_of(row) == ratio] for ratio in RATIOS}
     cells |= {kind: _of(rows, kind) for kind in ("one-bag", "late", "barely")}
     return {
@@ -329,7 +333,7 @@ def _peers(rows: Sequence[Row]) -> dict[str, Row]:
         have = [row for row in clear if name in row["peers"]]
         named = [row for row in have if row["peers"][name]["names"] is not None]
         found[name] = {
-            "removed": summary(row["peers"][name]["removed"] for row in have),
+            "removed": summary(_removed_by(row, name) for row in have),
             "false_alarms": proportion(row["peers"][name]["alarm"] for row in _of(compared, "null") if name in row["peers"]),
             "named": proportion(row["truth"]["effects"][0]["id"] in row["peers"][name]["names"] for row in named),
             "seconds": summary(row["peers"][name]["seconds"] for row in have),
@@ -342,6 +346,14 @@ def _peers(rows: Sequence[Row]) -> dict[str, Row]:
             "seconds": summary(row["seconds"]["diagnosis"] for row in clear),
         }
     return found
+
+
+def _removed_by(row: Row, peer: str) -> float | None:
+    """``removed`` of a peer."""
+    squares, entry = heldout(row), row["peers"][peer]
+    if squares is None or entry["before"] <= 1.1 * squares[2]:
+        return None
+    return float((entry["before"] - entry["after"]) / (entry["before"] - squares[2]))
 
 
 def _targets(result: Row) -> list[Row]:

@@ -1,0 +1,87 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The ``prove`` command: a campaign of blind cases in, a scoreboard and pictures out."""
+
+from __future__ import annotations
+
+import json
+import platform
+import secrets
+from collections.abc import Callable
+from datetime import datetime, timezone
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy
+import scipy
+
+from lugre_steering.errors import LugreSteeringError
+from lugre_steering.proof import campaign
+from lugre_steering.proof.blind import run_all, source_version
+from lugre_steering.proof.scoreboard import board
+from lugre_steering.resources import config_folder
+
+QUICK_BUDGET_S = 225.0
+"""No case is begun after this, so that a quick run ends within five minutes."""
+
+
+def run(
+    out: Path,
+    *,
+    quick: bool = False,
+    cases: str | None = None,
+    seed: int | None = None,
+    peers: bool = False,
+    announce: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str, int, int | None], None] = lambda *_: None,
+) -> dict[str, Any]:
+    """Run the campaign into DIR (finished cases of the same seed and code are kept), write scoreboard.json and figures."""
+    if peers:
+        from lugre_steering.proof.peers import missing
+
+        for note in missing():
+            announce(note)
+    seed = secrets.randbelow(2**31) if seed is None else seed
+    chosen = campaign.campaign(seed)
+    if cases is not None:
+        chosen = campaign.matching(chosen, cases)
+    if quick:
+        chosen = campaign.quick(chosen)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LugreSteeringError(f"{out}: cannot be made: {error.strerror or error}; expected a writable folder") from error
+    command = " ".join(
+        ["lugre-steering prove --out DIR", f"--seed {seed}", *(["--quick"] if quick else []), *(["--peers"] if peers else [])]
+        + ([f"--cases '{cases}'"] if cases is not None else [])
+    )
+    announce(f"{len(chosen)} cases, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
+    rows = run_all(
+        chosen, config_folder() / "test_vehicle.yaml", out / "cases.jsonl",
+        peers=peers, budget_s=QUICK_BUDGET_S if quick else None, progress=progress,
+    )  # fmt: skip
+    result = board(rows, {
+        "synthetic": True, "command": command, "seed": seed, "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+        "planned_cases": len(chosen), "source": source_version(), "versions": _versions(),
+    })  # fmt: skip
+    (out / "scoreboard.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    try:
+        from lugre_steering.report.proof_figures import draw_all
+    except LugreSteeringError as error:  # raised where matplotlib is missing
+        announce(str(error))
+    else:
+        draw_all(result, out)
+    return result
+
+
+def _versions() -> dict[str, str]:
+    try:
+        own = version("lugre_steering")
+    except PackageNotFoundError:
+        own = "source"
+    return {
+        "lugre_steering": own, "python": platform.python_version(),
+        "numpy": numpy.__version__, "scipy": scipy.__version__, "numba": numba.__version__,
+    }  # fmt: skip

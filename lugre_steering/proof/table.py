@@ -1,0 +1,83 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The scoreboard as tables on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+Row = Mapping[str, Any]
+
+
+def share(score: Row) -> str:
+    """'0.93 (14 of 15, 0.70 to 0.99)'."""
+    if score["share"] is None:
+        return "-"
+    low, high = score["ci95"]
+    return f"{score['share']:.2f} ({score['hits']} of {score['of']}, {low:.2f} to {high:.2f})"
+
+
+def median(score: Row) -> str:
+    """'0.85 (0.70 to 0.93, 12)': median, quartiles, count."""
+    if score["median"] is None:
+        return "-"
+    low, high = score["quartiles"]
+    return f"{score['median']:.3g} ({low:.3g} to {high:.3g}, {score['of']})"
+
+
+def show_board(console: Console, board: Row) -> None:
+    """Targets first, then what they are made of."""
+    targets = Table(title=f"{sum(board['cases'].values())} cases, seed {board['made']['seed']}")
+    for name in ("score", "reached", "target", ""):
+        targets.add_column(name, justify="left" if name == "score" else "right")
+    for target in board["targets"]:
+        reached = "-" if target["reached"] is None else f"{target['reached']:.2f}"
+        met = {None: "", True: "[green]met[/green]", False: "[red]not met[/red]"}[target["met"]]
+        targets.add_row(target["what"], reached, f"{target['target']:.2f}", met)
+    console.print(targets)
+    scores = Table("score", "share (count, 95 % interval) or median (quartiles, count)")
+    scores.add_row("nulls silent", share(board["nulls"]["silent"]))
+    for noise, score in board["nulls"]["by_noise"].items():
+        scores.add_row(f"  {noise} noise", share(score))
+    scores.add_row("  held-out error over noise (mean square)", median(board["nulls"]["heldout_over_noise"]))
+    for power in board["power"]:
+        scores.add_row(f"detected at effect-to-noise {power['ratio']:g}", share(power["detected"]))
+        scores.add_row("  right name or tie", share(power["right"]))
+    for kind, score in board["disguises"].items():
+        scores.add_row(f"right name or tie, {kind}", share(score))
+    for band in board["masked"]:
+        scores.add_row(f"right name or tie, masked share {band['masked']}", share(band))
+    scores.add_row("both of two effects", share(board["pairs"]["both"]))
+    scores.add_row("unlisted called unlisted", share(board["unlisted"]["called_unlisted"]))
+    scores.add_row("location IoU", median(board["location"]["listed"]))
+    scores.add_row("location IoU, unlisted", median(board["location"]["unlisted"]))
+    scores.add_row("parameters within 10 %", share(board["parameters"]["within_10_percent"]))
+    scores.add_row("95 % interval covers the true parameter", share(board["parameters"]["interval_covers"]))
+    scores.add_row("removable held-out error removed", median(board["removed"]["from_0.3"]))
+    scores.add_row("seconds per diagnosis", median(board["seconds_per_case"]))
+    console.print(scores)
+    _show_effects(console, board)
+    if board["peers"]:
+        _show_peers(console, board["peers"])
+    for failure in board["failed"]:
+        console.print(f"failed: {failure['name']} (seed {failure['seed']}): {failure['error']}")
+
+
+def _show_effects(console: Console, board: Row) -> None:
+    cells = list(next(iter(board["effects"].values()))["right"]) if board["effects"] else []
+    table = Table("effect", *cells, "taken for", title="right of all, by effect-to-noise ratio and disguise")
+    for effect, entry in board["effects"].items():
+        counts = [f"{right}/{of}" if of else "" for right, of in (entry["right"][cell] for cell in cells)]
+        table.add_row(effect, *counts, ", ".join(f"{name} {n}" for name, n in entry["taken_for"].items()))
+    console.print(table)
+
+
+def _show_peers(console: Console, peers: Row) -> None:
+    table = Table("method", "held-out error removed", "false alarms", "right name", "seconds", title="on the same recordings")
+    for name, entry in peers.items():
+        table.add_row(name, median(entry["removed"]), share(entry["false_alarms"]), share(entry["named"]), median(entry["seconds"]))
+    console.print(table)
