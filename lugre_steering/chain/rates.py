@@ -19,6 +19,9 @@ from numba import njit
 WIDTH_SIGMA = 5.0
 """Narrower, and chance alone moves a parked vehicle at 500 Hz: by 0.4 % of its torque a minute with 4."""
 RATE_TIME_CONSTANT_S = 0.04
+USUAL_ACCELERATION_RAD_S2 = 0.11
+"""Noise of the rate falls with the filter time, its lag grows with the acceleration: cleaner sensors get a faster filter,
+sqrt(sigma / acceleration), up to RATE_TIME_CONSTANT_S."""
 PROGRESS_TIME_CONSTANT_S = 0.05
 GIVE_BACK = 0.5
 """Share of the travel that may be used to take back lag compensation."""
@@ -76,7 +79,7 @@ def follow(s, dt, measured, measured_rate, sigma):
     s.theta += step
 
     rate = step / dt if math.isnan(measured_rate) else measured_rate
-    gain = dt / (RATE_TIME_CONSTANT_S + dt)
+    gain = dt / (min(RATE_TIME_CONSTANT_S, math.sqrt(sigma / USUAL_ACCELERATION_RAD_S2)) + dt)
     change = (rate - s.omega) * gain
     s.omega += change
     if abs(s.omega) < 1e-7 and step == 0.0:

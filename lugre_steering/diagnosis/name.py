@@ -19,7 +19,7 @@ from lugre_steering.recording import Array
 MAX_EFFECTS = 3
 SHORTLIST = 7
 FALSE_DISCOVERY_RATE = 0.01
-OWN_ERROR = 0.08
+OWN_ERROR = 0.05
 """Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
 WHOLE = (0.75, 0.09, 0.93)
 """Share of the excess that named physics must explain together, else it is unlisted: at an excess of one noise variance, per

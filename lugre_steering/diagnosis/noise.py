@@ -58,13 +58,13 @@ def standstill(run: Run, minimum_s: float = 1.0) -> list[slice]:
 def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     """Level and memory of the standardised torque noise from all standstill stretches (sheet values if they are too short).
 
-    Each stretch is freed of offset, drift and a logarithmic decay first, which real holds may show.
+    Each stretch is freed of offset and drift first, which real holds may show.
     """
     pieces = []
     for run in runs:
         for part in standstill(run):
             t = run.time[part] - run.time[part][0]
-            trend = np.column_stack([np.ones_like(t), t, np.log1p(t)])
+            trend = np.column_stack([np.ones_like(t), t])
             y = run.measured[part] / run.sigma[part]
             pieces.append(y - trend @ np.linalg.lstsq(trend, y, rcond=None)[0])
     dt = runs[0].time[1] - runs[0].time[0]

@@ -37,6 +37,8 @@ OPPOSED = -0.5
 """Correlation of measured and nominal torque, with negative work, that is a flipped sign however poor the model."""
 ABSURD_SHARE = 0.05
 """So many angles beyond half a turn are not glitches but another unit."""
+GEOMETRY_RAD, GEOMETRY_RATIO = float(np.radians(0.5)), 3.0
+"""Root mean square by which the worse steering geometry must miss, and by which factor more than the other."""
 TURNED_RAD = np.pi / 2.0
 """No steered track turns this far."""
 SKEW_S = 0.1
@@ -49,17 +51,20 @@ PLAY = (0.0, 0.1, 0.3, 0.6)
 """Stiffness factors and backlash (in presliding lengths) that may explain a late torque in place of a clock."""
 DRIFT_SHARE = 0.02
 """Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
+TINY = 1e-2
+"""A line whose highest pressure is this share of the others' speaks another unit, or is idle."""
 PRESSURE_UNITS = {"kPa": 1e3, "psi": 6894.757, "bar": 1e5, "MPa": 1e6}
 
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """One fault undone: the relative error (0 ... 1 and more) that the nominal model then leaves."""
+    """One fault undone: the relative error that the nominal model then leaves, and by which factor it must fall."""
 
     finding: str
     topics: tuple[str, ...]
     statement: str
     error: float
+    better: float = BETTER
 
 
 def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
@@ -124,25 +129,29 @@ def _error(run: Run, measured: Array, expected: Array) -> float:
     """Relative error of the expected torque, both about their means, with a gain within GAIN."""
     a, b = measured[run.valid] - measured[run.valid].mean(), expected[run.valid] - expected[run.valid].mean()
     gain = float(np.clip(float(a @ b) / max(float(b @ b), 1e-30), 1.0 / GAIN, GAIN))
-    return float(np.linalg.norm(a - gain * b) / max(float(np.linalg.norm(a)), 1e-30))
+    return float(np.linalg.norm(a - gain * b) / max(float(np.linalg.norm(a)), gain * float(np.linalg.norm(b)), 1e-30))
 
 
 def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | None:
     """The simplest hypothesis among the best, if it is convincing."""
-    if (exchanged := _exchanged_angles(vehicle, run)) is not None:
-        return exchanged
     model = build_model(vehicle)
     expected = _torques(model, run)
     total = expected.sum(axis=0)
     as_is = _error(run, run.measured, total)
-    hypotheses = [*_signals_wrong(vehicle, run, total), *_signs(vehicle, run, expected)]
+    correlation = float(np.corrcoef(run.measured[run.valid], total[run.valid])[0, 1])
+    mirrored = _mirrored(vehicle, run)
+    if mirrored and correlation > 0.0:
+        topics = tuple(_topics(vehicle, Kind.ANGLE).values())
+        statement = f"{' and '.join(topics)} are exchanged: the outer track would turn further than the inner one"
+        return _Hypothesis("swapped_angles", topics, statement, 0.0)
+    hypotheses = [*_signals_wrong(vehicle, run, total), *_signs(vehicle, run, expected, mirrored)]
     if as_is > GOOD:
         hypotheses += _angle_units(recording, vehicle, model)
-    convincing = [h for h in hypotheses if h.error < min(GOOD, BETTER * as_is)]
+    convincing = [h for h in hypotheses if h.error < min(GOOD, h.better * as_is)]
     if not convincing:
-        opposed = float(np.corrcoef(run.measured[run.valid], total[run.valid])[0, 1]) < OPPOSED
         work = float(np.sum((run.measured * run.omega.mean(axis=0))[run.valid]))
-        convincing = [h for h in hypotheses if h.finding == "sign_flipped" and h.error < as_is] if opposed and work < 0.0 else []
+        opposed = correlation < OPPOSED and work < 0.0
+        convincing = [h for h in hypotheses if opposed and h.finding == "sign_flipped" and h.error < as_is]
     if not convincing:
         return None
     best = min(h.error for h in convincing)
@@ -164,6 +173,7 @@ def _signals_wrong(vehicle: Vehicle, run: Run, total: Array) -> Iterator[_Hypoth
         yield _Hypothesis("unit_suspect", (topic,), statement, _error(run, 1e3 * run.measured, total))
         return
     topics = list(_topics(vehicle, Kind.PRESSURE).values())
+    highest = np.abs(run.pressure).max(axis=1)
     for i, j in combinations(range(len(topics)), 2):
         measured = run.measured + (gains[i] - gains[j]) * (run.pressure[j] - run.pressure[i])
         statement = f"{topics[i]} and {topics[j]} are exchanged; check the plugs of the two sensors"
@@ -172,30 +182,37 @@ def _signals_wrong(vehicle: Vehicle, run: Run, total: Array) -> Iterator[_Hypoth
         statement = f"probably in {unit} (multiply by {factor:g})"
         every = f"{', '.join(topics)}: {statement}"
         yield _Hypothesis("unit_suspect", tuple(topics), every, _error(run, factor * run.measured, total))
-        for topic, gain, pressure in zip(topics, gains, run.pressure, strict=True):
-            if factor * float(np.abs(pressure).max()) < 1.1 * vehicle.sensors.pressure_range_Pa:
+        for topic, gain, pressure, high in zip(topics, gains, run.pressure, highest, strict=True):
+            if 0.01 < factor * high / vehicle.sensors.pressure_range_Pa < 1.1:
                 measured = run.measured + gain * (factor - 1.0) * pressure
-                yield _Hypothesis("unit_suspect", (topic,), f"{topic}: {statement}", _error(run, measured, total))
+                # A line that hardly works in this recording changes little, but its magnitude already speaks.
+                better = 1.0 if high < TINY * np.median(highest) else BETTER
+                yield _Hypothesis("unit_suspect", (topic,), f"{topic}: {statement}", _error(run, measured, total), better)
 
 
-def _signs(vehicle: Vehicle, run: Run, expected: Array) -> Iterator[_Hypothesis]:
-    """Flipped angles, one or all; the chain is not quite odd (gravity), so flipped motion runs through it again."""
+def _signs(vehicle: Vehicle, run: Run, expected: Array, mirrored: bool | None) -> Iterator[_Hypothesis]:
+    """Flipped angles, one or all; the chain is not quite odd (gravity), so flipped motion runs through it again.
+
+    All angles flipped look like all circuits exchanged, except to the steering geometry (``mirrored``, if it tells).
+    """
     topics = _topics(vehicle, Kind.ANGLE)
     turned = replace(run, theta=-run.theta, omega=-run.omega, alpha=-run.alpha)
     flipped = _torques(build_model(vehicle), turned)
     choices = [{side} for side in vehicle.sides] + ([set(vehicle.sides)] if len(vehicle.sides) > 1 else [])
     for choice in choices:
         flip = np.array([side in choice for side in vehicle.sides])[:, None]
-        theta = np.where(flip, -run.theta, run.theta)
         measured = run.measured
         if vehicle.hydraulics is not None:
-            measured = np.einsum("slt,lt->t", line_gains(vehicle, theta), run.pressure)
-        named = tuple(topics[side] for side in vehicle.sides if side in choice)
-        statement = f"{' and '.join(named)}: the sign is flipped (positive turns the track to the left)"
-        if len(choice) == len(vehicle.sides) > 1:
-            statement += ", or the lines of every circuit are exchanged" if vehicle.hydraulics is not None else ""
+            measured = np.einsum("slt,lt->t", line_gains(vehicle, np.where(flip, -run.theta, run.theta)), run.pressure)
         error = _error(run, measured, np.where(flip, flipped, expected).sum(axis=0))
-        yield _Hypothesis("sign_flipped", named, statement, error)
+        if len(choice) == 1 or mirrored is not False:
+            named = tuple(topics[side] for side in vehicle.sides if side in choice)
+            statement = f"{' and '.join(named)}: the sign is flipped (positive turns the track to the left)"
+            yield _Hypothesis("sign_flipped", named, statement, error)
+        if len(choice) == len(vehicle.sides) and vehicle.hydraulics is not None and not mirrored:
+            lines = tuple(_topics(vehicle, Kind.PRESSURE).values())
+            statement = f"{', '.join(lines)}: the two lines of every circuit are exchanged"
+            yield _Hypothesis("swapped_lines", lines, statement, error)
 
 
 def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterator[_Hypothesis]:
@@ -214,25 +231,21 @@ def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterat
         yield _Hypothesis("unit_suspect", named, statement, error)
 
 
-def _exchanged_angles(vehicle: Vehicle, run: Run) -> _Hypothesis | None:
-    """Left and right by the steering geometry alone: the inner track turns further, cot(left) - cot(right) = -b / L.
+def _mirrored(vehicle: Vehicle, run: Run) -> bool | None:
+    """Whether the angles obey the steering geometry of the mirrored vehicle rather than its own; None if it does not tell.
 
-    The torque hardly tells them apart. Primary source: Ackermann condition, e.g. Gillespie 1992, chapter 8.
+    The inner track turns further, cot(left) - cot(right) = -b / L; with the sides exchanged, or with both signs flipped, the
+    outer one would. Primary source: Ackermann condition, e.g. Gillespie 1992, chapter 8.
     """
     if vehicle.axle is None or set(vehicle.sides) != {"left", "right"}:
         return None
     left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
     t, ratio = np.tan(left), vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
-    as_is = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
-    exchanged = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 - ratio * t)) ** 2)))
-    if as_is < np.radians(0.5) or exchanged > as_is / 3.0:
+    own = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
+    other = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 - ratio * t)) ** 2)))
+    if max(own, other) < GEOMETRY_RAD or GEOMETRY_RATIO * min(own, other) > max(own, other):
         return None
-    topics = tuple(_topics(vehicle, Kind.ANGLE).values())
-    statement = (
-        f"{' and '.join(topics)} are exchanged: the outer track would turn further than the inner one (error of the steering "
-        f"geometry {np.degrees(as_is):.1f} deg as recorded, {np.degrees(exchanged):.1f} deg exchanged)"
-    )
-    return _Hypothesis("swapped_angles", topics, statement, 0.0)
+    return other < own
 
 
 def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
