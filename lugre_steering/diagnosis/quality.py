@@ -306,7 +306,9 @@ def _spikes(look: _Look) -> Mask:
     middle = median_filter(look.value, 2 * SPIKE_SAMPLES + 1, mode="nearest")
     off = np.abs(look.value - middle)
     scatter = 1.4826 * median_filter(off, _samples(WINDOW_S, look.period), mode="reflect")
-    least = max(look.floor, look.resolution, 1.4826 * float(np.median(off)))
+    # On a slope the median is often the sample itself, so the scatter alone is too small there.
+    noise = 1.4826 * float(np.median(np.abs(np.convolve(look.value, FOURTH, mode="valid")))) / np.sqrt(FOURTH @ FOURTH)
+    least = max(look.floor, look.resolution, noise)
     slope = np.abs(np.gradient(middle, look.time)) * look.period
     steepest = uniform_filter1d(slope, 2 * SPIKE_SAMPLES + 1) * SPIKE_SAMPLES
     found: Mask = off > SPIKE_SIGMA * np.maximum(scatter, least) + steepest

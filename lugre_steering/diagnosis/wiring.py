@@ -52,7 +52,7 @@ PLAY = (0.0, 0.1, 0.3, 0.6)
 DRIFT_SHARE = 0.02
 """Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
 TINY = 1e-2
-"""A line whose highest pressure is this share of the others' speaks another unit, or is idle."""
+"""A line whose highest pressure is this share of the others', or a torque this share of the nominal one, has another unit."""
 PRESSURE_UNITS = {"kPa": 1e3, "psi": 6894.757, "bar": 1e5, "MPa": 1e6}
 
 
@@ -151,7 +151,9 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | No
     if not convincing:
         work = float(np.sum((run.measured * run.omega.mean(axis=0))[run.valid]))
         opposed = correlation < OPPOSED and work < 0.0
-        convincing = [h for h in hypotheses if opposed and h.finding == "sign_flipped" and h.error < as_is]
+        tiny = float(np.std(run.measured)) < TINY * float(np.std(total))
+        poor = {"sign_flipped"} if opposed else {"unit_suspect"} if tiny else set()
+        convincing = [h for h in hypotheses if h.finding in poor and h.error < as_is]
     if not convincing:
         return None
     best = min(h.error for h in convincing)
