@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,10 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 
 from lugre_steering.errors import DataError, LugreSteeringError
+
+# Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 app = typer.Typer(
     help="Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out.",

@@ -249,9 +249,8 @@ class _Conclusion:
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         parts = [slice(a, b) for a, b in zip(problem.edges, problem.edges[1:], strict=False)]
         axes = [locate.coordinates(run, run.measured) for run in problem.runs]
-        axis, share, p = locate.telling_coordinate(
-            axes, [residual[s] for s in parts], [weight[s] for s in parts], [self.noise.draws[:, s] for s in parts]
-        )
+        stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
+        axis, share, p = locate.telling_coordinate(stacked, residual, weight, self.noise.draws)
         used = weight > 0.0
         moving = np.concatenate([np.abs(run.omega).max(axis=0) > 1e-3 for run in problem.runs])
         energy = (residual * weight) ** 2
@@ -274,13 +273,10 @@ class _Conclusion:
             # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
             sound = fit(problem, np.where(self.roles.fit, weight, 0.0), (), final.x, robust=True, evaluations=25)
             residual = problem.measured - sound.prediction
-            axis, share, _ = locate.telling_coordinate(
-                axes, [residual[s] for s in parts], [weight[s] for s in parts], [self.noise.draws[:, s] for s in parts]
-            )
+            axis, share, _ = locate.telling_coordinate(stacked, residual, weight, self.noise.draws)
         formula = None
         held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
-        stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
         proposal = unlisted.propose(stacked, residual, fitted, held)
         if proposal is not None:
             formula = f"{proposal.text} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"

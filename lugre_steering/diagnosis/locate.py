@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -91,35 +91,34 @@ def active_range(coordinate: Array, part: Array) -> tuple[float, float]:
     return float(coordinate[order][low]), float(coordinate[order][min(high, order.size - 1)])
 
 
-def explained_by(coordinate: Array, residual: Array, weight: Array) -> float:
-    """Share of the weighted residual energy that bin means along a coordinate explain (correlation ratio), less its chance level."""
+def explained_by(coordinate: Array, values: Array) -> Array:
+    """Share of the energy of each row of ``values`` (m, n) that bin means along a coordinate (n,) explain (correlation ratio).
+
+    NaN in ``values`` marks samples that do not count.
+    """
     edges = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, BINS + 1)))
     if edges.size < 3:
-        return 0.0
+        return np.zeros(values.shape[0])
     index = np.clip(np.searchsorted(edges, coordinate, side="right") - 1, 0, edges.size - 2)
-    value = residual * weight
-    count = np.bincount(index, weight > 0.0, edges.size - 1)
-    total = np.bincount(index, value, edges.size - 1)
-    between = float(np.sum(total[count > 0] ** 2 / count[count > 0]))
-    return between / max(float(value @ value), 1e-30)
+    used = np.isfinite(values[0])
+    count = np.bincount(index[used], minlength=edges.size - 1)
+    filled = count > 0
+    shares = np.zeros(values.shape[0])
+    for i, row in enumerate(values):
+        total = np.bincount(index[used], row[used], edges.size - 1)
+        shares[i] = np.sum(total[filled] ** 2 / count[filled]) / max(float(row[used] @ row[used]), 1e-30)
+    return shares
 
 
-def telling_coordinate(
-    by_bag: Sequence[Mapping[str, Array]], residual: Sequence[Array], weight: Sequence[Array], draws: Sequence[Array]
-) -> tuple[str, float, float]:
-    """The coordinate along which a residual has the most structure: name, share, p-value of the maximum over all coordinates.
+def telling_coordinate(axes: Mapping[str, Array], residual: Array, weight: Array, draws: Array) -> tuple[str, float, float]:
+    """The coordinate along which a residual has the most structure: name, share, p-value of the maximum over all.
 
-    ``draws`` are residuals (m, n) per bag that hide nothing; the maximum over coordinates is taken in each, so looking
-    everywhere is paid for.
+    ``draws`` (m, n) are residuals that hide nothing; the maximum over coordinates is taken in each, so looking everywhere is
+    paid for. Samples without weight do not count.
     """
-    names = list(by_bag[0])
-    stacked = {name: np.concatenate([bag[name] for bag in by_bag]) for name in names}
-    all_weight = np.concatenate(weight)
-    shares = {name: explained_by(stacked[name], np.concatenate(residual), all_weight) for name in names}
-    best = max(shares, key=lambda name: shares[name])
-    null = [
-        max(explained_by(stacked[name], np.concatenate([bag[i] for bag in draws]), all_weight) for name in names)
-        for i in range(draws[0].shape[0])
-    ]
-    p = (1 + sum(value >= shares[best] for value in null)) / (1 + len(null))
-    return best, shares[best], float(p)
+    values = np.vstack([residual, draws]) * np.where(weight > 0.0, weight, np.nan)
+    shares = {name: explained_by(axis, values) for name, axis in axes.items()}
+    best = max(shares, key=lambda name: shares[name][0])
+    null = np.max([share[1:] for share in shares.values()], axis=0)
+    p = (1.0 + float(np.sum(null >= shares[best][0]))) / (1.0 + null.size)
+    return best, float(shares[best][0]), p
