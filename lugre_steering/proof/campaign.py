@@ -68,7 +68,7 @@ def campaign(seed: int) -> list[Hiding]:
 
 
 def quick(cases: Sequence[Hiding]) -> list[Hiding]:
-    """A stratified few of each kind, different effects, interleaved, so that a run cut short still has all kinds."""
+    """A stratified few of each kind, different effects; one of every kind first, so that a run cut short has them all."""
     chosen: dict[str, list[Hiding]] = {kind: [] for kind in QUICK}
     seen: set[tuple[str, tuple[str, ...]]] = set()
     for case in cases:
@@ -77,7 +77,7 @@ def quick(cases: Sequence[Hiding]) -> list[Hiding]:
             continue
         seen.add((case.kind, case.effects))
         chosen[case.kind].append(case)
-    share = {case.name: (i + 0.5) / len(group) for group in chosen.values() for i, case in enumerate(group)}
+    share = {case.name: i / len(group) for group in chosen.values() for i, case in enumerate(group)}
     return sorted((case for group in chosen.values() for case in group), key=lambda case: share[case.name])
 
 

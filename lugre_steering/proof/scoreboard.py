@@ -181,12 +181,12 @@ def parameter_errors(row: Row) -> dict[str, tuple[float, bool]]:
 
 
 def heldout(row: Row) -> tuple[float, float, float] | None:
-    """Held-out mean squares [N2 m2]: after recalibration, with the named physics, and of the noise (from the truth)."""
+    """Held-out mean squares [N2 m2]: after recalibration, with the named physics, and of the noise."""
     diagnosis = row["diagnosis"]
     if diagnosis is None or diagnosis["baseline"]["heldout_rmse_Nm"] is None:
         return None
     bags = row["truth"]["bags"].values()
-    noise = np.average([bag["noise_variance"] for bag in bags], weights=[bag["duration_s"] for bag in bags])
+    noise = np.average([bag["seen_noise_variance"] for bag in bags], weights=[bag["duration_s"] for bag in bags])
     return diagnosis["baseline"]["heldout_rmse_Nm"] ** 2, diagnosis["augmented"]["heldout_rmse_Nm"] ** 2, float(noise)
 
 

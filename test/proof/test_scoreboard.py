@@ -1,0 +1,304 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Scores against answers worked out by hand; the campaign has what it must; one blind run from end to end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from lugre_steering.cli import app
+from lugre_steering.errors import DataError
+from lugre_steering.proof import blind, campaign, manoeuvres, scoreboard
+from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
+from lugre_steering.proof.simulator import load_sheet
+from lugre_steering.proof.vehicle_draw import Sheet
+
+Row = dict[str, Any]
+
+ROOT = Path(__file__).resolve().parents[2]
+SHEET_FILE = ROOT / "config" / "test_vehicle.yaml"
+KEPT_BOARD = ROOT / "config" / "proof_scoreboard.json"
+
+
+def effect(name: str, ties: Sequence[str] = (), spans: Sequence[Sequence[float]] = (), **parameters: tuple[float, float]) -> Row:
+    """A reported effect; parameters are (value, half width of the interval)."""
+    return {
+        "id": name, "indistinguishable_from": list(ties), "energy_share": 0.9, "masked_share": 0.1, "p_value": 0.01,
+        "where": [{"bag": "run_a", "intervals_s": [list(span) for span in spans]}],
+        "parameters": {k: {"value": v, "ci95": [v - d, v + d], "unit": "1"} for k, (v, d) in parameters.items()},
+    }  # fmt: skip
+
+
+def row(
+    hidden: Sequence[str], verdict: str, *reported: Row, kind: str = "single", ratio: float = 1.0, rmse: tuple[float, float] = (20.0, 10.0)
+) -> Row:
+    """A finished case: bags of 100 s, the first effect acts from 10 to 30 s of run_a; noise variance as seen 36."""
+    spans = {name: [[10.0, 30.0]] for name in hidden}
+    parameters = {"torque": 400.0, "b": 100.0, "line": "aux_a", "offset": 5e4}
+    bag = {"manoeuvre": "sweeps", "duration_s": 100.0, "removable_variance": 500.0, "noise_variance": 40.0, "seen_noise_variance": 36.0}
+    return {
+        "name": f"{kind}/{'+'.join(hidden)}/{verdict}/{len(reported)}", "kind": kind, "noise": "white", "seed": 3, "version": "v",
+        "wanted_ratio": ratio, "ratio": ratio if hidden else 0.0, "masked": 0.2, "strengths": [1.0] * len(hidden), "error": None,
+        "seconds": {"making": 1.0, "diagnosis": 5.0},
+        "truth": {
+            "effects": [{"id": name, "only_bag": None, "parameters": parameters} for name in hidden],
+            "bags": {"run_a": {**bag, "intervals_s": spans}, "run_b": {**bag, "intervals_s": {}}},
+        },
+        "diagnosis": {
+            "verdict": verdict, "noise_floor_Nm": 6.0, "effects": list(reported),
+            "baseline": {"rmse_Nm": rmse[0], "heldout_rmse_Nm": rmse[0]}, "augmented": {"rmse_Nm": rmse[1], "heldout_rmse_Nm": rmse[1]},
+            "unexplained": {"structured": False, "where": None},
+        },
+    }  # fmt: skip
+
+
+FOUND = "missing_physics"
+
+
+@pytest.mark.parametrize(
+    ("hits", "of", "low", "high"),
+    [(9, 10, 0.5958, 0.9821), (0, 10, 0.0, 0.2775), (95, 100, 0.8882, 0.9785), (0, 0, 0.0, 1.0)],
+)
+def test_wilson_interval_has_the_tabulated_values(hits: int, of: int, low: float, high: float) -> None:
+    assert scoreboard.interval(hits, of) == pytest.approx((low, high), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("case", "expected"),
+    [
+        (row(["slope_bias"], FOUND, effect("slope_bias")), "right name"),
+        (row(["slope_bias"], FOUND, effect("slope_bias", ties=["pressure_offset"])), "right name"),
+        (row(["slope_bias"], FOUND, effect("pressure_offset", ties=["slope_bias"])), "right tie"),
+        (row(["slope_bias"], FOUND, effect("slope_bias"), effect("backlash")), "extra name"),
+        (row(["slope_bias"], FOUND, effect("backlash", ties=["end_stop"])), "wrong name"),
+        (row([], FOUND, effect("backlash"), kind="null"), "wrong name"),
+        (row(["slope_bias"], "consistent"), "silent"),
+        (row(["slope_bias"], "unlisted_physics"), "unlisted"),
+        (row(["slope_bias"], "insufficient_data"), "insufficient data"),
+        ({**row(["slope_bias"], FOUND), "diagnosis": None, "error": "crash"}, "failed"),
+    ],
+)
+def test_outcome(case: Row, expected: str) -> None:
+    assert scoreboard.outcome(case) == expected
+
+
+@pytest.mark.parametrize(
+    ("reported", "expected"),
+    [
+        ([effect("end_stop"), effect("backlash")], 2),
+        ([effect("soil_shear", ties=["end_stop"]), effect("backlash")], 2),
+        ([effect("end_stop", ties=["backlash"])], 1),  # one answer cannot stand for both
+        ([effect("end_stop", ties=["backlash"]), effect("backlash")], 2),
+        ([effect("end_stop"), effect("slope_bias")], 1),
+        ([effect("slope_bias")], 0),
+    ],
+)
+def test_both_of_two_need_an_answer_each(reported: list[Row], expected: int) -> None:
+    assert scoreboard.both(row(["end_stop", "backlash"], FOUND, *reported, kind="pair")) == expected
+
+
+def test_location_is_intersection_over_union_of_all_bags() -> None:
+    case = row(["end_stop"], FOUND, effect("end_stop", spans=[(20.0, 40.0)]))
+    assert scoreboard.location(case) == pytest.approx(10.0 / 30.0)
+    case["truth"]["bags"]["run_b"]["intervals_s"] = {"end_stop": [[0.0, 30.0]]}  # missed altogether
+    assert scoreboard.location(case) == pytest.approx(10.0 / 60.0)
+    case["truth"]["bags"]["run_b"]["intervals_s"] = {"end_stop": [[0.0, 100.0]]}  # acts in 120 of 200 s: not local
+    assert scoreboard.location(case) is None
+    assert scoreboard.location(row(["end_stop"], "consistent")) is None
+
+
+SPANS = st.lists(st.tuples(st.integers(0, 40), st.integers(1, 10)).map(lambda t: (t[0], t[0] + t[1])), min_size=1, max_size=4)
+
+
+@given(SPANS, SPANS)
+def test_overlap_counts_seconds_like_a_raster(one: list[tuple[int, int]], other: list[tuple[int, int]]) -> None:
+    seconds = [{s for a, b in spans for s in range(a, b)} for spans in (one, other)]
+    assert scoreboard.overlap(one, other) == (len(seconds[0] & seconds[1]), len(seconds[0] | seconds[1]))
+
+
+def test_parameter_errors_use_the_meaning_not_the_number() -> None:
+    case = row(["line_loss_linear"], FOUND, effect("line_loss_linear", b=(55.0, 6.0)))
+    assert scoreboard.parameter_errors(case) == {"line_loss_linear.b": (pytest.approx(0.1), True)}  # 100 of two tracks, 55 of one
+    line = row(["pressure_offset"], FOUND, effect("pressure_offset", aux_a=(4e4, 1e3)))
+    assert scoreboard.parameter_errors(line) == {"pressure_offset.line": (pytest.approx(0.2), False)}
+    elsewhere = row(["pressure_offset"], FOUND, effect("pressure_offset", main_b=(5e4, 1e3)))
+    assert scoreboard.parameter_errors(elsewhere) == {}
+    assert scoreboard.parameter_errors(row(["slope_bias"], FOUND, effect("pressure_offset", ties=["slope_bias"]))) == {}
+
+
+def test_removed_is_the_share_of_what_noise_does_not_explain() -> None:
+    assert scoreboard.removed(row(["slope_bias"], FOUND, effect("slope_bias"))) == pytest.approx((400 - 100) / (400 - 36))
+    assert scoreboard.removed(row(["slope_bias"], "consistent", rmse=(6.1, 6.1))) is None
+
+
+def test_board_counts_and_serialises() -> None:
+    rows = [
+        *(row([], "consistent", kind="null") for _ in range(3)), row([], FOUND, effect("backlash"), kind="null"),
+        row(["slope_bias"], FOUND, effect("slope_bias", torque=(410.0, 20.0))), row(["slope_bias"], "consistent", ratio=0.1),
+        row(["backlash"], FOUND, effect("end_stop")),
+        row(["end_stop", "backlash"], FOUND, effect("end_stop"), effect("backlash"), kind="pair"),
+        row(["body_mode"], "unlisted_physics", kind="unlisted"), row(["body_mode"], FOUND, effect("backlash"), kind="unlisted"),
+    ]  # fmt: skip
+    board = scoreboard.board(rows, {"seed": 3})
+    assert json.loads(json.dumps(board, allow_nan=False)) == board
+    assert board["nulls"]["silent"]["share"] == 0.75
+    assert board["nulls"]["named"] == {"backlash": 1}
+    assert board["naming"]["from_0.3"] == {"share": 0.5, "hits": 1, "of": 2, "ci95": list(scoreboard.interval(1, 2))}
+    assert board["power"][0]["detected"]["share"] == 0.0
+    assert board["naming"]["confusion"] == {
+        "slope_bias": {"slope_bias": 1}, "backlash": {"end_stop": 1}, "body_mode": {"unlisted": 1, "backlash": 1},
+    }  # fmt: skip
+    assert board["pairs"]["both"]["share"] == 1.0
+    assert board["unlisted"]["called_unlisted"]["share"] == 0.5
+    assert board["effects"]["backlash"]["taken_for"] == {"end_stop": 1}
+    assert {target["id"]: target["met"] for target in board["targets"]}["nulls_silent"] is False
+
+
+def test_empty_board_meets_and_misses_nothing() -> None:
+    assert {target["met"] for target in scoreboard.board([], {"seed": 1})["targets"]} == {None}
+
+
+def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
+    entry = {"before": 136.0, "after": 86.0, "alarm": True, "names": ["slope_bias", "pressure_offset"], "seconds": 1.0}
+    rows = [
+        {**row(["slope_bias"], FOUND, effect("slope_bias")), "peers": {"SINDy ensemble": entry}},
+        {**row([], "consistent", kind="null"), "peers": {"SINDy ensemble": entry}},
+    ]
+    board = scoreboard.board(rows, {"seed": 1, "date": "2026-01-01"})
+    peer = board["peers"]["SINDy ensemble"]
+    assert peer["removed"]["median"] == pytest.approx(0.5)
+    assert peer["false_alarms"]["share"] == 1.0
+    assert peer["named"]["share"] == 1.0
+    assert board["peers"]["lugre_steering"]["false_alarms"]["share"] == 0.0
+    pytest.importorskip("matplotlib")
+    from lugre_steering.report.proof_figures import draw_all
+
+    files = draw_all(board, tmp_path)
+    assert {file.stem for file in files} == {f"proof_{name}" for name in ("power", "confusion", "location", "effects", "peers")}
+    assert all(file.stat().st_size > 5000 for file in files)
+
+
+def test_campaign_covers_every_effect_size_and_disguise() -> None:
+    cases = campaign.campaign(7)
+    kinds = {kind: [case for case in cases if case.kind == kind] for kind in {case.kind for case in cases}}
+    assert len(kinds["null"]) >= 100
+    assert {case.noise for case in kinds["null"]} == {"white", "coloured", "ripple"}
+    wanted = {(name, ratio) for name in EFFECT_IDS for ratio in (0.1, 0.3, 1.0, 10.0)}
+    assert {(case.effects[0], case.ratio) for case in kinds["single"]} == wanted
+    assert {case.effects[0] for case in kinds["one-bag"]} == set(EFFECT_IDS)
+    assert {case.effects[0] for case in kinds["unlisted"]} == set(UNLISTED_IDS)
+    assert len({case.effects for case in kinds["pair"]}) >= 20
+    assert len({case.name for case in cases}) == len(cases) == len({case.seed for case in cases})
+
+
+def test_campaign_repeats_with_its_seed_only() -> None:
+    assert campaign.campaign(7) == campaign.campaign(7)
+    assert not {case.seed for case in campaign.campaign(7)} & {case.seed for case in campaign.campaign(8)}
+    some = campaign.matching(campaign.campaign(7), "single/end_stop/*")
+    assert {case.effects for case in some} == {("end_stop",)}
+    assert set(some) <= set(campaign.campaign(7))
+
+
+def test_quick_has_every_kind_and_different_effects() -> None:
+    few = campaign.quick(campaign.campaign(7))
+    assert {case.kind for case in few[:12]} == {"null", "single", "pair", "unlisted", "one-bag", "late", "barely"}
+    singles = [case.effects for case in few if case.kind == "single"]
+    assert len(set(singles)) == len(singles) == campaign.QUICK["single"]
+
+
+def test_unknown_case_pattern_is_one_line_and_code_2(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no case has such a name"):
+        campaign.matching(campaign.campaign(7), "single/unicorn/*")
+    result = CliRunner().invoke(app, ["prove", "--out", str(tmp_path), "--cases", "single/unicorn/*"])
+    assert result.exit_code == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_resume_keeps_finished_cases_of_the_same_code(tmp_path: Path) -> None:
+    journal, version = tmp_path / "cases.jsonl", blind.source_version()
+    cases = campaign.matching(campaign.campaign(7), "null/white/0*")[:2]
+    done = [{**row([], "consistent", kind="null"), "name": case.name, "seed": case.seed, "version": version} for case in cases]
+    lines = [json.dumps(entry) for entry in done]
+    journal.write_text("\n".join(lines) + "\n" + lines[0][:50], encoding="utf-8")  # the last one was cut off
+    assert blind.run_all(cases, SHEET_FILE, journal) == done
+    other = json.dumps({**done[0], "version": "older code"})
+    failed = json.dumps({**done[1], "error": "crash", "diagnosis": None})
+    journal.write_text(f"{other}\n{failed}\n", encoding="utf-8")
+    assert blind.finished(journal, version, peers=False) == {}
+    journal.write_text(lines[0] + "\n", encoding="utf-8")
+    assert blind.finished(journal, version, peers=True) == {}  # peers have not run yet
+
+
+@pytest.fixture(scope="module")
+def sheet() -> Sheet:
+    return load_sheet(SHEET_FILE)
+
+
+@pytest.fixture
+def _short_manoeuvres(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Under a minute with both limits, holds and small reversals."""
+
+    def short(rng: np.random.Generator) -> Any:
+        targets = manoeuvres.LIMIT_RAD * np.array([0.98, -0.98, 0.3, 0.2, 0.35, -0.1, 0.95, 0.0])
+        return manoeuvres._sweep_to(targets, np.deg2rad(rng.uniform(6.0, 9.0, 8)), rng.uniform(1.0, 4.0, 8))
+
+    monkeypatch.setattr(manoeuvres, "KINDS", {"short": short, "brief": short})
+
+
+@pytest.mark.usefixtures("_short_manoeuvres")
+def test_effects_are_scaled_to_the_wanted_ratio(sheet: Sheet) -> None:
+    for name, ratio in (("end_stop", 0.3), ("slope_bias", 10.0)):
+        data = blind.make(campaign.Hiding("x", "single", (name,), ratio, "white", 11), sheet)
+        reached = blind.recalibrated_variance(data) / blind.noise_of(data)
+        assert 0.75 < reached / ratio < 1.3
+
+
+@pytest.mark.usefixtures("_short_manoeuvres")
+def test_diagnosis_sees_bags_and_sheet_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: dict[str, Any] = {}
+
+    def look(command: list[str], **_options: Any) -> Any:
+        vehicle = Path(command[command.index("--vehicle") + 1])
+        seen["files"] = sorted(str(file.relative_to(vehicle.parent)) for file in vehicle.parent.rglob("*") if file.is_file())
+        seen["command"] = command
+        seen["text"] = b"".join(file.read_bytes() for file in vehicle.parent.rglob("*") if file.is_file())
+        raise blind.subprocess.TimeoutExpired(command, 1.0)
+
+    monkeypatch.setattr(blind.subprocess, "run", look)
+    case = campaign.Hiding("single/end_stop/1/0", "single", ("end_stop",), 1.0, "white", 11)
+    result = blind.run(blind.Job(case, SHEET_FILE, "v", peers=False))
+    assert result["error"] is not None
+    assert scoreboard.outcome(result) == "failed"
+    assert [file for file in seen["files"] if not file.startswith("bags")] == ["rubber_dma_10hz.csv", "vehicle.yaml"]
+    assert not any("end_stop" in word or "truth" in word for word in seen["command"])
+    assert b"end_stop" not in seen["text"].replace(SHEET_FILE.read_bytes(), b"")
+
+
+@pytest.mark.usefixtures("_short_manoeuvres")
+def test_blind_end_to_end() -> None:
+    stop = campaign.Hiding("single/end_stop/10/0", "single", ("end_stop",), 10.0, "white", 11)
+    found = blind.run(blind.Job(stop, SHEET_FILE, "v", peers=False))
+    assert found["error"] is None
+    assert scoreboard.outcome(found) in scoreboard.RIGHT
+    null = campaign.Hiding("null/white/00", "null", (), 0.0, "white", 12)
+    quiet = blind.run(blind.Job(null, SHEET_FILE, "v", peers=False))
+    assert quiet["error"] is None
+    assert scoreboard.outcome(quiet) == "silent"
+
+
+@pytest.mark.skipif(not KEPT_BOARD.exists(), reason="no full run has been kept yet")
+def test_readme_shows_the_kept_scoreboard() -> None:
+    board = json.loads(KEPT_BOARD.read_text(encoding="utf-8"))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    missing = [line for line in scoreboard.readme_lines(board) if line not in readme]
+    assert not missing, "README's table differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)
+    assert board["made"]["command"] in readme
