@@ -31,7 +31,8 @@ def median(score: Row) -> str:
 
 def show_board(console: Console, board: Row) -> None:
     """Targets first, then what they are made of."""
-    targets = Table(title=f"{sum(board['cases'].values())} cases, seed {board['made']['seed']}")
+    done, planned = sum(board["cases"].values()), board["made"]["planned_cases"]
+    targets = Table(title=f"{done} of {planned} cases, seed {board['made']['seed']}")
     for name in ("score", "reached", "target", ""):
         targets.add_column(name, justify="left" if name == "score" else "right")
     for target in board["targets"]:

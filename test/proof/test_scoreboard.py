@@ -160,7 +160,9 @@ def test_board_counts_and_serialises() -> None:
     assert board["pairs"]["both"]["share"] == 1.0
     assert board["unlisted"]["called_unlisted"]["share"] == 0.5
     assert board["effects"]["backlash"]["taken_for"] == {"end_stop": 1}
-    assert {target["id"]: target["met"] for target in board["targets"]}["nulls_silent"] is False
+    met = {target["id"]: target["met"] for target in board["targets"]}
+    assert met["nulls_silent"] is False
+    assert met["parameter_error"] is True  # 410 for 400: lower is better
 
 
 def test_empty_board_meets_and_misses_nothing() -> None:
