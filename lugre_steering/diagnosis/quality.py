@@ -9,13 +9,14 @@ and coarsely quantised recordings stay silent.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from lugre_steering.chain.model import Model, build_model
 from lugre_steering.diagnosis.dataset import GAP_S, angle_noise
 from lugre_steering.diagnosis.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
@@ -36,6 +37,10 @@ NOISE_S = 2.0
 NOISE_RATE_HZ = 20.0
 """Slower channels cannot tell noise from motion."""
 WINDOW_S = 1.0
+FORGOTTEN = 5.0
+"""Presliding lengths after which less than 1 % of a wrong bristle deflection is left."""
+PARKED = 0.02
+"""Share of a presliding length that a track at rest may seem to move by angle noise."""
 LATE_S = 1.0
 """A channel that starts later or ends earlier than the others by more than this is missing there."""
 FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
@@ -66,6 +71,11 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
         found, keep = _examine(channel, look, others, vehicle.sensors.pressure_range_Pa)
         findings += found
         clean[channel] = Signal(look.time[keep], look.value[keep])
+    for finding in _memory_lost(clean, build_model(vehicle)):
+        findings.append(finding)
+        for channel, signal in clean.items():
+            if channel.kind is not Kind.ANGLE:
+                clean[channel] = _without(signal, finding.intervals_s)
     usable = _with_signals(recording, clean)
     return Quality((*findings, *inspect_wiring(usable, vehicle)), usable)
 
@@ -191,6 +201,45 @@ def _white_noise(time: Array, value: Array, period: float) -> Array:
     slope = np.gradient(uniform_filter1d(value, _samples(0.1, period)), time)
     excess = sigma**2 - jitter**2 * uniform_filter1d(slope**2, width)
     return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
+
+
+def _without(signal: Signal, intervals: Intervals) -> Signal:
+    keep = np.ones(signal.time_s.size, bool)
+    for start, end in intervals:
+        keep &= (signal.time_s < start) | (signal.time_s > end)
+    return Signal(signal.time_s[keep], signal.value[keep])
+
+
+def _memory_lost(clean: Mapping[Channel, Signal], model: Model) -> Iterator[Finding]:
+    """Where motion went unseen in a gap of an angle, until friction has forgotten it.
+
+    The bristle holds what happened there: reversals, and the slower or faster sliding that set its level. An error of it falls
+    by e for each presliding length that the angle turns afterwards. Nothing is lost while the other track was seen at rest.
+    """
+    presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
+    angles = {channel: signal for channel, signal in clean.items() if channel.kind is Kind.ANGLE}
+    for channel, signal in angles.items():
+        time, lost = signal.time_s, []
+        for i in np.flatnonzero(np.diff(time) > GAP_S):
+            if any(_parked(other, time[i], time[i + 1], presliding) for c, other in angles.items() if c is not channel):
+                continue
+            after = slice(i + 1, None, _samples(0.2, float(np.median(np.diff(time)))))
+            turned = np.cumsum(np.abs(np.diff(signal.value[after], prepend=signal.value[i + 1])))
+            forgotten = np.searchsorted(turned, FORGOTTEN * presliding)
+            lost.append((float(time[i]), float(time[after][min(int(forgotten), turned.size - 1)])))
+        if lost:
+            statement = (
+                f"{channel.topic}: motion is missing in its gaps, so the friction torque is unknown until the angle has turned by "
+                f"{np.degrees(FORGOTTEN * presliding):.0f} deg; the measured torque is not used for {_total(tuple(lost)):.1f} s"
+            )
+            yield Finding("friction_memory_lost", channel.topic, statement, tuple(lost))
+
+
+def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool:
+    """This track was seen all the time between ``start`` and ``end`` [s] and hardly moved."""
+    inside = (signal.time_s >= start) & (signal.time_s <= end)
+    near = np.concatenate([[start], signal.time_s[inside], [end]])
+    return float(np.diff(near).max()) <= GAP_S and float(np.ptp(signal.value[inside])) < PARKED * presliding
 
 
 def _examine(
