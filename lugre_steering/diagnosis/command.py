@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -42,5 +43,7 @@ def run(
         progress("writing the report")
         from lugre_steering.report.diagnosis_report import write_report
 
-        write_report(result, out)
+        note = write_report(result, out).note
+        if note:
+            print(f"lugre-steering: {note}", file=sys.stderr)
     return result.json

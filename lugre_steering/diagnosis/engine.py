@@ -447,10 +447,10 @@ class _Conclusion:
             if effect["indistinguishable_from"]
         ]
         return (
-            f"The model leaves out {names}. With it the held-out error falls from {number(baseline['heldout_rmse_Nm'])} to "
-            f"{number(augmented['heldout_rmse_Nm'])} (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
+            f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
+            f"from {number(baseline['heldout_rmse_Nm'])} to {number(augmented['heldout_rmse_Nm'])} (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
             f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
-            + (f" {'; '.join(ties).capitalize()} with these data." if ties else "")
+            + (f" With these data {'; '.join(ties)}." if ties else "")
             + (f" Structure is left: {left}." if left else "")
         )
 
