@@ -80,7 +80,7 @@ def draw_confusion(board: Board, file: Path, made: str) -> None:
         "Effects at a ratio of 0.3 and above. A row is what was hidden, a column what was answered; 'right tie' means that the truth is "
         f"among the names the engine says it cannot tell apart. A dot marks the right column.\n{made}"
     )
-    with figure(1, 1, caption, file, row_inches=0.24 * len(rows) + 2.2, width=0.3 * len(columns) + 4.0) as axes:
+    with figure(1, 1, caption, file, row_inches=0.24 * len(rows) + 2.2, width=max(0.3 * len(columns) + 4.0, 7.0)) as axes:
         right = [["right tie", row] if row in board["effects"] and row not in _unlisted(board) else ["unlisted"] for row in rows]
         shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
         _matrix(axes[0, 0], shares, [[str(n) if n else "" for n in row] for row in counts])
@@ -89,7 +89,7 @@ def draw_confusion(board: Board, file: Path, made: str) -> None:
                 axes[0, 0].plot(j + 0.36, i - 0.33, ".", color=SERIES[1], markersize=4)
         axes[0, 0].set_xticks(range(len(columns)), columns, rotation=90, fontsize=7.5)
         axes[0, 0].set_yticks(range(len(rows)), rows, fontsize=7.5)
-        axes[0, 0].set(title="What was hidden (rows) and what was answered", xlabel="answer", ylabel="truth")
+        axes[0, 0].set(title="What was hidden and what was answered", xlabel="answer", ylabel="truth")
 
 
 def draw_location(board: Board, file: Path, made: str) -> None:
