@@ -114,15 +114,18 @@ def _concealed(hiding: Hiding) -> list[Concealed]:
 
 
 def _sized(concealed: Concealed, hiding: Hiding, sheet: Sheet) -> Concealed:
-    """Amplitude goes with the root of the variance; repeated, since nature's effects are not linear in their strength."""
-    strength = 1.0
-    for _ in range(4):
+    """Secant steps in the logarithms, from "amplitude goes with the root of the variance": nature is not linear in strength."""
+    strength, power, tried = 1.0, 2.0, []
+    for _ in range(6):
         sized = Concealed(concealed.id, strength, concealed.only_bag, concealed.from_time_s, concealed.barely)
         data = simulate_case(Case(hiding.seed, (sized,), hiding.noise), sheet)
-        ratio = recalibrated_variance(data) / noise_of(data)
-        if 0.8 < ratio / hiding.ratio < 1.25 or (ratio < hiding.ratio and strength == STRONGEST):
+        off = float(np.log(max(recalibrated_variance(data) / noise_of(data), 1e-12) / hiding.ratio))
+        if abs(off) < np.log(1.25) or (off < 0.0 and strength == STRONGEST):
             break
-        strength = min(strength * float(np.sqrt(hiding.ratio / max(ratio, 1e-12))), STRONGEST)
+        tried.append((np.log(strength), off))
+        if len(tried) > 1 and tried[-1][0] != tried[-2][0]:
+            power = float(np.clip((tried[-1][1] - tried[-2][1]) / (tried[-1][0] - tried[-2][0]), 1.0, 6.0))
+        strength = min(strength * float(np.exp(-off / power)), STRONGEST)
     return sized
 
 

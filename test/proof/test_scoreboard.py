@@ -258,7 +258,7 @@ def _short_manoeuvres(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_short_manoeuvres")
 def test_effects_are_scaled_to_the_wanted_ratio(sheet: Sheet) -> None:
-    for name, ratio in (("end_stop", 0.3), ("slope_bias", 10.0)):
+    for name, ratio in (("end_stop", 0.3), ("slope_bias", 10.0), ("distributed_contact", 0.3)):
         data = blind.make(campaign.Hiding("x", "single", (name,), ratio, "white", 11), sheet)
         reached = blind.recalibrated_variance(data) / blind.noise_of(data)
         assert 0.75 < reached / ratio < 1.3
