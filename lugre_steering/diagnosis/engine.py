@@ -448,7 +448,8 @@ class _Conclusion:
         ]
         return (
             f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
-            f"from {number(baseline['heldout_rmse_Nm'])} to {number(augmented['heldout_rmse_Nm'])} (improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
+            f"from {number(baseline['heldout_rmse_Nm'])} to {number(augmented['heldout_rmse_Nm'])} "
+            f"(improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
             f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
             + (f" With these data {'; '.join(ties)}." if ties else "")
             + (f" Structure is left: {left}." if left else "")
