@@ -71,7 +71,9 @@ def propose(coordinates: Mapping[str, Array], residual: Array, fit_weight: Array
         correlation = np.abs((matrix * fit_weight[:, None]).T @ left) / np.where(usable, norms, np.inf)
         correlation[chosen] = 0.0
         trial = [*chosen, int(np.argmax(correlation))]
-        trial_values: Array = np.linalg.lstsq(matrix[:, trial] * fit_weight[:, None], target, rcond=None)[0]
+        trial_values: Array = np.asarray(
+            np.linalg.lstsq(matrix[:, trial] * fit_weight[:, None], target, rcond=None)[0], np.float64
+        )
         held = float(np.sum(((residual - matrix[:, trial] @ trial_values) * held_weight) ** 2))
         if held > best_held - 0.02 * held_start:
             break
