@@ -133,6 +133,10 @@ def test_parameter_errors_use_the_meaning_not_the_number() -> None:
     elsewhere = row(["pressure_offset"], FOUND, effect("pressure_offset", main_b=(5e4, 1e3)))
     assert scoreboard.parameter_errors(elsewhere) == {}
     assert scoreboard.parameter_errors(row(["slope_bias"], FOUND, effect("pressure_offset", ties=["slope_bias"]))) == {}
+    stop = row(["end_stop"], FOUND, effect("end_stop", engage_angle=(0.5, 0.01), stiffness=(1e4, 10.0), cubic_stiffness=(4e6, 10.0)))
+    stop["truth"]["effects"][0]["parameters"] = {"threshold": 0.5, "k1": 2e4, "k3": 0.0}  # both reach 1000 N m after 0.05 rad
+    errors = scoreboard.parameter_errors(stop)
+    assert errors == {"end_stop.engage_angle": (0.0, True), "end_stop.secant": (pytest.approx(0.0), None)}
 
 
 def test_removed_is_the_share_of_what_noise_does_not_explain() -> None:
