@@ -168,7 +168,7 @@ def location(row: Row) -> float | None:
 
 
 def parameter_errors(row: Row) -> dict[str, tuple[float, bool | None]]:
-    """Relative error of each reported parameter that means the same as a true one, and whether its interval covers the truth (None without one).
+    """Relative error of each reported parameter that means the same as a true one, and whether its interval (if any) covers it.
 
     Keys are 'effect.parameter'. Only effects that bear the right name count: another law's parameters mean something else.
     """
