@@ -48,8 +48,8 @@ def seconds(message) -> float:
     [
         ("deg", np.pi / 180), ("mrad", 1e-3), ("mm", 1e-3), ("cm", 1e-2), ("bar", 1e5), ("mbar", 100.0), ("kPa", 1e3),
         ("MPa", 1e6), ("psi", 0.45359237 * 9.80665 / 0.0254**2), ("kN", 1e3), ("kN m", 1e3), ("ms", 1e-3), ("us", 1e-6),
-        ("ns", 1e-9), ("min", 60.0), ("rpm", 2 * np.pi / 60), ("deg/s", np.pi / 180), ("mm/s", 1e-3), ("K", 1.0 - 273.15),  # noqa: E501
-        ("rad", 1.0), ("m", 1.0), ("Pa", 1.0), ("N", 1.0), ("N m", 1.0), ("s", 1.0), ("rad/s", 1.0), ("m/s", 1.0), ("degC", 1.0),  # noqa: E501
+        ("ns", 1e-9), ("min", 60.0), ("rpm", 2 * np.pi / 60), ("deg/s", np.pi / 180), ("mm/s", 1e-3), ("K", 1.0 - 273.15),
+        ("rad", 1.0), ("m", 1.0), ("Pa", 1.0), ("N", 1.0), ("N m", 1.0), ("s", 1.0), ("rad/s", 1.0), ("m/s", 1.0), ("degC", 1.0),
     ],
 )  # fmt: skip
 def test_a_unit_is_what_its_definition_says(unit: str, one: float) -> None:
@@ -161,12 +161,12 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         ("schema: other\n", "key 'schema': got 'other'"),
         (HEAD + "channels: {}\n", "key 'channels': got {}"),
         (GOOD + "chanels: {}\n", "key 'chanels'.*did you mean 'channels'"),
-        (GOOD.replace("unit: deg", "unit: bar"), r"key 'channels.angle/left.unit': got 'bar', expected one of rad, mrad, deg"),  # noqa: E501
+        (GOOD.replace("unit: deg", "unit: bar"), r"key 'channels.angle/left.unit': got 'bar', expected one of rad, mrad, deg"),
         (GOOD.replace(", unit: deg", ""), r"channels.angle/left.unit': got nothing"),
         (GOOD.replace("column: a", "colum: a"), "colum'.*did you mean 'column'"),
         (GOOD.replace("angle/left", "angle/middle"), "got 'angle/middle', expected angle/left"),
         (GOOD.replace("angle/left", "pressure"), "got 'pressure', expected angle/left"),
-        (GOOD.replace("column: a,", "column: a, polynomial: [1.0], of: a,"), "exactly one of column, polynomial, cylinder"),  # noqa: E501
+        (GOOD.replace("column: a,", "column: a, polynomial: [1.0], of: a,"), "exactly one of column, polynomial, cylinder"),
         (GOOD.replace("column: a,", "polynomial: [1.0],"), "angle/left.of': got nothing"),
         (GOOD.replace("time: {column: t}\n", ""), "key 'time': got nothing"),
         (GOOD.replace("column: t", "column: t, unit: m"), "key 'time.unit': got 'm'"),
@@ -174,8 +174,8 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         (GOOD + "start_s: 2\nstop_s: 1\n", "key 'stop_s': got 1.0, expected more than start_s"),
         (GOOD + "epoch_s: -1\n", "key 'epoch_s': got -1"),
         (GOOD + "csv: {delimiter: ';;'}\n", "key 'csv.delimiter'"),
-        (GOOD.replace("angle/left: {column: a, unit: deg}", "rate/left: {column: a, unit: deg/s}"), "expected angle/left beside"),  # noqa: E501
-        (GOOD.replace("column: a, unit: deg", "cylinder: {cap: {column: a, unit: bar, area_m2: 1}}"), "for measured_torque only"),  # noqa: E501
+        (GOOD.replace("angle/left: {column: a, unit: deg}", "rate/left: {column: a, unit: deg/s}"), "expected angle/left beside"),
+        (GOOD.replace("column: a, unit: deg", "cylinder: {cap: {column: a, unit: bar, area_m2: 1}}"), "for measured_torque only"),
         ("[1, 2", "is not valid YAML"),
         ("- 1\n", "expected a mapping"),
     ],
