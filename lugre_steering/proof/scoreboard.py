@@ -56,7 +56,7 @@ SAME_MEANING: dict[str, tuple[Meaning, ...]] = {
     "angle_offset": (Meaning("offset", "offset"),),
     "angle_scale": (Meaning("scale", "scale"),),
     "yaw_inertia": (Meaning("inertia", "inertia"),),
-    "kingpin_jacking": (Meaning("amplitude", "amplitude"),),
+    "kingpin_jacking": (Meaning("slope", "slope"),),
     "slope_bias": (Meaning("torque", "torque"),),
     "cylinder_friction": (Meaning("coulomb", "coulomb"), Meaning("load_share", "load_share")),
     # Hidden losses follow the mean rate of both tracks, the catalogue's are of one track: half of the hidden one.
@@ -74,11 +74,18 @@ SAME_MEANING: dict[str, tuple[Meaning, ...]] = {
 STOP_DEPTH_RAD = 0.05
 
 
-def with_secant(parameters: Mapping[str, Any], linear: str, cubic: str) -> dict[str, Any]:
-    """Parameters of an end stop with its secant stiffness k1 + k3 x^2 at x = 0.05 rad: k1 and k3 trade places, this does not."""
-    if linear not in parameters:
-        return dict(parameters)
-    return {**parameters, "secant": parameters[linear] + parameters.get(cubic, 0.0) * STOP_DEPTH_RAD**2}
+def derived(parameters: Mapping[str, float]) -> dict[str, float]:
+    """Parameters, true or reported, with what their trade-offs leave alone, where the parameters for it are there.
+
+    ``secant``: stiffness k1 + k3 x^2 of an end stop at x = STOP_DEPTH_RAD. ``slope``: of a jacking torque about the middle [N m/rad].
+    """
+    out, get = dict(parameters), parameters.get
+    for linear, cubic in (("k1", "k3"), ("stiffness", "cubic_stiffness")):
+        if linear in parameters:
+            out["secant"] = parameters[linear] + get(cubic, 0.0) * STOP_DEPTH_RAD**2
+    if "amplitude" in parameters:
+        out["slope"] = parameters["amplitude"] + 2.0 * get("second_harmonic", 0.0)
+    return out
 
 
 TARGETS: dict[str, float] = {
@@ -175,10 +182,10 @@ def parameter_errors(row: Row) -> dict[str, tuple[float, bool | None]]:
     found: dict[str, tuple[float, bool | None]] = {}
     reported = {effect["id"]: effect["parameters"] for effect in row["diagnosis"]["effects"]} if row["diagnosis"] is not None else {}
     for hidden in row["truth"]["effects"]:
-        name, true = hidden["id"], with_secant(hidden["parameters"], "k1", "k3")
+        name, true = hidden["id"], derived(hidden["parameters"])
         if name not in reported:
             continue
-        values = with_secant({key: entry["value"] for key, entry in reported[name].items()}, "stiffness", "cubic_stiffness")
+        values = derived({key: entry["value"] for key, entry in reported[name].items()})
         for meaning in SAME_MEANING.get(name, ()):
             key = true["line"] if meaning.reported == "line" else meaning.reported
             in_time = bool(true.get("in_time", 0.0))

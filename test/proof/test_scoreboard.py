@@ -137,6 +137,9 @@ def test_parameter_errors_use_the_meaning_not_the_number() -> None:
     stop["truth"]["effects"][0]["parameters"] = {"threshold": 0.5, "k1": 2e4, "k3": 0.0}  # both reach 1000 N m after 0.05 rad
     errors = scoreboard.parameter_errors(stop)
     assert errors == {"end_stop.engage_angle": (0.0, True), "end_stop.secant": (pytest.approx(0.0), None)}
+    jacking = row(["kingpin_jacking"], FOUND, effect("kingpin_jacking", amplitude=(100.0, 1.0), second_harmonic=(70.0, 1.0)))
+    jacking["truth"]["effects"][0]["parameters"] = {"amplitude": 200.0, "caster_share": 0.4}  # slopes 240 and 200 N m/rad
+    assert scoreboard.parameter_errors(jacking) == {"kingpin_jacking.slope": (pytest.approx(0.2), None)}
 
 
 def test_removed_is_the_share_of_what_noise_does_not_explain() -> None:
