@@ -74,7 +74,7 @@ SAME_MEANING: dict[str, tuple[Meaning, ...]] = {
 STOP_DEPTH_RAD = 0.05
 
 
-def derived(parameters: Mapping[str, float]) -> dict[str, float]:
+def derived(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Parameters, true or reported, with what their trade-offs leave alone, where the parameters for it are there.
 
     ``secant``: stiffness k1 + k3 x^2 of an end stop at x = STOP_DEPTH_RAD. ``slope``: of a jacking torque about the middle [N m/rad].
