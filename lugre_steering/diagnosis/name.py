@@ -240,8 +240,22 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
         p.name for p in candidate.effect.parameters if p.name in candidate.free or p.name in dict(candidate.shapes)
     )
     effects = [*current.effects, (replace(candidate, free=free), score.values)]
-    result = fit(problem, weight, effects, current.x, evaluations=8)
-    return Trial(score, result, cost(problem, result, weight))
+    starts = [current.x]
+    if _cornered(problem, current):
+        # Recalibration ran into its bounds to imitate what is missing; from there the way back may be closed.
+        starts.append(problem.start())
+    fits = [fit(problem, weight, effects, start, evaluations=8) for start in starts]
+    costs = [cost(problem, result, weight) for result in fits]
+    best = int(np.argmin(costs))
+    return Trial(score, fits[best], costs[best])
+
+
+def _cornered(problem: Problem, current: Fit) -> bool:
+    """Whether a calibration value lies at a bound."""
+    low, high = problem.bounds()
+    count = len(problem.calibrations)
+    x = current.x[:count]
+    return bool(np.any((x < 0.98 * low[:count]) | (x > 0.98 * high[:count])))
 
 
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:

@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_toeplitz
+from scipy.linalg import solve_toeplitz, toeplitz
 from scipy.ndimage import uniform_filter1d
+from scipy.optimize import nnls
 from scipy.signal import lfilter
 
 from lugre_steering.chain.step import REST_RATE_RAD_S
@@ -23,7 +24,9 @@ from lugre_steering.diagnosis.problem import Candidate, Problem, Values, in_thre
 from lugre_steering.diagnosis.smoother import smooth_angle
 from lugre_steering.recording import Array
 
-AR_ORDER_S = 0.3
+AR_ORDER_S = 0.6
+CHUNK_S = 3.0
+MEMORIES_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
 MIN_QUIET_S = 3.0
 MOTION_PROFILE_S = 0.5
 
@@ -58,31 +61,44 @@ def standstill(run: Run, minimum_s: float = 1.0) -> list[slice]:
 def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     """Level and memory of the standardised torque noise from all standstill stretches (sheet values if they are too short).
 
-    Each stretch is freed of offset and drift first, which real holds may show.
+    Stretches are cut into chunks of one length and freed of offset and drift, which real holds may show. What that takes
+    away from a slow disturbance is put back: the chunks' autocovariance is explained by white noise and exponential memories
+    as they look after detrending, and exchanged for what those are before it.
     """
-    pieces = []
-    for run in runs:
-        for part in standstill(run):
-            t = run.time[part] - run.time[part][0]
-            trend = np.column_stack([np.ones_like(t), t])
-            y = run.measured[part] / run.sigma[part]
-            pieces.append(y - trend @ np.linalg.lstsq(trend, y, rcond=None)[0])
     dt = runs[0].time[1] - runs[0].time[0]
+    stretches = [run.measured[part] / run.sigma[part] for run in runs for part in standstill(run)]
     order = max(2, round(AR_ORDER_S / dt))
-    samples = sum(piece.size for piece in pieces)
-    if samples * dt < MIN_QUIET_S or samples < 8 * order:
+    size = min(round(CHUNK_S / dt), int(np.median([stretch.size for stretch in stretches]))) if stretches else 0
+    chunks = [s[k : k + size] for s in stretches for k in range(0, s.size - size + 1, max(size, 1))]
+    if size <= 2 * order or len(chunks) * size * dt < MIN_QUIET_S:
         return QuietNoise(1.0, np.zeros(1), 1.0)
-    covariance = np.zeros(order + 1)
-    for lag in range(order + 1):
-        covariance[lag] = sum(float(p[: p.size - lag] @ p[lag:]) for p in pieces if p.size > lag)
-    covariance /= samples
+    clean = _detrend(np.array(chunks).T)
+    seen = _autocovariance(clean, order)
+    memories = np.exp(-np.arange(size) / np.maximum(np.array(MEMORIES_S) / dt, 1e-9)[:, None])
+    memories[0] = np.arange(size) == 0
+    roots = (np.linalg.cholesky(toeplitz(memory) + 1e-9 * np.eye(size)) for memory in memories)
+    shrunk = size * np.array([_autocovariance(_detrend(root), order) for root in roots])
+    share, _ = nnls(shrunk.T, seen)
+    covariance = seen + share @ (memories[:, : order + 1] - shrunk)
     # Taper: beyond the noise of its own estimate a lag says nothing.
     significance = covariance / covariance[0]
-    significance[1:] = np.where(np.abs(significance[1:]) > 3.0 / np.sqrt(samples), significance[1:], 0.0)
+    significance[1:] = np.where(np.abs(significance[1:]) > 3.0 / np.sqrt(clean.size), significance[1:], 0.0)
     significance *= 1.0 - np.arange(order + 1) / (order + 1)
     coefficients = solve_toeplitz(significance[:-1], significance[1:])
     innovation = float(np.sqrt(max(1.0 - coefficients @ significance[1:], 0.02)))
     return QuietNoise(float(np.sqrt(covariance[0])), coefficients, innovation)
+
+
+def _detrend(columns: Array) -> Array:
+    """Columns (n, m) without offset and linear drift."""
+    trend = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, columns.shape[0]), 2))[0]
+    return np.asarray(columns - trend @ (trend.T @ columns))
+
+
+def _autocovariance(columns: Array, order: int) -> Array:
+    """Mean of x(t) x(t + lag) over the columns (n, m), for lags 0 ... order; each lag by the number of its products."""
+    n = columns.shape[0]
+    return np.array([np.mean(columns[: n - lag] * columns[lag:]) for lag in range(order + 1)])
 
 
 @dataclass(frozen=True)
