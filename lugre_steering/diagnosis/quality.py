@@ -264,7 +264,7 @@ def _examine(
     for first, last in stuck + clipped:
         keep[first : last + 1] = False
 
-    spikes = [(a, b) for a, b in look.runs(_spikes(look) & keep) if b - a < SPIKE_SAMPLES]
+    spikes = [(a, b) for a, b in look.runs(_spikes(look) & keep) if b - a < SPIKE_SAMPLES and _returns(look, a, b)]
     for first, last in spikes:
         keep[first : last + 1] = False
     noisy = _noise_change(look, keep)
@@ -351,17 +351,25 @@ def _moved(look: _Look, start: float, end: float) -> bool:
 
 
 def _spikes(look: _Look) -> Mask:
-    """Samples off the running median by SPIKE_SIGMA of the local scatter, more than the slope there can make."""
-    middle = median_filter(look.value, 2 * SPIKE_SAMPLES + 1, mode="nearest")
-    off = np.abs(look.value - middle)
+    """Samples off the running median by SPIKE_SIGMA of the local scatter and the slope of one sample."""
+    width = 2 * SPIKE_SAMPLES + 1
+    middle = median_filter(look.value, width, mode="nearest")
+    trend = uniform_filter1d(middle, width)
+    flat = look.value - trend  # on a slope an outlier would only swap ranks with its neighbours
+    off = np.abs(flat - median_filter(flat, width, mode="nearest"))
     scatter = 1.4826 * median_filter(off, _samples(WINDOW_S, look.period), mode="reflect")
-    # On a slope the median is often the sample itself, so the scatter alone is too small there.
     noise = 1.4826 * float(np.median(np.abs(np.convolve(look.value, FOURTH, mode="valid")))) / np.sqrt(FOURTH @ FOURTH)
-    least = max(look.floor, look.resolution, noise)
-    slope = np.abs(np.gradient(middle, look.time)) * look.period
-    steepest = uniform_filter1d(slope, 2 * SPIKE_SAMPLES + 1) * SPIKE_SAMPLES
-    found: Mask = off > SPIKE_SIGMA * np.maximum(scatter, least) + steepest
+    steepest = uniform_filter1d(np.abs(np.gradient(trend, look.time)) * look.period, width)
+    limit = SPIKE_SIGMA * np.maximum(scatter, max(look.floor, look.resolution, noise)) + steepest
+    found: Mask = (off > limit) & (np.abs(look.value - middle) > 0.5 * limit)  # the latter is blind to steps
     return found
+
+
+def _returns(look: _Look, first: int, last: int) -> bool:
+    """The signal goes on after an excursion about where it was before: not the front of a step or of a decaying pulse."""
+    before, after = look.value[max(first - 1, 0)], look.value[min(last + 1, look.value.size - 1)]
+    height = np.abs(look.value[first : last + 1] - 0.5 * (before + after)).min()
+    return bool(abs(after - before) < 0.5 * height)
 
 
 def _noise_change(look: _Look, keep: Mask) -> list[tuple[int, int]]:

@@ -128,8 +128,10 @@ def _torques(model: Model, run: Run) -> Array:
 def _error(run: Run, measured: Array, expected: Array) -> float:
     """Relative error of the expected torque, both about their means, with a gain within GAIN."""
     a, b = measured[run.valid] - measured[run.valid].mean(), expected[run.valid] - expected[run.valid].mean()
-    gain = float(np.clip(float(a @ b) / max(float(b @ b), 1e-30), 1.0 / GAIN, GAIN))
-    return float(np.linalg.norm(a - gain * b) / max(float(np.linalg.norm(a)), gain * float(np.linalg.norm(b)), 1e-30))
+    # Plain sums: threads of a linear algebra library cost more than they save here.
+    aa, ab, bb = float(np.sum(a * a)), float(np.sum(a * b)), float(np.sum(b * b))
+    gain = float(np.clip(ab / max(bb, 1e-30), 1.0 / GAIN, GAIN))
+    return float(np.sqrt(max(aa - 2.0 * gain * ab + gain**2 * bb, 0.0) / max(aa, gain**2 * bb, 1e-30)))
 
 
 def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | None:
@@ -278,7 +280,7 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
             record["sigma_0"] *= softer
             record["backlash_width"] += play * presliding
         expected = slope(_torques(trial, run).sum(axis=0))[reach : reach + window]
-        power = max(float(expected @ expected), 1e-30)
+        power = max(float(np.sum(expected**2)), 1e-30)
         overlap = correlate(measured, expected, mode="valid")
         gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
         left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(energy, 1e-30)

@@ -1,0 +1,409 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Faults injected into synthetic recordings are found by name, topic and stretch; sound recordings have no finding.
+
+Recordings come from the second simulator, which shares no code with the estimator; the oracle of every stretch is where the
+fault was put in, the oracle of the calibration is the recording before the fault.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lugre_steering import vehicle as vehicle_file
+from lugre_steering.bag import read_recording
+from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.problem import Problem, fit
+from lugre_steering.diagnosis.quality import inspect
+from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
+from lugre_steering.recording import Finding, Recording, Signal
+from lugre_steering.resources import config_folder
+from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep, motion_of
+from lugre_steering.simulate.run import sensing_of, simulate
+from lugre_steering.vehicle import Contact, TorqueSensor, Vehicle
+
+Array = NDArray[np.float64]
+Edit = Callable[[Signal], Signal]
+Fault = Callable[[Recording], Recording]
+
+SHEET_FILE = config_folder() / "test_vehicle.yaml"
+VEHICLE = vehicle_file.load(SHEET_FILE)
+SHEET = load_sheet(SHEET_FILE)
+LINES = ("main_a", "main_b", "aux_a", "aux_b")
+CONFORMANCE = Path(__file__).resolve().parents[3] / "shared" / "conformance"
+LEFT, RIGHT = "steering/left/joint_state", "steering/right/joint_state"
+PRESSURE = {line: f"steering/pressure/{line}" for line in LINES}
+EVERY_LINE = ", ".join(PRESSURE.values())
+RIG = Vehicle(
+    schema=vehicle_file.SCHEMA, name="rig", sides=("left",), torque_sensor=TorqueSensor(noise_Nm=20.0),
+    contact=Contact(
+        static_torque_Nm=9000.0, coulomb_torque_Nm=8000.0, stiffness_Nm_per_deg=4000.0, stribeck_speed_deg_s=1.5
+    ),
+)  # fmt: skip
+
+
+def recording_of(bag: BagData) -> Recording:
+    angle = {side: Signal(s.time, s.value) for side, s in zip(("left", "right"), bag.angles, strict=True)}
+    pressure = {line: Signal(s.time, s.value) for line, s in zip(SHEET.lines, bag.pressures, strict=True)}
+    return Recording(bag.manoeuvre, 0, angle, pressure)
+
+
+@pytest.fixture(scope="module")
+def sound() -> Recording:
+    """Nothing wrong, nothing hidden; the left track moves in most of 20 ... 30 s."""
+    return recording_of(simulate_case(Case(107, manoeuvres=("loops", "chirp")), SHEET).bags[0])
+
+
+@pytest.fixture(scope="module")
+def reference(sound: Recording) -> Array:
+    return calibration(sound)
+
+
+def calibration(recording: Recording) -> Array:
+    """Fitted friction level, static ratio, stiffness, Stribeck speed (logarithms, ratio); heat is too slow to judge by."""
+    run = prepare(recording, VEHICLE)
+    return fit(Problem(VEHICLE, [run]), np.where(run.valid, 1.0 / run.sigma, 0.0)).x[:4]
+
+
+def angle(side: str, edit: Edit) -> Fault:
+    return lambda r: replace(r, angle={**r.angle, side: edit(r.angle[side])})
+
+
+def pressure(edit: Edit, *lines: str) -> Fault:
+    return lambda r: replace(r, pressure={name: edit(s) if name in lines else s for name, s in r.pressure.items()})
+
+
+def scaled(factor: float) -> Edit:
+    return lambda s: Signal(s.time_s, s.value * factor)
+
+
+def later(delay_s: float) -> Edit:
+    return lambda s: Signal(s.time_s + delay_s, s.value)
+
+
+def between(start: float, end: float, change: Callable[[Array], Array]) -> Edit:
+    def edit(s: Signal) -> Signal:
+        inside = (s.time_s >= start) & (s.time_s < end)
+        value = s.value.copy()
+        value[inside] = change(value[inside])
+        return Signal(s.time_s, value)
+
+    return edit
+
+
+def missing(start: float, end: float) -> Edit:
+    def edit(s: Signal) -> Signal:
+        keep = (s.time_s < start) | (s.time_s >= end)
+        return Signal(s.time_s[keep], s.value[keep])
+
+    return edit
+
+
+def noisier(sigma: float) -> Callable[[Array], Array]:
+    return lambda value: value + sigma * np.random.default_rng(5).standard_normal(value.size)
+
+
+def frozen(value: Array) -> Array:
+    return np.full(value.size, value[0])
+
+
+def exchanged(*pairs: tuple[str, str]) -> Fault:
+    swap = {a: b for pair in pairs for a, b in (pair, pair[::-1])}
+    return lambda r: replace(r, pressure={line: r.pressure[swap.get(line, line)] for line in r.pressure})
+
+
+def overlap(found: tuple[tuple[float, float], ...], true: list[tuple[float, float]]) -> float:
+    """Intersection over union of two sets of stretches, on a grid of a millisecond."""
+    a, b = np.zeros(305_000, bool), np.zeros(305_000, bool)
+    for grid, stretches in ((a, found), (b, true)):
+        for start, end in stretches:
+            grid[round(1e3 * (start + 5.0)) : round(1e3 * (end + 5.0))] = True
+    return float((a & b).sum() / (a | b).sum())
+
+
+def names(findings: tuple[Finding, ...]) -> list[tuple[str, str]]:
+    return [(f.finding, f.topic) for f in findings]
+
+
+STRETCH = {
+    "stuck angle": ("stuck_sensor", LEFT, angle("left", between(20.0, 25.0, frozen)), (20.0, 25.0)),
+    "stuck pressure": ("stuck_sensor", PRESSURE["main_a"], pressure(between(60.0, 62.0, frozen), "main_a"), (60.0, 62.0)),
+    "broken wire": ("stuck_sensor", PRESSURE["main_b"], pressure(between(20.0, 25.0, np.zeros_like), "main_b"), (20.0, 25.0)),
+    "lost angle": ("dropout", RIGHT, angle("right", missing(30.0, 33.0)), (30.0, 33.0)),
+    "lost pressure": ("dropout", PRESSURE["aux_a"], pressure(missing(30.0, 30.4), "aux_a"), (30.0, 30.4)),
+    "noisy angle": ("noise_change", LEFT, angle("left", between(20.0, 26.0, noisier(math.radians(0.06)))), (20.0, 26.0)),
+    "noisy pressure": ("noise_change", PRESSURE["aux_b"], pressure(between(20.0, 26.0, noisier(6e4)), "aux_b"), (20.0, 26.0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", STRETCH)
+def test_bad_stretches_are_found_and_left_out(fault: str, sound: Recording, reference: Array) -> None:
+    name, topic, inject, stretch = STRETCH[fault]
+    quality = inspect(inject(sound), VEHICLE)
+    assert [f for f in names(quality.findings) if f[0] != "friction_memory_lost"] == [(name, topic)]
+    (found,) = (f for f in quality.findings if f.finding == name)
+    assert overlap(found.intervals_s, [stretch]) > 0.8
+    assert topic in found.statement
+    assert not quality.blocking
+    run = prepare(quality.recording, VEHICLE)
+    inside = (run.time > stretch[0] + 0.1) & (run.time < stretch[1] - 0.1)
+    assert not run.valid[inside].any()
+    np.testing.assert_allclose(calibration(quality.recording), reference, atol=0.03)
+
+
+@pytest.mark.parametrize("channel", ["angle", "pressure"])
+def test_spikes_are_removed(channel: str, sound: Recording, reference: Array) -> None:
+    signal = sound.angle["left"] if channel == "angle" else sound.pressure["aux_b"]
+    size = math.radians(1.0) if channel == "angle" else 4e5  # a hundredth of the range
+    at = np.arange(300, signal.value.size - 300, 613)
+    at = np.sort(np.concatenate([at, at[::3] + 1]))  # some last two samples
+    value = signal.value.copy()
+    value[at] += size * np.random.default_rng(2).choice([-1.0, 1.0], at.size)
+    edit: Edit = lambda s: Signal(s.time_s, value)  # noqa: E731
+    bad = (angle("left", edit) if channel == "angle" else pressure(edit, "aux_b"))(sound)
+    quality = inspect(bad, VEHICLE)
+    (found,) = quality.findings
+    assert (found.finding, found.topic) == ("spikes", LEFT if channel == "angle" else PRESSURE["aux_b"])
+    assert overlap(found.intervals_s, [(signal.time_s[i] - 0.005, signal.time_s[i] + 0.005) for i in at]) > 0.8
+    kept = quality.recording.angle["left"] if channel == "angle" else quality.recording.pressure["aux_b"]
+    np.testing.assert_array_equal(kept.time_s, np.delete(signal.time_s, at))
+    np.testing.assert_allclose(calibration(quality.recording), reference, atol=0.03)
+
+
+@pytest.mark.parametrize("channel", ["angle", "pressure"])
+def test_a_limit_of_the_sensor_is_found(channel: str, sound: Recording, reference: Array) -> None:
+    signal = sound.angle["left"] if channel == "angle" else sound.pressure["main_a"]
+    limit = 0.75 * float(signal.value.max())
+    cut: Edit = lambda s: Signal(s.time_s, np.minimum(s.value, limit))  # noqa: E731
+    quality = inspect((angle("left", cut) if channel == "angle" else pressure(cut, "main_a"))(sound), VEHICLE)
+    wanted = ("clipped_angle", LEFT) if channel == "angle" else ("saturation", PRESSURE["main_a"])
+    assert [f for f in names(quality.findings) if f[0] != "friction_memory_lost"] == [wanted]
+    beyond = signal.value >= limit
+    true = [(t - 0.005, t + 0.005) for t in signal.time_s[beyond]]
+    assert overlap(quality.findings[0].intervals_s, true) > 0.8
+    kept = quality.recording.angle["left"] if channel == "angle" else quality.recording.pressure["main_a"]
+    assert (kept.value >= limit).mean() < 0.01 * beyond.mean()
+    np.testing.assert_allclose(calibration(quality.recording)[:3], reference[:3], atol=0.03)
+
+
+def test_pressure_at_the_range_of_its_sensor(sound: Recording) -> None:
+    low = VEHICLE.replace(sensors=replace(VEHICLE.sensors, pressure_range_Pa=8e6))
+    cut: Edit = lambda s: Signal(s.time_s, np.minimum(s.value, 8e6))  # noqa: E731
+    findings = inspect(pressure(cut, "main_b")(sound), low).findings
+    assert ("saturation", PRESSURE["main_b"]) in names(findings)
+
+
+def test_a_dead_line_is_stuck_all_the_time(sound: Recording) -> None:
+    (found,) = inspect(pressure(scaled(0.0), "main_b")(sound), VEHICLE).findings
+    assert (found.finding, found.topic) == ("stuck_sensor", PRESSURE["main_b"])
+    assert overlap(found.intervals_s, [(0.0, float(sound.pressure["main_b"].time_s[-1]))]) > 0.99
+
+
+def test_a_large_drift_of_a_zero(sound: Recording) -> None:
+    drifting = pressure(lambda s: Signal(s.time_s, s.value + 6e3 * s.time_s), "aux_a")
+    quality = inspect(drifting(sound), VEHICLE)
+    assert names(quality.findings) == [("zero_drift", PRESSURE["aux_a"])]
+    assert not quality.blocking
+    assert "pressure_drift" in quality.findings[0].statement
+    bar = float(quality.findings[0].statement.split("drifts by ")[1].split(" bar")[0])
+    assert bar == pytest.approx(6e3 * float(sound.angle["left"].time_s[-1]) / 1e5, rel=0.15)
+
+
+BLOCKING: dict[str, tuple[str, str, Fault, str]] = {
+    "left sign": ("sign_flipped", LEFT, angle("left", scaled(-1.0)), ""),
+    "right sign": ("sign_flipped", RIGHT, angle("right", scaled(-1.0)), ""),
+    "both signs": (
+        "sign_flipped", f"{LEFT}, {RIGHT}", lambda r: angle("left", scaled(-1.0))(angle("right", scaled(-1.0))(r)), "",
+    ),
+    "left in degrees": ("unit_suspect", LEFT, angle("left", scaled(180.0 / math.pi)), "0.0174533"),
+    "pressures in bar": ("unit_suspect", EVERY_LINE, pressure(scaled(1e-5), *LINES), "bar (multiply by 100000)"),
+    "pressures in MPa": ("unit_suspect", EVERY_LINE, pressure(scaled(1e-6), *LINES), "MPa (multiply by 1e+06)"),
+    "pressures in kPa": ("unit_suspect", EVERY_LINE, pressure(scaled(1e-3), *LINES), "kPa (multiply by 1000)"),
+    "one line in bar": ("unit_suspect", PRESSURE["aux_a"], pressure(scaled(1e-5), "aux_a"), "bar"),
+    "main lines": ("swapped_lines", f"{PRESSURE['main_a']}, {PRESSURE['main_b']}", exchanged(("main_a", "main_b")), ""),
+    "auxiliary lines": ("swapped_lines", f"{PRESSURE['aux_a']}, {PRESSURE['aux_b']}", exchanged(("aux_a", "aux_b")), ""),
+    "across circuits": ("swapped_lines", f"{PRESSURE['main_b']}, {PRESSURE['aux_a']}", exchanged(("main_b", "aux_a")), ""),
+    "both circuits": ("swapped_lines", EVERY_LINE, exchanged(("main_a", "main_b"), ("aux_a", "aux_b")), ""),
+    "sides": (
+        "swapped_angles", f"{LEFT}, {RIGHT}",
+        lambda r: replace(r, angle={"left": r.angle["right"], "right": r.angle["left"]}), "",
+    ),
+    "pressures late": ("clock_skew", EVERY_LINE, pressure(later(0.15), *LINES), "too late"),
+    "pressures early": ("clock_skew", EVERY_LINE, pressure(later(-1.2), *LINES), "too early"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", BLOCKING)
+def test_wrong_wiring_stops_the_diagnosis(fault: str, sound: Recording) -> None:
+    name, topic, inject, said = BLOCKING[fault]
+    quality = inspect(inject(sound), VEHICLE)
+    assert names(quality.findings) == [(name, topic)]
+    assert quality.blocking == quality.findings
+    assert said in quality.findings[0].statement
+    start, end = float(sound.angle["left"].time_s[0]), float(sound.angle["left"].time_s[-1])
+    assert overlap(quality.findings[0].intervals_s, [(start, end)]) > 0.8
+
+
+@pytest.mark.parametrize("skew_s", [0.15, -0.3])
+def test_the_size_of_a_skew(skew_s: float, sound: Recording) -> None:
+    (found,) = inspect(pressure(later(skew_s), *LINES)(sound), VEHICLE).findings
+    seconds = float(found.statement.split("stamped ")[1].split(" s")[0])
+    assert seconds == pytest.approx(abs(skew_s), abs=0.04)
+
+
+def test_one_angle_in_degrees_that_reading_refused(sound: Recording) -> None:
+    """Reading leaves out angles beyond half a turn; what is left looks small, the count does not."""
+    degrees = scaled(180.0 / math.pi)(sound.angle["left"])
+    keep = np.abs(degrees.value) <= math.pi
+    rejected = {LEFT: {"absurd_value": int((~keep).sum())}}
+    bad = replace(angle("left", lambda s: Signal(s.time_s[keep], degrees.value[keep]))(sound), rejected=rejected)
+    quality = inspect(bad, VEHICLE)
+    assert ("unit_suspect", LEFT) in names(quality.blocking)
+    assert ("rejected_samples", LEFT) in names(quality.findings)
+
+
+def test_small_angles_in_degrees() -> None:
+    """Below a quarter turn by number: the nominal model tells."""
+    small = Manoeuvre("small", "", (Hold(2.0), *(Sweep(1.2 * (-1.0) ** i, 0.5, 1.0) for i in range(6))))
+    made = simulate(VEHICLE, motion_of(small, VEHICLE), sensing_of(VEHICLE))
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    recording = Recording(
+        "small", 0, {side: signals[side] for side in VEHICLE.sides}, {line: signals[line] for line in LINES}
+    )
+    assert inspect(recording, VEHICLE).findings == ()
+    degrees = scaled(180.0 / math.pi)
+    quality = inspect(angle("left", degrees)(angle("right", degrees)(recording)), VEHICLE)
+    assert names(quality.findings) == [("unit_suspect", f"{LEFT}, {RIGHT}")]
+
+
+def test_what_reading_found_is_kept(sound: Recording) -> None:
+    damaged = Finding("damaged_bag", "", "a chunk is damaged")
+    bad = replace(sound, findings=(damaged,), rejected={LEFT: {"not_finite": 3, "zero_stamp": 2}})
+    found = inspect(bad, VEHICLE).findings
+    assert names(found) == [("damaged_bag", ""), ("rejected_samples", LEFT)]
+    assert "5 messages" in found[1].statement
+    assert "3 not finite" in found[1].statement
+
+
+def test_rates_go_with_their_angles(sound: Recording) -> None:
+    rates = {"left": Signal(sound.angle["left"].time_s, np.zeros(sound.angle["left"].value.size))}
+    bad = angle("left", between(20.0, 25.0, frozen))(replace(sound, rate=rates))
+    kept = inspect(bad, VEHICLE).recording.rate["left"]
+    assert not ((kept.time_s > 20.0) & (kept.time_s < 25.0)).any()
+    assert kept.time_s.size > 0.9 * rates["left"].time_s.size
+
+
+def test_torque_unknown_after_a_gap_is_said_and_not_used(sound: Recording) -> None:
+    quality = inspect(angle("left", between(20.0, 25.0, frozen))(sound), VEHICLE)
+    (memory,) = (f for f in quality.findings if f.finding == "friction_memory_lost")
+    (start, end) = memory.intervals_s[0]
+    turned = np.abs(np.diff(np.interp(np.arange(25.0, end, 0.2), *_arrays(sound.angle["left"])))).sum()
+    presliding_deg = 0.75 * _lever() / VEHICLE.friction.stiffness_Nm_per_deg  # type: ignore[union-attr]
+    assert math.degrees(turned) == pytest.approx(5.0 * presliding_deg, rel=0.1)
+    run = prepare(quality.recording, VEHICLE)
+    assert not run.valid[(run.time > start + 0.1) & (run.time < end - 0.1)].any()
+
+
+def _arrays(signal: Signal) -> tuple[Array, Array]:
+    return signal.time_s, signal.value
+
+
+def _lever() -> float:
+    """Sum of roller loads times radii [N m], from the sheet as the second simulator reads it."""
+    return float(np.sum(SHEET.roller_load_N * np.hypot(SHEET.roller_x_m, SHEET.hinge_offset_m)))
+
+
+@pytest.mark.parametrize("noise", ["white", "coloured", "ripple"])
+def test_silent_on_sound_recordings(noise: str) -> None:
+    for bag in simulate_case(Case(7, noise=noise, manoeuvres=("sweeps", "decaying")), SHEET).bags:  # type: ignore[arg-type]
+        assert inspect(recording_of(bag), VEHICLE).findings == ()
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("backlash", "time_delay"), ("linkage_compliance", "pressure_lag"), ("end_stop", "relief_saturation"),
+        ("cylinder_friction", "pressure_drift"),
+    ],
+)  # fmt: skip
+def test_silent_on_hidden_physics(first: str, second: str) -> None:
+    case = Case(41, (Concealed(first, 2.0), Concealed(second, 2.0)), noise="ripple", manoeuvres=("decaying", "chirp"))
+    for bag in simulate_case(case, SHEET).bags:
+        assert inspect(recording_of(bag), VEHICLE).findings == ()
+
+
+@pytest.mark.skipif(not CONFORMANCE.exists(), reason="conformance recordings are not beside the project")
+@pytest.mark.parametrize("bag", ["baseline_clean", "baseline_noisy"])
+def test_silent_on_the_conformance_recordings(bag: str) -> None:
+    assert inspect(read_recording(CONFORMANCE / bag, VEHICLE.channels), VEHICLE).findings == ()
+
+
+@pytest.mark.parametrize(("angle_deg", "pressure_Pa"), [(0.0, 0.0), (0.0055, 763.0), (0.1, 5e4)])
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_parked_values_repeat_without_being_stuck(angle_deg: float, pressure_Pa: float, noise: float) -> None:
+    """Noise-free, or coarser than the noise: held angles and pressures stand still for seconds."""
+    held = Manoeuvre("held", "", (Hold(4.0), *(Sweep(20.0 * (-1.0) ** i, 8.0, 4.0) for i in range(5))))
+    sensing = replace(
+        sensing_of(VEHICLE), angle_resolution_deg=angle_deg, pressure_resolution_Pa=pressure_Pa,
+        angle_noise_deg=noise * angle_deg, pressure_noise_Pa=noise * pressure_Pa,
+    )  # fmt: skip
+    made = simulate(VEHICLE, motion_of(held, VEHICLE), sensing)
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    recording = Recording(
+        "held", 0, {side: signals[side] for side in VEHICLE.sides}, {line: signals[line] for line in LINES}
+    )
+    assert inspect(recording, VEHICLE).findings == ()
+
+
+def rig_recording() -> Recording:
+    sweeps = Manoeuvre("rig", "", (Hold(2.0), *(Sweep(15.0 * (-1.0) ** i, 4.0 + i, 2.0) for i in range(6))))
+    made = simulate(RIG, motion_of(sweeps, RIG), sensing_of(RIG))
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    return Recording("rig", 0, {"left": signals["left"]}, {}, measured_torque=signals["torque"])
+
+
+@pytest.mark.parametrize(
+    ("edit", "name"),
+    [(None, None), (scaled(-1.0), "sign_flipped"), (scaled(1e-3), "unit_suspect"), (later(0.3), "clock_skew")],
+)
+def test_a_torque_sensor(edit: Edit | None, name: str | None) -> None:
+    recording = rig_recording()
+    assert recording.measured_torque is not None
+    if edit is not None:
+        recording = replace(recording, measured_torque=edit(recording.measured_torque))
+    found = inspect(recording, RIG).findings
+    assert names(found) == ([] if name is None else [(name, "steering/measured_torque")])
+    if name == "sign_flipped":
+        assert f"{LEFT}: the sign is flipped" in found[0].statement  # the data cannot tell which of the two
+
+
+def test_pulses_with_a_tail_are_physics() -> None:
+    """A drive that pushes: up in one sample, down over fifteen (as real drives do); nothing to remove."""
+    recording = rig_recording()
+    torque = recording.measured_torque
+    assert torque is not None
+    pulse = np.zeros(torque.value.size)
+    pulse[200::150] = 1.0
+    pushed = torque.value + 3000.0 * np.convolve(pulse, np.linspace(1.0, 0.0, 15))[: pulse.size]
+    assert inspect(replace(recording, measured_torque=Signal(torque.time_s, pushed)), RIG).findings == ()
+
+
+@pytest.mark.parametrize("left", [0, 5])
+def test_too_little_data_is_no_error(left: int, sound: Recording) -> None:
+    short = angle("left", lambda s: Signal(s.time_s[:left], s.value[:left]))(sound)
+    assert not inspect(short, VEHICLE).blocking
+    assert inspect(Recording("empty", 0, {}, {}), VEHICLE).findings == ()
+
+
+def test_it_is_quick(sound: Recording) -> None:
+    began = time.process_time()
+    inspect(sound, VEHICLE)
+    assert time.process_time() - began < 2.0  # 0.2 to 0.5 s alone on a core; this machine may be shared
