@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.errors import LugreSteeringError
 from lugre_steering.proof import hydraulics
 from lugre_steering.proof.campaign import Hiding
 from lugre_steering.proof.sensors import PERIOD_S
@@ -238,7 +240,10 @@ def run_all(
                 break
             done, running = wait(running, return_when=FIRST_COMPLETED)
             for future in done:
-                rows.append(future.result())
+                try:
+                    rows.append(future.result())
+                except BrokenProcessPool as error:
+                    raise LugreSteeringError("prove: a worker died, perhaps for want of memory; finished cases are kept") from error
                 log.write(json.dumps(rows[-1]) + "\n")
                 log.flush()
             progress("cases", len(rows), len(cases))
