@@ -368,8 +368,9 @@ def _spikes(look: _Look) -> Mask:
 def _returns(look: _Look, first: int, last: int) -> bool:
     """The signal goes on after an excursion about where it was before: not the front of a step or of a decaying pulse."""
     before, after = look.value[max(first - 1, 0)], look.value[min(last + 1, look.value.size - 1)]
-    height = np.abs(look.value[first : last + 1] - 0.5 * (before + after)).min()
-    return bool(abs(after - before) < 0.5 * height)
+    height = float(np.abs(look.value[first : last + 1] - 0.5 * (before + after)).min())
+    usual = float(np.median(np.abs(np.diff(look.value[max(first - 10, 0) : last + 11]))))
+    return bool(abs(after - before) < 0.5 * height + (last - first + 2) * usual)
 
 
 def _noise_change(look: _Look, keep: Mask) -> list[tuple[int, int]]:
