@@ -52,7 +52,8 @@ EFFECT_FIELDS = (
     # parallel torque
     "end_stop_engage_angle", "end_stop_stiffness", "end_stop_cubic_stiffness", "end_stop_loss",
     "end_stop_damping", "end_stop_shift",
-    "yaw_inertia_inertia", "kingpin_jacking_amplitude", "kingpin_jacking_second_harmonic", "slope_bias_torque",
+    "yaw_inertia_inertia", "kingpin_jacking_amplitude", "kingpin_jacking_second_harmonic",
+    "kingpin_jacking_even", "slope_bias_torque",
     "soil_shear_torque", "soil_shear_span", "soil_shear_growth",
     # measurement: torque the actuators must deliver on top
     "cylinder_friction_coulomb", "cylinder_friction_load_share", "cylinder_friction_viscous",

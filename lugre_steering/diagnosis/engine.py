@@ -143,11 +143,12 @@ class _Conclusion:
     def diagnosis(self, findings: list[dict[str, Any]]) -> Diagnosis:
         problem, roles, found = self.problem, self.roles, self.found
         gain, interval = verify.improvement(problem, found.baseline, found.final, roles, self.seed)
-        named = bool(found.found) and interval[0] > 0.0
+        # The search has already tested significance; held-out data must not contradict it (they may hardly see the effect).
+        named = bool(found.found) and gain > 0.0
         final = found.final if named else found.baseline
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         whole = fit(problem, weight, final.effects, final.x, evaluations=12)
-        residual = problem.measured - final.prediction
+        residual = problem.measured - found.final.prediction
         left, left_text, structured = self._left_over(residual, final)
         if named:
             verdict = "missing_physics"
@@ -199,6 +200,8 @@ class _Conclusion:
         covariance = verify.robust_covariance(problem, whole, weight, self.roles.cluster)
         position, entries = problem.nuisances, []
         start = name.cost(problem, found.baseline, np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0))
+        removed = start - name.cost(problem, found.final, np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0))
+        total = sum(item.gain for item in found.found)
         amplitude = float(np.percentile(np.abs(problem.measured), 99.0))
         for index, ((candidate, values), item) in enumerate(zip(whole.effects, found.found, strict=True)):
             parameters = {}
@@ -213,7 +216,7 @@ class _Conclusion:
             part = locate.contribution(problem, whole, index)
             size = float(np.max(np.abs(part)))
             where = self._where(candidate, part)
-            share = float(np.clip(item.gain / max(start, 1e-9), 0.0, 1.0))
+            share = float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0))
             rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
             label = "material" if size > self.material * amplitude else "small"
             entries.append({

@@ -27,8 +27,8 @@ decade above, and at most. Strong signals show more of their shape, so a right n
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
 TIE_T = 2.5
-TIE_GAIN = 0.93
-"""A rival must gain at least this share of what the best gains to be tied with it."""
+TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
+"""A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
     effects = [*current.effects, (replace(candidate, free=free), score.values)]
     starts = [current.x]
     if _cornered(problem, current):
-        # Recalibration ran into its bounds to imitate what is missing; from there the way back may be closed.
+        # Recalibration was bent to imitate what is missing; from there the way back may be closed.
         starts.append(problem.start())
     fits = [fit(problem, weight, effects, start, evaluations=8) for start in starts]
     costs = [cost(problem, result, weight) for result in fits]
@@ -251,11 +251,9 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
 
 
 def _cornered(problem: Problem, current: Fit) -> bool:
-    """Whether a calibration value lies at a bound."""
-    low, high = problem.bounds()
-    count = len(problem.calibrations)
-    x = current.x[:count]
-    return bool(np.any((x < 0.98 * low[:count]) | (x > 0.98 * high[:count])))
+    """Whether a calibration value lies implausibly far from the sheet."""
+    prior = np.array([calibration.prior for calibration in problem.calibrations])
+    return bool(np.any(np.abs(current.x[: prior.size]) > 2.0 * prior))
 
 
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
@@ -295,7 +293,7 @@ def tied(
             continue
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
-        close = before - other.cost > TIE_GAIN * (before - best.cost)
+        close = other.cost - best.cost < TIE_MISFIT * misfit + TIE_ENERGY * samples
         if (close and t < TIE_T) or other.cost - best.cost < 0.1 * misfit + 10.0:
             found.append(other)
     return found

@@ -29,12 +29,13 @@ EFFECTS = (
     ),
     Effect(
         "kingpin_jacking", "parallel_torque", 1, "Jacking torque of the inclined kingpin",
-        "M = amplitude sin(theta) + second_harmonic sin(2 theta)",
+        "M = amplitude sin(theta) + second_harmonic sin(2 theta) + even sin(theta)^2",
         "Reimpell, Stoll, Betzler, The Automotive Chassis (2001); Pacejka, Tire and Vehicle Dynamics, ch. 9",
         "the mean of both sweep branches is a function of the angle", "steering angle",
         (
             Parameter("amplitude", "N m", "of one track", 500.0, -5e4, 5e4),
             Parameter("second_harmonic", "N m", "of one track", 300.0, -5e4, 5e4, optional=True),
+            Parameter("even", "N m", "caster part of one track", 300.0, -5e4, 5e4, optional=True),
         ),
         ("moment_arm_error", "angle_scale"),
     ),
