@@ -267,7 +267,7 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
     richer = replace(candidate, free=candidate.free + tuple(optional))
     result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=12)
-    deviation = np.sqrt(np.diag(result.covariance))[-len(optional) :]
+    deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0))[-len(optional) :]
     fitted = result.effects[-1][1]
     needed = tuple(name for name, sd in zip(optional, deviation, strict=True) if abs(fitted[name]) > 4.0 * sd)
     if len(needed) < len(optional):
