@@ -27,8 +27,9 @@ def parallel_torque(p, s, d_theta, omega, alpha):
     """Effects that act beside the contact [N m]: end_stop, soil_shear, yaw_inertia, kingpin_jacking, slope_bias."""
     torque = p.slope_bias_torque / p.sides + p.yaw_inertia_inertia * alpha
     if p.kingpin_jacking_amplitude != 0.0 or p.kingpin_jacking_second_harmonic != 0.0 or p.kingpin_jacking_even != 0.0:
-        sine = math.sin(s.theta)
-        torque += sine * (p.kingpin_jacking_amplitude + p.kingpin_jacking_second_harmonic * 2.0 * math.cos(s.theta))
+        sine, cosine = math.sin(s.theta), math.cos(s.theta)
+        torque += sine * (p.kingpin_jacking_amplitude + 2.0 * p.kingpin_jacking_second_harmonic * cosine)
+        torque += sine * sine * p.kingpin_jacking_even
     if p.end_stop_stiffness != 0.0 or p.end_stop_cubic_stiffness != 0.0:
         torque += end_stop(p, s, d_theta, omega)
     if p.soil_shear_torque != 0.0:
