@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,13 +22,19 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
+from lugre_steering.diagnosis import experiment
 from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
-from lugre_steering.simulate.manoeuvres import BUILT_IN, ackermann, motion_of
+from lugre_steering.recording import Recording, Signal
+from lugre_steering.report.diagnosis_report import write_report
+from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
-from lugre_steering.units import label, title
+from lugre_steering.units import label, law, title, words
+from lugre_steering.vehicle import Vehicle
 
 CONFIG = Path(__file__).parents[1] / "config"
 EXAMPLES = ("single_joint_example", "linear_axis_example", "one_angle_sensor_example")
@@ -163,3 +171,103 @@ def test_a_linear_axis_in_other_units_names_its_own_mass() -> None:
     linear = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
     millimetres = linear.replace(coordinate=dataclasses.replace(linear.coordinate, unit="mm"))
     assert label(millimetres, "kg m2") == "N s2/mm"
+
+
+def linear_axis() -> Vehicle:
+    return vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+
+
+PROSE = [
+    ("most of it along steering angle", "most of it along position"),
+    ("along steering rate (34 %)", "along position rate (34 %)"),
+    ("|steering angle|, angle since reversal, torque rate", "|position|, travel since reversal, force rate"),
+    ("steering/measured_torque: torque stamped late by 2 N m", "steering/measured_torque: force stamped late by 2 N"),
+    ("<b>Torque</b>, measured", "<b>Force</b>, measured"),
+    ("the contact turned by 2 presliding lengths", "the contact moved by 2 presliding lengths"),
+    ("stiffness_Nm_per_deg 5 N m/deg, 3 deg/s", "stiffness_Nm_per_deg 5 N per 0.01745 m, 3 0.01745 m/s"),
+]
+
+
+@pytest.mark.parametrize(("text", "axis"), PROSE)
+def test_words_of_a_linear_axis(text: str, axis: str) -> None:
+    joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    assert words(joint, text) == text
+    assert words(linear_axis(), text) == axis
+    assert words(linear_axis(), axis) == axis  # twice is once
+
+
+@pytest.mark.parametrize("name", ["piston stroke", "steering rod", "ram angle", r"x\1"])
+def test_any_name_of_a_coordinate_will_do(name: str) -> None:
+    axis = linear_axis()
+    vehicle = axis.replace(coordinate=dataclasses.replace(axis.coordinate, name=name))
+    for text in ("steering angle", "steering rate", "the angle"):
+        once = words(vehicle, text)
+        assert name in once
+        assert words(vehicle, once) == once
+
+
+def test_every_equation_of_the_catalogue_has_the_symbols_of_an_axis() -> None:
+    joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    for effect in CATALOGUE.values():
+        assert law(joint, effect.equation) == effect.equation
+        assert not re.search(
+            r"theta\b|theta_m|\bomega|\balpha\b|\bM\b|N m|\brad\b", law(linear_axis(), effect.equation)
+        )
+    assert law(linear_axis(), "M = J alpha") == "F = J q''"
+    assert law(linear_axis(), "Ms, Mc times dM/dt, dz/dtheta") == "Fs, Fc times dF/dt, dz/dq"
+    assert law(linear_axis(), "xM Mass thetas") == "xM Mass thetas"
+
+
+def ball_screw(period_m: float, amplitude_N: float) -> Recording:
+    """A linear axis with a force that repeats along its travel of 0.3 m, which no entry of the catalogue describes."""
+    vehicle = linear_axis()
+    ends = np.degrees([0.15, -0.15])  # the axis counts 1 m as 1 rad
+    sweeps = tuple(Sweep(ends[i % 2], rate, 1.0) for i, rate in enumerate((2.0, 3.0, 5.0, 1.5, 4.0, 2.5)))
+    run = simulate(vehicle, motion_of(Manoeuvre("axis", "", (Hold(2.0), *sweeps)), vehicle), sensing_of(vehicle))
+    signals = {channel.name: signal for channel, signal in run.signals.items()}
+    force = signals["torque"]
+    position = np.interp(force.time_s, run.truth.motion.time, run.truth.motion.theta[0])
+    moving = np.abs(np.interp(force.time_s, run.truth.motion.time, run.truth.motion.rate[0])) > 1e-3
+    ripple = amplitude_N * np.sin(2.0 * np.pi * position / period_m) * moving
+    measured = Signal(force.time_s, force.value + ripple)
+    return Recording("axis", 0, {"left": signals["left"]}, {}, measured_torque=measured)
+
+
+FOREIGN = (
+    r"(?<!-)\bsteering |\btorque\b|\brad\b|\bdeg(rees)?\b|N m\b|\bangle\b|\btheta\b|\bomega\b|\bturns?\b|\btrack\b"
+)
+
+
+def test_the_diagnosis_of_a_linear_axis_speaks_of_one(tmp_path: Path) -> None:
+    done = diagnose_recordings([ball_screw(0.024, 8.0)], linear_axis())
+    assert done.json["verdict"] == "unlisted_physics"
+    left = done.json["unexplained"]
+    period = float(re.search(r"2 pi q / ([\d.]+) m", left["formula"])[1])  # type: ignore[index]
+    assert period == pytest.approx(0.024, rel=0.02)
+    assert left["formula"].startswith("force [N] = ")
+    for place in left["where"]:
+        assert (place["coordinate"], place["unit"]) in (("position", "m"), ("|position|", "m"), ("force", "N"))
+    texts = [done.json["statement"], left["description"], left["formula"], *done.json["next_experiment"].values()]
+    assert not re.search(FOREIGN, " ".join(map(str, texts)))
+    assert "baseline" in done.json
+    assert "heldout_rmse_Nm" in done.json["baseline"]  # keys are those of the contract
+    write_report(done, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    body = re.sub(r"<script.*?</script>|<style.*?</style>|<code>.*?</code>", "", page, flags=re.DOTALL)
+    text = html.unescape(re.sub(r"<[^>]*>", " ", body)).replace("\u00a0", " ")
+    assert not re.search(FOREIGN, text, re.IGNORECASE), re.search(FOREIGN, text, re.IGNORECASE)
+
+
+def test_the_next_experiment_stays_within_the_travel_of_a_linear_axis() -> None:
+    vehicle = linear_axis()
+    problem = Problem(vehicle, [prepare(ball_screw(0.024, 0.0), vehicle)])
+    for manoeuvre in experiment.manoeuvres(problem).values():
+        assert "deg" not in manoeuvre.description
+        theta = motion_of(manoeuvre, vehicle).theta
+        assert np.abs(theta).max() <= 0.151
+    sweeps = experiment.manoeuvres(problem)["double-cycle"]
+    assert np.abs(motion_of(sweeps, vehicle).theta).max() == pytest.approx(0.15, rel=0.01)
+    speed = float(re.search(r"at ([\d.]+) m/s", sweeps.description)[1])  # type: ignore[index]
+    assert np.abs(motion_of(sweeps, vehicle).rate).max() == pytest.approx(speed, rel=0.02)
+    joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    assert experiment.manoeuvres(SimpleNamespace(vehicle=joint)) is BUILT_IN  # type: ignore[arg-type]

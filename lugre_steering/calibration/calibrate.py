@@ -35,7 +35,7 @@ from typing import Any
 
 import numpy as np
 
-from lugre_steering import __version__
+from lugre_steering import __version__, units
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration.estimate import EVALUATIONS, Effects, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
@@ -239,7 +239,7 @@ def calibrate_recordings(
         "undetermined": [asdict(combination) for combination in weak],
         "assumed": [asdict(value) for value in assumed],
         "data_quality": found,
-        "statement": statement(rows, rmse, held, weak, assumed),
+        "statement": units.words(vehicle, statement(rows, rmse, held, weak, assumed)),
     })  # fmt: skip
 
 
@@ -255,8 +255,7 @@ def check_motion(problem: Problem) -> None:
     travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs)
     needed = SLIDING * problem.presliding
     if travel < needed:
-        unit = problem.vehicle.coordinate.unit
-        far, least = (f"{math.degrees(v):.3g} deg" if unit == "rad" else f"{v:.3g} {unit}" for v in (travel, needed))
+        far, least = (units.distance(problem.vehicle, v) for v in (travel, needed))
         raise DataError(
             f"{names}: turns {far} at most, expected at least {least}, below which friction does not slide; "
             "drive 'varied-rates' (see lugre-steering simulate --list)"
@@ -311,7 +310,7 @@ def parameter_rows(problem: Problem, result: Estimate, fitted: Vehicle, priors: 
         rows.append({
             "name": key.calibration,
             "key": key.key,
-            "unit": key.unit,
+            "unit": units.label(problem.vehicle, key.unit),
             "sheet": sheet,
             "value": value,
             "ci95": sorted((value / reach, value * reach)),

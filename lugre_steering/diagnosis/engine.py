@@ -26,7 +26,6 @@ from lugre_steering.diagnosis.split import Split, split
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Recording
-from lugre_steering.simulate.manoeuvres import BUILT_IN
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
 NULL_DRAWS = 16
@@ -83,7 +82,7 @@ def diagnose_recordings(
     roles = split(problem)
     if travel < MIN_SLIDING or roles.fit.sum() < 500:
         advice = {
-            "manoeuvre": "double-cycle: " + BUILT_IN["double-cycle"].description,
+            "manoeuvre": "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description,
             "separates": ["friction level", "stiffness"],
             "why": f"the recording turns the contact by only {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed",
         }
@@ -187,7 +186,7 @@ class _Conclusion:
             "next_experiment": self._next(verdict, whole),
         }
         return Diagnosis(
-            finite(json),
+            units.in_words(vehicle, finite(json)),
             vehicle,
             self._traces(whole, final),
             self._evidence(effects),
@@ -218,11 +217,12 @@ class _Conclusion:
             where = self._where(candidate, part)
             share = float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0))
             rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
+            law = units.law(problem.vehicle, candidate.effect.equation)
             label = "material" if size > self.material * amplitude else "small"
             entries.append({
                 "id": candidate.effect.id, "stage": candidate.effect.stage,
                 "statement": (
-                    f"{self._title(candidate.effect.id)}: {candidate.effect.equation}. Up to {self._torque(size)} "
+                    f"{self._title(candidate.effect.id)}: {law}. Up to {self._torque(size)} "
                     f"({100 * size / amplitude:.1f} % of the torque amplitude, {label})"
                     + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
                 ),
@@ -280,9 +280,9 @@ class _Conclusion:
         formula = None
         held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
-        proposal = unlisted.propose(stacked, residual, fitted, held)
+        proposal = unlisted.propose(stacked, residual, fitted, held, units.is_linear(problem.vehicle))
         if proposal is not None:
-            formula = f"{proposal.text} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
+            formula = f"{units.law(problem.vehicle, proposal.text)} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
         where = []
         for run, part, values in zip(problem.runs, parts, axes, strict=True):
             smooth = np.sqrt(np.convolve((residual[part] * weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
@@ -408,7 +408,7 @@ class _Conclusion:
                 energies = experiment.separation(
                     self.problem, whole, [chosen], [rivals[0].fit.effects[-1]], self.noise.floor
                 )
-                best, description, energy = experiment.recommend(energies)
+                best, description, energy = experiment.recommend(self.problem, energies)
                 others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
                 return {
                     "manoeuvre": f"{best}: {description}", "separates": [chosen[0].effect.id, rivals[0].candidate.effect.id],
@@ -489,7 +489,7 @@ def _insufficient(
         "unexplained": {"structured": False, "description": "not examined", "formula": None, "where": None},
         "detection_limits": {}, "data_quality": findings, "next_experiment": advice,
     }  # fmt: skip
-    return Diagnosis(finite(json), vehicle)
+    return Diagnosis(units.in_words(vehicle, finite(json)), vehicle)
 
 
 __all__ = ["Run", "diagnose", "diagnose_recordings"]

@@ -4,17 +4,53 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.diagnosis.dataset import Run
 from lugre_steering.diagnosis.problem import Candidate, Fit, Problem
 from lugre_steering.recording import Array
-from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
+from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
 
 SAMPLE_S = 0.02
+SHORTEST_TRAVEL = 20.0
+"""Travel asked of a linear axis that hardly moved, in presliding lengths."""
 Named = tuple[Candidate, Mapping[str, float]]
+
+
+def manoeuvres(problem: Problem) -> Mapping[str, Manoeuvre]:
+    """The built-in manoeuvres; for a linear axis scaled to the travel it was recorded over, as none is known otherwise."""
+    if not units.is_linear(problem.vehicle):
+        return BUILT_IN
+    low, high = _reach(problem)
+    factor = 0.5 * (high - low) / float(np.radians(LIMIT_DEG))
+    return {name: _scaled(manoeuvre, factor, problem.vehicle.coordinate.unit) for name, manoeuvre in BUILT_IN.items()}
+
+
+def _reach(problem: Problem) -> tuple[float, float]:
+    """Ends of the recorded travel of a linear axis, widened if it hardly moved."""
+    low, high = min(float(run.theta.min()) for run in problem.runs), max(float(run.theta.max()) for run in problem.runs)
+    middle, half = 0.5 * (low + high), 0.5 * max(high - low, SHORTEST_TRAVEL * problem.presliding)
+    return middle - half, middle + half
+
+
+def _scaled(manoeuvre: Manoeuvre, factor: float, unit: str) -> Manoeuvre:
+    """Angles and rates multiplied by a factor, in the description too, where they are given in ``unit``."""
+
+    def part(segment: Segment) -> Segment:
+        if isinstance(segment, Sweep):
+            return replace(segment, to_deg=factor * segment.to_deg, rate_deg_s=factor * segment.rate_deg_s)
+        return replace(segment, amplitude_deg=factor * segment.amplitude_deg) if isinstance(segment, Chirp) else segment
+
+    def written(degrees: re.Match[str]) -> str:
+        return re.sub(r"[\d.]+", lambda n: f"{factor * np.radians(float(n[0])):.2g}", degrees[1]) + f" {unit}"
+
+    description = re.sub(r"([\d.]+(?:(?:, | to | and )[\d.]+)*) deg", written, manoeuvre.description)
+    return replace(manoeuvre, description=description, segments=tuple(part(s) for s in manoeuvre.segments))
 
 
 def _run(problem: Problem, manoeuvre: Manoeuvre, sigma: float) -> Run:
@@ -22,6 +58,8 @@ def _run(problem: Problem, manoeuvre: Manoeuvre, sigma: float) -> Run:
     motion = motion_of(manoeuvre, problem.vehicle)
     keep = slice(None, None, max(1, round(SAMPLE_S / (motion.time[1] - motion.time[0]))))
     time, theta = motion.time[keep], motion.theta[:, keep]
+    if units.is_linear(problem.vehicle):
+        theta = theta + 0.5 * sum(_reach(problem))
     omega = np.gradient(theta, time, axis=1)
     sides, lines = problem.runs[0].gains.shape[:2]
     empty = np.zeros((sides, time.size))
@@ -37,7 +75,7 @@ def separation(
 ) -> dict[str, float]:
     """Energy per manoeuvre by which two explanations would differ there, after recalibration, in noise variances."""
     found = {}
-    for manoeuvre in BUILT_IN.values():
+    for manoeuvre in manoeuvres(problem).values():
         trial = Problem(problem.vehicle, [_run(problem, manoeuvre, sigma)], problem.calibrations)
         x = np.append(fit.x[: len(problem.calibrations)], 0.0)
         difference = trial.predict(0, x, first) - trial.predict(0, x, second)
@@ -55,7 +93,7 @@ def _moved(problem: Problem, x: Array, j: int, effects: Sequence[Named]) -> Arra
     return problem.predict(0, moved, effects)
 
 
-def recommend(energies: Mapping[str, float]) -> tuple[str, str, float]:
+def recommend(problem: Problem, energies: Mapping[str, float]) -> tuple[str, str, float]:
     """Name, description and separation of the manoeuvre that tells most."""
     best = max(energies, key=lambda name: energies[name])
-    return best, BUILT_IN[best].description, energies[best]
+    return best, manoeuvres(problem)[best].description, energies[best]

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from lugre_steering.chain.model import Model, build_model
+from lugre_steering import units
+from lugre_steering.chain.model import build_model
 from lugre_steering.diagnosis.dataset import GAP_S, angle_noise
 from lugre_steering.diagnosis.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
@@ -71,7 +72,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
         found, keep = _examine(channel, look, others, vehicle.sensors.pressure_range_Pa)
         findings += found
         clean[channel] = Signal(look.time[keep], look.value[keep])
-    for finding in _memory_lost(clean, build_model(vehicle)):
+    for finding in _memory_lost(clean, vehicle):
         findings.append(finding)
         for channel, signal in clean.items():
             if channel.kind is not Kind.ANGLE:
@@ -210,13 +211,14 @@ def _without(signal: Signal, intervals: Intervals) -> Signal:
     return Signal(signal.time_s[keep], signal.value[keep])
 
 
-def _memory_lost(clean: Mapping[Channel, Signal], model: Model) -> Iterator[Finding]:
+def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[Finding]:
     """Where motion went unseen in a gap of an angle, until friction has forgotten it.
 
     The bristle holds what happened there: reversals, and the slower or faster sliding that set its level. An error of it falls
     by e for each presliding length that the angle turns afterwards. Nothing is lost while the other track was seen at rest.
     """
-    presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
+    record = build_model(vehicle).parameters[0]
+    presliding = float(record["coulomb_torque"][0] / record["sigma_0"][0])
     angles = {channel: signal for channel, signal in clean.items() if channel.kind is Kind.ANGLE}
     for channel, signal in angles.items():
         time, lost = signal.time_s, []
@@ -228,9 +230,10 @@ def _memory_lost(clean: Mapping[Channel, Signal], model: Model) -> Iterator[Find
             forgotten = np.searchsorted(turned, FORGOTTEN * presliding)
             lost.append((float(time[i]), float(time[after][min(int(forgotten), turned.size - 1)])))
         if lost:
+            far = units.distance(vehicle, FORGOTTEN * presliding, degrees=".0f")
             statement = (
                 f"{channel.topic}: motion is missing in its gaps, so the friction torque is unknown until the angle has turned by "
-                f"{np.degrees(FORGOTTEN * presliding):.0f} deg; the measured torque is not used for {_total(tuple(lost)):.1f} s"
+                f"{far}; the measured torque is not used for {_total(tuple(lost)):.1f} s"
             )
             yield Finding("friction_memory_lost", channel.topic, statement, tuple(lost))
 

@@ -16,7 +16,11 @@ import numpy as np
 from lugre_steering.recording import Array
 
 MAX_TERMS = 3
-PERIODS_RAD = tuple(np.radians(np.arange(1.0, 12.5, 0.25)))
+PERIODS_DEG = np.arange(1.0, 12.5, 0.25)
+CYCLES = np.arange(1.0, 40.5, 0.5)
+"""Periods to try: in degrees for a joint, as cycles over the travel for a linear axis, which may be of any size."""
+REVERSAL_RAD, REVERSAL_SHARE = 0.05, 0.05
+"""Length of the memory after a reversal: for a joint, and as share of the travel of a linear axis."""
 
 
 @dataclass(frozen=True)
@@ -26,21 +30,27 @@ class Formula:
     """Share of the held-out residual energy it removes."""
 
 
-def terms(c: Mapping[str, Array]) -> dict[str, Array]:
-    """Library of candidate terms (n,) with their text."""
+def terms(c: Mapping[str, Array], linear: bool = False) -> dict[str, Array]:
+    """Library of candidate terms (n,) with their text, which writes a linear axis as an angle too (``units.law``)."""
     theta, rate, direction = c["steering angle"], c["steering rate"], c["direction"]
+    travel = float(np.ptp(theta))
+    reversal = float(f"{REVERSAL_SHARE * travel:.2g}") if linear else REVERSAL_RAD
+    periods = (
+        {f"{period:.4g} rad": period for period in travel / CYCLES}
+        if linear
+        else {f"{degrees:.2f} deg": float(np.radians(degrees)) for degrees in PERIODS_DEG}
+    )
     library = {
         "1": np.ones_like(theta), "theta [rad]": theta, "theta^2 [rad2]": theta**2, "theta^3 [rad3]": theta**3,
         "omega [rad/s]": rate, "omega |omega| [rad2/s2]": rate * np.abs(rate), "sgn(omega)": direction,
         "theta omega [rad2/s]": theta * rate, "theta^2 sgn(omega) [rad2]": theta**2 * direction,
         "alpha [rad/s2]": c["steering acceleration"], "M [N m]": c["torque"], "|M| sgn(omega) [N m]": np.abs(c["torque"]) * direction,
-        "dM/dt [N m/s]": c["torque rate"], "sgn(omega) exp(-angle since reversal / 0.05 rad)":
-        direction * np.exp(-c["angle since reversal"] / 0.05), "log(1 + dwell [s]) M [N m]": np.log1p(c["dwell"]) * c["torque"],
+        "dM/dt [N m/s]": c["torque rate"], f"sgn(omega) exp(-angle since reversal / {reversal:g} rad)":
+        direction * np.exp(-c["angle since reversal"] / reversal), "log(1 + dwell [s]) M [N m]": np.log1p(c["dwell"]) * c["torque"],
     }  # fmt: skip
-    for period in PERIODS_RAD:
-        degrees = np.degrees(period)
-        library[f"sin(2 pi theta / {degrees:.2f} deg)"] = np.sin(2 * np.pi * theta / period)
-        library[f"cos(2 pi theta / {degrees:.2f} deg)"] = np.cos(2 * np.pi * theta / period)
+    for text, period in periods.items():
+        library[f"sin(2 pi theta / {text})"] = np.sin(2 * np.pi * theta / period)
+        library[f"cos(2 pi theta / {text})"] = np.cos(2 * np.pi * theta / period)
     for tau in (0.5, 1.0, 2.0, 4.0, 8.0):
         library[f"low-pass({tau:g} s) of omega [rad/s]"] = _low_pass(rate, c["time"], tau)
         library[f"low-pass({tau:g} s) of sgn(omega)"] = _low_pass(direction, c["time"], tau)
@@ -54,9 +64,11 @@ def _low_pass(value: Array, time: Array, tau: float) -> Array:
     return np.asarray(lfilter([1.0 - decay], [1.0, -decay], value))
 
 
-def propose(coordinates: Mapping[str, Array], residual: Array, fit_weight: Array, held_weight: Array) -> Formula | None:
+def propose(
+    coordinates: Mapping[str, Array], residual: Array, fit_weight: Array, held_weight: Array, linear: bool = False
+) -> Formula | None:
     """Best formula of up to three terms, each of which must lower the held-out error; None if even one term does not."""
-    library = terms(coordinates)
+    library = terms(coordinates, linear)
     names = list(library)
     matrix = np.column_stack([library[name] for name in names])
     norms = np.linalg.norm(matrix * fit_weight[:, None], axis=0)

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.calibration.calibrate import Calibrated, standing_effects
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure
 
@@ -24,7 +26,9 @@ def draw_calibration(done: Calibrated, file: Path) -> None:
     caption = f"Vehicle: {problem.vehicle.name}. {result['statement']}"
     if len(problem.runs) > len(runs):
         caption += f" {len(problem.runs) - len(runs)} more bags were fitted and are not drawn."
-    with figure(1 + 2 * len(runs), 1, caption, file, row_inches=2.1) as axes:
+    with figure(
+        1 + 2 * len(runs), 1, caption, file, row_inches=2.1, words=partial(units.words, problem.vehicle)
+    ) as axes:
         _parameters(axes[0, 0], result["parameters"])
         for bag, run in enumerate(runs):
             torque, residual = axes[1 + 2 * bag, 0], axes[2 + 2 * bag, 0]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.diagnosis.result import BagTrace, Diagnosis
 from lugre_steering.report import diagnosis_plots as plots
 from lugre_steering.report import shown
@@ -60,7 +61,7 @@ def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
             trace.time[0] + np.arange(points.size) * width * (trace.time[1] - trace.time[0]), points * scale, **style
         )
 
-    with figure(3 if parts else 2, 1, caption, file, row_inches=2.2) as axes:
+    with figure(3 if parts else 2, 1, caption, file, row_inches=2.2, words=partial(units.words, vehicle)) as axes:
         top, middle = axes[0, 0], axes[1, 0]
         line(top, trace.measured, torque.scale, **MEASURED, label="measured")
         line(top, trace.baseline, torque.scale, **ORIGINAL, label="recalibrated baseline")
@@ -101,7 +102,7 @@ def _residual(diagnosis: Diagnosis, effect: dict[str, Any], file: Path) -> None:
         "augmented model leaves to this effect; line, its fitted law. Right: what is left with everything found; band, "
         "two noise floors."
     )
-    with figure(1, 2, caption, file, row_inches=3.4) as axes:
+    with figure(1, 2, caption, file, row_inches=3.4, words=partial(units.words, diagnosis.vehicle)) as axes:
         before, after = axes[0]
         before.plot(x, cloud.before * scale, ".", markersize=2, color="#a9bce6", rasterized=True)
         before.plot(x, cloud.partial * scale, ".", markersize=2, color="#5b6169", rasterized=True)

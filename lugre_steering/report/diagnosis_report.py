@@ -8,6 +8,7 @@ import base64
 import html
 import json
 import math
+import re
 import string
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.report import diagnosis_plots as plots
 from lugre_steering.report import shown
+from lugre_steering.vehicle import Vehicle
 
 VERDICTS = {
     "consistent": ("Consistent with the model", "#1a7f37"),
@@ -100,17 +102,38 @@ def render(diagnosis: Diagnosis, library: str, pictures: Mapping[str, Path] | No
     sections = [section for section in _sections(diagnosis, drawing) if section.content]
     body = [_head(diagnosis)]
     body += [f'<section id="{s.anchor}"><h2>{s.title}</h2>\n{s.content}</section>' for s in sections]
+    vehicle = diagnosis.vehicle
+    own = [vehicle.name, *diagnosis.json["bags"], *(CATALOGUE[e["id"]].source for e in diagnosis.json["effects"])]
+    specs = _named_for(vehicle, drawing.specs) if units.is_linear(vehicle) else drawing.specs
     links = [("verdict", "Verdict"), *((section.anchor, section.short) for section in sections)]
     page = resources.files(__package__).joinpath("diagnosis.html").read_text(encoding="utf-8")
     return string.Template(page).substitute(
         title=_text(f"Diagnosis of {diagnosis.vehicle.name}"),
         accent=VERDICTS[diagnosis.json["verdict"]][1],
-        nav="".join(f'<a href="#{anchor}">{words}</a>' for anchor, words in links),
-        body="\n".join(body),
+        nav=_in_words(vehicle, "".join(f'<a href="#{anchor}">{words}</a>' for anchor, words in links)),
+        body=_in_words(vehicle, "\n".join(body), own),
         # Inside a script element only the letters of its end tag would be dangerous.
-        plots=json.dumps(drawing.specs, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        plots=json.dumps(specs, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
         library=library.replace("</script", "<\\/script") or "var Plotly = {};",
     )
+
+
+def _in_words(vehicle: Vehicle, page: str, own: Sequence[str] = ()) -> str:
+    """The words of a page in those of a linear axis; tags, code and the user's ``own`` names stay."""
+    if not units.is_linear(vehicle):
+        return page
+    kept = "|".join(["<code>.*?</code>", "<[^>]*>", *(re.escape(_text(name)) for name in own if name)])
+    parts = re.split(f"({kept})", page, flags=re.DOTALL)
+    return "".join(part if i % 2 else units.words(vehicle, part) for i, part in enumerate(parts))
+
+
+def _named_for(vehicle: Vehicle, tree: Any) -> Any:
+    """Plots with their titles and names in the words of this vehicle."""
+    if isinstance(tree, dict):
+        return {key: _named_for(vehicle, item) for key, item in tree.items()}
+    if isinstance(tree, list):
+        return [_named_for(vehicle, item) for item in tree]
+    return units.words(vehicle, tree) if isinstance(tree, str) else tree
 
 
 class _Drawing:
@@ -295,13 +318,16 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
     colour = plots.colours(diagnosis)[effect["id"]]
     meaning = {p.name: p.meaning for p in entry.parameters}
     per_line = entry.parameters[0].meaning if entry.per_line and entry.parameters else ""
+    angular = "" if units.is_linear(vehicle) else "in degrees"
+    header = ["parameter", "value", "95 % interval", "unit", angular, "meaning"]
     rows = []
     for name, parameter in effect["parameters"].items():
         unit, ends = units.label(vehicle, parameter["unit"]), parameter["ci95"]
         value, between = shown.estimate(parameter["value"], ends)
         degrees = _degrees(parameter["value"], ends) if unit == "rad" else ""
         meant = _text(meaning.get(name, per_line))
-        rows.append([f"<code>{_text(name)}</code>", value, between, _text(unit), degrees, meant])
+        row = [f"<code>{_text(name)}</code>", value, between, _text(unit), degrees, meant]
+        rows.append([cell for cell, title in zip(row, header, strict=True) if title])
     law = ""
     if any(effect["id"] in trace.contributions for trace in diagnosis.traces):
         words = f"Residual along the telling coordinate of {effect['id']}, with its fitted law, before and after"
@@ -310,7 +336,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
     facts = _pairs(
         [
             ("where in the chain", f"{_text(effect['stage'])}: {STAGES.get(effect['stage'], '')}"),
-            ("law", f"<code>{_text(entry.equation)}</code>"),
+            ("law", f"<code>{_text(units.law(vehicle, entry.equation))}</code>"),
             ("source", _text(entry.source)),
             ("how it shows", _text(entry.trace)),
             ("chance that noise does this", f"p {_p(effect['p_value'])}"),
@@ -323,7 +349,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
     return (
         f'<div class="effect"><h3><span class="swatch" style="background:{colour}"></span>{_text(units.title(vehicle, entry))} '
         f"(<code>{_text(effect['id'])}</code>)</h3>\n<p>{_text(effect['statement'])}</p>\n"
-        + _table(["parameter", "value", "95 % interval", "unit", "in degrees", "meaning"], rows, numeric=(1, 2, 4))
+        + _table([title for title in header if title], rows, numeric=(1, 2, 4) if angular else (1, 2))
         + facts
         + (_table(["bag", "acts during", "along"], where) if where else "")
         + law

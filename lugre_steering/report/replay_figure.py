@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.online import Curves
 from lugre_steering.recording import Array
 from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, figure
@@ -32,7 +34,14 @@ def draw_replay(
     time, lines = _lines(motion)
     check_time, checked = _lines(check)
     measured = "sensor torque" if vehicle.torque_sensor is not None else "cylinder torque"
-    with figure(4 if vehicle.rubber else 3, 1, _caption(name, vehicle, fit), file, row_inches=1.9) as axes:
+    with figure(
+        4 if vehicle.rubber else 3,
+        1,
+        _caption(name, vehicle, fit),
+        file,
+        row_inches=1.9,
+        words=partial(units.words, vehicle),
+    ) as axes:
         rows = iter(axes[:, 0])
         ax = next(rows)
         for i, side in enumerate(sides):

@@ -43,9 +43,10 @@ def torque_axis(vehicle: Vehicle, *values: Array) -> Axis:
 
 
 def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
-    """A coordinate of ``locate.UNITS`` in the words and units of this vehicle, angles in degrees."""
+    """A coordinate of ``locate.UNITS``, or its name in this vehicle's words, in its words and units; angles in degrees."""
+    name = {units.words(vehicle, key): key for key in UNITS}.get(name, name)
     if name == "torque":
-        return Axis(f"{name} [k{vehicle.coordinate.force_unit}]", 1e-3)
+        return Axis(f"{units.words(vehicle, name)} [k{vehicle.coordinate.force_unit}]", 1e-3)
     unit, scale = units.label(vehicle, UNITS.get(name, "")), 1.0
     for plain, handy, factor in _HANDIER:
         if re.match(rf"{plain}(?!\w)|{plain}/", unit):
@@ -56,11 +57,8 @@ def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
 
 
 def coordinate_name(vehicle: Vehicle, name: str) -> str:
-    """'steering rate' of a linear axis called position: 'position rate'."""
-    if vehicle.coordinate.unit == "rad":
-        return name.replace("steering angle", vehicle.coordinate.name)
-    name = name.replace("steering angle", vehicle.coordinate.name).replace("steering", vehicle.coordinate.name)
-    return name.replace("angle since", "travel since")
+    """'steering rate' of a linear axis called position: 'position rate'; 'steering angle' by the name it has in the file."""
+    return units.words(vehicle, name).replace("steering angle", vehicle.coordinate.name)
 
 
 def law_coordinate(effect: Mapping[str, Any], told_by: str, coordinates: Collection[str]) -> str:

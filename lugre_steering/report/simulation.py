@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.recording import Kind
 from lugre_steering.report.style import IMPROVED, MEASURED, figure
 from lugre_steering.simulate.run import Simulated
@@ -24,7 +26,7 @@ def draw_simulation(run: Simulated, label: str, file: Path) -> None:
     torques = [s for c, s in run.signals.items() if c.kind is Kind.TORQUE]
     effects = ", ".join(e.id for e in vehicle.effects) or "none"
     caption = f"SYNTHETIC recording: {label}. Effects added to the baseline: {effects}."
-    with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9) as axes:
+    with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9, words=partial(units.words, vehicle)) as axes:
         rows = iter(axes[:, 0])
         ax = next(rows)
         for side, theta in zip(vehicle.sides, truth.motion.theta, strict=True):

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ try:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
     from cycler import cycler
+    from matplotlib.text import Text
 except ImportError as error:
     raise LugreSteeringError("pictures need matplotlib: install 'lugre_steering[report]'") from error
 
@@ -54,20 +55,31 @@ _LINE_INCHES = 0.165
 
 @contextmanager
 def figure(
-    rows: int, columns: int, caption: str, file: Path, row_inches: float = 3.0, width: float = 10.0
+    rows: int,
+    columns: int,
+    caption: str,
+    file: Path,
+    row_inches: float = 3.0,
+    width: float = 10.0,
+    words: Callable[[str], str] = str,
 ) -> Iterator[Any]:
     """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to
     ``file``.
 
-    The figure grows with its caption, so no line of it is ever cut off.
+    ``words`` is applied to all its text (a linear axis has forces where others have torques). The figure grows with its
+    caption, so no line of it is ever cut off.
     """
-    lines = [line for paragraph in caption.split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]]
+    lines = [
+        line for paragraph in words(caption).split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]
+    ]
     below = _LINE_INCHES * len(lines) + 0.15
     height = rows * row_inches + below
     with mpl.rc_context(RC):
         fig, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False)
         try:
             yield axes
+            for text in fig.findobj(Text):
+                text.set_text(words(text.get_text()))
             fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
             fig.text(
                 0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333"
