@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise with a memory: what the sensors and the motion estimate can put into a residual without any missing physics.
 
-Two sources, both measured on the recording itself: the torque noise of standstill stretches (white sensor noise, pump ripple,
-slow wander, as an autoregressive process), and the error that angle noise causes through smoother and chain (by repeating
-both with fresh angle noise).
+Three sources, all measured on the recording itself: the slow torque noise of standstill stretches (as an autoregressive
+process); the fast one all along the recording, where it may grow with load and motion (pump ripple, vibration), since no
+physics of a steered contact is that fast for long; and the error that angle noise causes through smoother and chain (by
+repeating both with fresh angle noise).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from lugre_steering.chain.step import REST_RATE_RAD_S
 from lugre_steering.diagnosis.dataset import Run, angle_noise, motion
@@ -29,6 +30,11 @@ CHUNK_S = 3.0
 MEMORIES_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
 MIN_QUIET_S = 3.0
 MOTION_PROFILE_S = 0.5
+SPLIT_HZ = 2.5
+"""Between slow noise, known from standstill only, and fast noise, known from the residual wherever nothing sudden happens."""
+WINDOW_S = 1.0
+SUDDEN = 3.0
+"""Times its expected fast energy beyond which a window holds an event rather than noise."""
 
 
 @dataclass(frozen=True)
@@ -114,17 +120,61 @@ class Noise:
         return float(np.sqrt(np.mean(self.sigma**2)))
 
 
+def slow_part(values: Array, dt: float) -> Array:
+    """What varies slower than SPLIT_HZ, along the last axis, without shift in time."""
+    corner = min(SPLIT_HZ, 0.1 / dt)
+    return np.asarray(sosfiltfilt(butter(2, corner, fs=1.0 / dt, output="sos"), values))
+
+
+def fast_variance(problem: Problem, residual: Array, known: Array) -> Array:
+    """Variance (n,) of the fast torque noise [N2 m2]: a sum of shares that are constant, go with the load, or with motion.
+
+    ``residual`` (n,) of a fitted model; ``known`` (n,) is the fast energy that another source has put into it.
+    """
+    shapes, energies = [], []
+    for run, part in _parts(problem):
+        dt = run.time[1] - run.time[0]
+        fast = residual[part] - slow_part(residual[part], dt)
+        moving = np.abs(run.omega).max(axis=0) > REST_RATE_RAD_S
+        shapes.append(np.array([run.sigma**2, run.measured**2, moving * run.sigma**2]))
+        energies.append(fast**2 - known[part])
+    shape, energy = np.concatenate(shapes, axis=1), np.concatenate(energies)
+    dt = problem.runs[0].time[1] - problem.runs[0].time[0]
+    windows = np.arange(energy.size) // max(1, round(WINDOW_S / dt))
+    used = problem.valid.astype(float)
+    count = np.maximum(np.bincount(windows, used), 1.0)
+    means = np.array([np.bincount(windows, row * used) / count for row in (*shape, energy)])
+    scale = np.maximum(means[:-1].mean(axis=1), 1e-30)
+    rows, target = (means[:-1] / scale[:, None]).T, means[-1]
+    sound = np.bincount(windows, used) > 0.5 * count.max()
+    expected = np.full(target.size, np.median(target[sound]) if sound.any() else 0.0)
+    share = np.zeros(scale.size)
+    for _ in range(4):
+        quiet = sound & (target < SUDDEN * np.maximum(expected, 1e-30))
+        if quiet.sum() < 3 * scale.size:
+            break
+        share, _ = nnls(rows[quiet] / expected[quiet, None], target[quiet] / expected[quiet])
+        expected = np.maximum(rows @ share, 1e-3 * max(float(np.median(target[sound])), 1e-30))
+    return np.asarray((share / scale) @ shape)
+
+
+def _parts(problem: Problem) -> list[tuple[Run, slice]]:
+    edges = zip(problem.edges, problem.edges[1:], strict=False)
+    return [(run, slice(a, b)) for run, (a, b) in zip(problem.runs, edges, strict=True)]
+
+
 def noise_model(
     problem: Problem, x: Array, effects: Sequence[tuple[Candidate, Values]], *, draws: int, seed: int
 ) -> Noise:
     """Noise of the residual at a fitted model, from ``draws`` repetitions."""
     quiet = quiet_noise(problem.runs)
     sheet = angle_noise(problem.vehicle)
+    base = problem.predict_all(x, effects)
 
-    def repeat(bag: int) -> tuple[Array, Array]:
+    def repeat(bag: int) -> Array:
+        """What fresh angle noise changes in the prediction of one bag (draws, n)."""
         rng = np.random.default_rng([seed, bag])
-        run = problem.runs[bag]
-        base = problem.predict(bag, x, effects)
+        run, part = parts[bag]
         errors = np.empty((draws, run.time.size))
         for i in range(draws):
             # One sensor for both tracks makes one error.
@@ -132,12 +182,21 @@ def noise_model(
             noisy = run.theta + sheet * rng.standard_normal((sensors, run.time.size))
             theta = np.array([smooth_angle(row, sheet) for row in noisy])
             omega, alpha = motion(run.time, theta)
-            errors[i] = problem.predict(bag, x, effects, replace(run, theta=theta, omega=omega, alpha=alpha)) - base
-        dt = run.time[1] - run.time[0]
-        variance = uniform_filter1d(np.mean(errors**2, axis=0), max(1, round(MOTION_PROFILE_S / dt)))
-        torque_noise = np.array([quiet.draw(run.time.size, rng) for _ in range(draws)]) * run.sigma
-        sigma: Array = np.sqrt((quiet.level * run.sigma) ** 2 + variance)
-        return sigma, torque_noise - errors
+            errors[i] = problem.predict(bag, x, effects, replace(run, theta=theta, omega=omega, alpha=alpha)) - base[part]
+        return errors
 
-    parts = in_threads(repeat, range(len(problem.runs)))
-    return Noise(np.concatenate([sigma for sigma, _ in parts]), np.concatenate([draw for _, draw in parts], axis=1))
+    parts = _parts(problem)
+    errors = in_threads(repeat, range(len(parts)))
+    steps = [run.time[1] - run.time[0] for run in problem.runs]
+    known = np.concatenate([np.mean((e - slow_part(e, dt)) ** 2, axis=0) for e, dt in zip(errors, steps, strict=True)])
+    fast = fast_variance(problem, problem.measured - base, known)
+    sigmas, residuals = [], []
+    for bag, (run, part) in enumerate(parts):
+        rng = np.random.default_rng([seed, bag, 1])
+        torque = np.array([quiet.draw(run.time.size, rng) for _ in range(draws)])
+        slow = slow_part(torque, steps[bag])
+        swift = (torque - slow) / np.std(torque - slow)
+        variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / steps[bag])))
+        sigmas.append(np.sqrt(np.var(slow) * run.sigma**2 + fast[part] + variance))
+        residuals.append(slow * run.sigma + swift * np.sqrt(fast[part]) - errors[bag])
+    return Noise(np.concatenate(sigmas), np.concatenate(residuals, axis=1))
