@@ -184,19 +184,7 @@ class World:
             time.sleep(0.01)
 
     def send(self, sample: Sample) -> None:
-        """Publish one sample as the message that its channel arrives in."""
-        channel = self.vehicle.channels[sample.channel]
-        if channel.kind is Kind.ANGLE:
-            message: Any = JointState(name=[channel.joint], position=[sample.value])
-            message.velocity = [] if math.isnan(sample.rate) else [sample.rate]
-        elif channel.kind is Kind.PRESSURE:
-            message = FluidPressure(fluid_pressure=sample.value)
-        elif channel.kind is Kind.AIR_TEMPERATURE:
-            message = Temperature(temperature=sample.value)
-        else:
-            message = WrenchStamped()
-            message.wrench.torque.z = sample.value
-        self.publish(sample.channel, sample.stamp_ns, message)
+        self.publish(sample.channel, sample.stamp_ns, message_of(self.vehicle, sample))
 
     def publish(self, channel: int, stamp_ns: int, message: Any) -> None:
         message.header.stamp = to_time(stamp_ns)
@@ -220,6 +208,23 @@ class World:
         self.wait(lambda: len(self.heard["diagnostics"]) > seen, timeout_s)
         status = next(s for s in self.heard["diagnostics"][-1].status if s.name == f"{NAME[1:]}: {component}")
         return status.level, status.message, {pair.key: pair.value for pair in status.values}
+
+
+def message_of(vehicle: Vehicle, sample: Sample) -> Any:
+    """One sample as the message that its channel arrives in."""
+    channel = vehicle.channels[sample.channel]
+    if channel.kind is Kind.ANGLE:
+        message: Any = JointState(name=[channel.joint], position=[sample.value])
+        message.velocity = [] if math.isnan(sample.rate) else [sample.rate]
+    elif channel.kind is Kind.PRESSURE:
+        message = FluidPressure(fluid_pressure=sample.value)
+    elif channel.kind is Kind.AIR_TEMPERATURE:
+        message = Temperature(temperature=sample.value)
+    else:
+        message = WrenchStamped()
+        message.wrench.torque.z = sample.value
+    message.header.stamp = to_time(sample.stamp_ns)
+    return message
 
 
 def motion(vehicle: Vehicle, seconds: float, *, start_ns: int = T0, rate_Hz: float = 100.0) -> list[Sample]:
