@@ -7,9 +7,11 @@ from __future__ import annotations
 import gc
 import signal
 import sys
+from collections.abc import Callable
 
 import rclpy
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions, install_signal_handlers
 from rclpy.task import Future
 
@@ -31,7 +33,7 @@ def run(args: list[str]) -> int:
         # What exists now lives until the end: a collection during a callback need not look at it.
         gc.collect()
         gc.freeze()
-        spin(node)
+        spin(node, node.settings.executor, node.fault)
     except LugreSteeringError as error:
         return _refused(error)
     finally:
@@ -44,30 +46,30 @@ def _refused(error: BaseException) -> int:
     return 2
 
 
-def spin(node: SteeringTorqueEstimator) -> None:
-    """Run callbacks until shutdown; an exception that the middleware raises between them does not end the node."""
-    executor = make_executor(node.settings.executor)
+def spin(node: Node, executor_kind: str, fault: Callable[[Exception], None]) -> None:
+    """Run callbacks until shutdown; what the middleware raises between them goes to ``fault``, not out of the node."""
+    executor = make_executor(executor_kind)
     executor.add_node(node)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: None)  # rclpy's handlers, put before these, shut the context down
     install_signal_handlers(SignalHandlerOptions.ALL)
     try:
         while rclpy.ok():
-            _spin_some(executor, node)
+            _spin_some(executor, fault)
     except ExternalShutdownException:
         pass
     finally:
         executor.shutdown()
 
 
-def _spin_some(executor: Executor, node: SteeringTorqueEstimator) -> None:
+def _spin_some(executor: Executor, fault: Callable[[Exception], None]) -> None:
     try:
         # Not spin(): the one of EventsExecutor in rclpy 7.1 keeps a core busy and ignores SIGTERM.
         executor.spin_until_future_complete(Future(), timeout_sec=_SLICE_S)
     except ExternalShutdownException:
         raise
     except Exception as error:
-        node.fault(error)
+        fault(error)
 
 
 def make_executor(kind: str) -> Executor:
