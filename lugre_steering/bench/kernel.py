@@ -11,8 +11,6 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.integrate import solve_ivp
 
 from lugre_steering.bench.kernel_c import CLoop
@@ -239,15 +237,13 @@ def run(arguments: list[str]) -> None:
     if options.json:
         print(json.dumps({"kernel": [{k: None if v != v else v for k, v in row.items()} for row in rows]}, indent=2))
         return
-    table = Table(title="One step of one track; error: largest, as a share of the torque range")
-    for header in ("way", "ns per step", "/ kernel", "error"):
-        table.add_column(header, justify="left" if header == "way" else "right", no_wrap=True)
+    print("one step of one track; error: the largest, as a share of the torque range")
+    print(f"{'way':<46} {'ns/step':>11} {'/ kernel':>9} {'error':>8}")
     base = float(str(rows[0]["ns_per_step_and_track"]))
     for row in rows:
         ns, error = float(str(row["ns_per_step_and_track"])), float(str(row["relative_error"]))
-        table.add_row(str(row["name"]), f"{ns:,.1f}", f"{ns / base:,.4g}", "-" if math.isnan(error) else f"{error:.1e}")
-    console = Console()
-    console.print(table)
-    console.print(verdict(rows), highlight=False, soft_wrap=True)
+        shown = "-" if math.isnan(error) else f"{error:.1e}"
+        print(f"{row['name']!s:<46} {ns:>11,.1f} {ns / base:>9,.4g} {shown:>8}")
+    print(verdict(rows))
     if not any("C loop" in str(row["name"]) for row in rows):
-        console.print("C loop skipped: gcc not found.")
+        print("C loop skipped: gcc not found.")
