@@ -24,10 +24,11 @@ from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
 from lugre_steering.diagnosis import experiment
 from lugre_steering.diagnosis.dataset import prepare
-from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
+from lugre_steering.estimator import Estimator
 from lugre_steering.recording import Recording, Signal
 from lugre_steering.report.diagnosis_report import write_report
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
@@ -271,3 +272,69 @@ def test_the_next_experiment_stays_within_the_travel_of_a_linear_axis() -> None:
     assert np.abs(motion_of(sweeps, vehicle).rate).max() == pytest.approx(speed, rel=0.02)
     joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
     assert experiment.manoeuvres(SimpleNamespace(vehicle=joint)) is BUILT_IN  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("rate_deg_s", "to_deg", "level"), [(40.0, 20.0, 35.0), (0.1, 3.0, 42.0)])
+def test_friction_and_gravity_of_a_joint_are_the_torques_of_its_file(
+    rate_deg_s: float, to_deg: float, level: float
+) -> None:
+    """Sliding far behind its reversals the joint holds gravity, 6 cos + 18 sin, and the friction level with the sign of the
+    motion: Coulomb when fast, static when slow against the Stribeck speed of 2 deg/s."""
+    estimator = Estimator(vehicle_file.load(CONFIG / "single_joint_example.yaml"))
+    way = np.radians(np.arange(0.0, to_deg, 0.01 * rate_deg_s))
+    rows = []
+    for i, angle in enumerate(np.concatenate([way, way[::-1], -way, -way[::-1]])):
+        rows += [row.copy() for row in estimator.push(0, 1_000_000_000 + i * 10_000_000, float(angle))[0]]
+    assert len(rows) == 4 * way.size
+    for quarter, sign in ((0, 1.0), (1, -1.0), (2, -1.0), (3, 1.0)):
+        row = rows[round((quarter + 0.9) * way.size)]
+        assert np.sign(row["omega"][0]) == sign
+        theta = float(row["theta"][0])
+        assert float(row["total"]) == pytest.approx(6.0 * np.cos(theta) + 18.0 * np.sin(theta) + sign * level, abs=0.1)
+
+
+def test_one_pressure_pair_gives_the_torque_of_all_its_cylinders() -> None:
+    """Oracle: virtual work of four cylinders on two lines, with their lengths from the pivots in the complex plane."""
+    vehicle = vehicle_file.load(CONFIG / "one_angle_sensor_example.yaml")
+    hydraulics, right, pressure = vehicle.hydraulics, 0.25, {"main_a": 9.0e6, "main_b": 2.0e6}
+    assert hydraulics is not None
+    left = float(np.arctan(1.0 / (1.0 / np.tan(right) - 2.1 / 3.6)))  # cot(right) - cot(left) = distance / wheelbase
+    work = 0.0
+    for cylinder in hydraulics.cylinders.values():
+        angle = right if cylinder.side == "right" else left
+        ends = [
+            abs(complex(*cylinder.knuckle_m) * np.exp(1j * (angle + d)) - complex(*cylinder.chassis_m))
+            for d in (-1e-6, 1e-6)
+        ]
+        piston, rod = np.pi * cylinder.bore_m**2 / 4.0, np.pi * cylinder.rod_m**2 / 4.0
+        work += (pressure[cylinder.cap] * piston - pressure[cylinder.rod] * (piston - rod)) * (ends[1] - ends[0]) / 2e-6
+    estimator, residuals = Estimator(vehicle), []
+    values = {"left": left, "right": right, **pressure}
+    for i in range(50):
+        for number, channel in enumerate(vehicle.channels):
+            if channel.name in values:
+                now_ns = 1_000_000_000 + i * 10_000_000
+                residuals += [row.copy() for row in estimator.push(number, now_ns, values[channel.name])[1]]
+    assert len(residuals) > 40
+    assert float(residuals[-1]["measured_torque"]) == pytest.approx(work, rel=1e-6)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_gravity_of_a_joint_is_known_or_found(tmp_path: Path, known: bool) -> None:
+    """From a bag with a torque channel; the names may share it, their sum is 6 cos + 18 sin within the sensor's 0.3 N m."""
+    true = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    run = simulate(true, motion_of(BUILT_IN["varied-rates"], true), sensing_of(true))
+    write_bag(tmp_path / "bag", run, "test")
+    done = diagnose([tmp_path / "bag"], true if known else true.replace(gravity=None))
+    if known:
+        assert done.json["verdict"] == "consistent"
+        return
+    assert done.json["verdict"] == "missing_physics"
+    found = {e["id"]: {k: p["value"] for k, p in e["parameters"].items()} for e in done.json["effects"]}
+    assert set(found) == {"kingpin_jacking", "slope_bias"}
+    theta = np.radians(np.linspace(-28.0, 28.0, 57))
+    jacking = {"amplitude": 0.0, "second_harmonic": 0.0, "even": 0.0} | found["kingpin_jacking"]
+    conservative = jacking["amplitude"] * np.sin(theta) + jacking["second_harmonic"] * np.sin(2.0 * theta)
+    conservative += jacking["even"] * np.sin(theta) ** 2 + found["slope_bias"]["torque"]
+    np.testing.assert_allclose(conservative, 6.0 * np.cos(theta) + 18.0 * np.sin(theta), atol=0.3)
+    assert "Gravity" in next(e for e in done.json["effects"] if e["id"] == "kingpin_jacking")["statement"]
