@@ -44,7 +44,7 @@ EFFECT_FIELDS = (
     "static_ageing_rate", "static_ageing_dwell", "static_ageing_slip_scale", "stress_relaxation_per_decade",
     "stress_relaxation_onset",
     "stress_relaxation_recovery_angle", "payne_softening_amplitude", "payne_softening_angle",
-    "mullins_softening_amplitude", "viscous_friction_sigma_2", "distributed_contact_spread",
+    "mullins_softening_amplitude", "viscous_friction_sigma_2", "viscous_friction_thinning", "distributed_contact_spread",
     # thermal
     "heat_partition_ground_share", "carcass_heat_sink_conductance", "carcass_heat_sink_capacity",
     "flash_temperature_resistance", "flash_temperature_saturation_power", "flash_temperature_time_constant",
@@ -62,6 +62,7 @@ EFFECT_FIELDS = (
     "back_pressure_torque",
     "back_pressure_flow",
     "back_pressure_rate_scale", "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
+    "trapped_pressure_refill_time",
 )  # fmt: skip
 
 PARAMETERS = np.dtype([(name, np.float64) for name in BASELINE_FIELDS + EFFECT_FIELDS])
@@ -89,6 +90,7 @@ STATE = np.dtype(
         ("stop_loading", np.float64),  # 1 end stop loading ... 0 unloading
         ("berm_left", np.float64),  # farthest push of the soil, positive side [rad]
         ("berm_right", np.float64),  # farthest push of the soil, negative side [rad]
+        ("leaked", np.float64),  # how far trapped oil has leaked away, 0 ... 1
         ("seal", np.float64),  # cylinder seal deflection, -1 ... 1
         ("torque", np.float64),  # last total torque [N m]
         ("load", np.float64),  # the same without losses in cylinders and lines [N m]

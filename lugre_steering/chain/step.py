@@ -133,7 +133,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     sigma_1 = p.damping_factor * math.sqrt(stiffness)
     rate = omega - abs(omega) * z_next * stiffness / g
     damping = sigma_1 * rate
-    viscous = p.viscous_friction_sigma_2 * omega if effects else 0.0
+    viscous = p.viscous_friction_sigma_2 * omega / (1.0 + p.viscous_friction_thinning * abs(omega)) if effects else 0.0
     if effects:
         elastic *= 1.0 - relaxed_share(p, s, d_theta, resting)
 
@@ -154,7 +154,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     parallel = parallel_torque(p, s, turned, omega, alpha) if effects else 0.0
     load = elastic + damping + viscous + conservative + parallel
     s.load = load
-    s.torque = hydraulic_limits(p, s, load + losses(p, s, omega, turned, load)) if effects else load
+    s.torque = hydraulic_limits(p, s, load + losses(p, s, omega, turned, load), dt, resting) if effects else load
 
     out.torque = s.torque
     out.elastic = elastic

@@ -95,14 +95,20 @@ def losses(p, s, omega, d_theta, load):
 
 
 @law
-def hydraulic_limits(p, s, torque):
+def hydraulic_limits(p, s, torque, dt, resting):
     """What the hydraulics can hold: relief_saturation clips at a ceiling, trapped_pressure leaks away at standstill.
 
-    trapped: torque (1 - share (1 - exp(-dwell / tau))).
+    trapped: torque (1 - share leaked); leaked goes to 1 with tau at rest and back to 0 with ``refill_time`` in motion.
     """
     if p.relief_saturation_ceiling != 0.0:
         limit = p.relief_saturation_ceiling / p.sides
         torque = max(-limit, min(limit, torque))
     if p.trapped_pressure_share != 0.0:
-        torque *= 1.0 - p.trapped_pressure_share * (1.0 - exp(-s.dwell / p.trapped_pressure_time_constant))
+        if resting:
+            s.leaked += (1.0 - s.leaked) * (1.0 - exp(-dt / p.trapped_pressure_time_constant))
+        elif p.trapped_pressure_refill_time > 0.0:
+            s.leaked *= exp(-dt / p.trapped_pressure_refill_time)
+        else:
+            s.leaked = 0.0
+        torque *= 1.0 - p.trapped_pressure_share * s.leaked
     return torque

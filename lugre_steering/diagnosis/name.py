@@ -26,6 +26,8 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
+VARIANT, VARIANTS = 0.5, 2
+"""Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
 """A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
@@ -100,7 +102,7 @@ def search(
             progress(f"fitting {score.candidate.label}")
             trials.append(try_effect(problem, weight, current, score))
         trials.sort(key=lambda trial: trial.cost)
-        trials = [refine(problem, weight, trial) for trial in trials[:3]] + trials[3:]
+        trials = [deepen(problem, weight, current, trial, scores) for trial in trials[:3]] + trials[3:]
         trials.sort(key=lambda trial: trial.cost)
         best, before = trials[0], cost(problem, current, weight)
         # A trial may have led the calibration out of a local minimum: then the gain is not the effect's, so look again.
@@ -153,7 +155,7 @@ def _confront(
     ordered = replace(final, effects=(*rest, (own, values)))
     champion = Trial(best.get(own.effect.id, item.score), ordered, cost(problem, final, weight))
     trials = [
-        refine(problem, weight, try_effect(problem, weight, without, best[name]))
+        deepen(problem, weight, without, try_effect(problem, weight, without, best[name]), scores)
         for name in sorted(names)
         if name in best and best[name].explained > 0.3 * champion.score.explained
     ]
@@ -256,17 +258,29 @@ def _cornered(problem: Problem, current: Fit) -> bool:
     return bool(np.any(np.abs(current.x[: prior.size]) > 2.0 * prior))
 
 
+def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
+    """A promising trial from its next best shapes as well (valleys are narrow), then refined."""
+    tried = trial.score.candidate
+    variants = [
+        score for score in scores
+        if score.candidate.label == tried.label and score.candidate.bags == tried.bags
+        and score.candidate.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
+    ]  # fmt: skip
+    others = [try_effect(problem, weight, current, score) for score in variants[:VARIANTS]]
+    return refine(problem, weight, min([trial, *others], key=lambda each: each.cost))
+
+
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     """Let the effect have the optional parts of its family; those that do not earn their place go again."""
     candidate, values = trial.fit.effects[-1]
     optional = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     if not optional:
-        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=8)
+        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=20)
         return Trial(trial.score, result, cost(problem, result, weight))
     earlier = trial.fit.effects[:-1]
     start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
     richer = replace(candidate, free=candidate.free + tuple(optional))
-    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=12)
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=20)
     deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0))[-len(optional) :]
     fitted = result.effects[-1][1]
     needed = tuple(name for name, sd in zip(optional, deviation, strict=True) if abs(fitted[name]) > 4.0 * sd)

@@ -255,20 +255,20 @@ def fit(
     """
     x0 = problem.start() if start is None else start
     low, high = problem.bounds()
-    free = [(i, name) for i, (candidate, _) in enumerate(effects) for name in candidate.free]
-    scale = np.concatenate([problem.scales(), [effects[i][0].parameter(n).scale for i, n in free]])
+    free = [(i, effects[i][0].parameter(name)) for i, (candidate, _) in enumerate(effects) for name in candidate.free]
+    scale = problem.scales()
     values0 = [dict(values) for _, values in effects]
-    p0 = np.concatenate([x0, [values0[i].get(n, 0.0) for i, n in free]]) / scale
-    low = np.concatenate([low, [effects[i][0].parameter(n).low for i, n in free]]) / scale
-    high = np.concatenate([high, [effects[i][0].parameter(n).high for i, n in free]]) / scale
+    p0 = np.concatenate([x0 / scale, [parameter.scaled(values0[i].get(parameter.name, 0.0)) for i, parameter in free]])
+    low = np.concatenate([low / scale, [parameter.scaled(parameter.low) for _, parameter in free]])
+    high = np.concatenate([high / scale, [parameter.scaled(parameter.high) for _, parameter in free]])
     prior = np.array([float(priors)] * len(problem.calibrations) + [0.3] * len(problem.runs) + [0.0] * len(free))
     n = problem.nuisances
 
     def unpack(p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:
         values = [dict(v) for v in values0]
-        for (i, name), number in zip(free, p[n:] * scale[n:], strict=True):
-            values[i][name] = float(number)
-        return p[:n] * scale[:n], [(candidate, v) for (candidate, _), v in zip(effects, values, strict=True)]
+        for (i, parameter), number in zip(free, p[n:], strict=True):
+            values[i][parameter.name] = parameter.unscaled(float(number))
+        return p[:n] * scale, [(candidate, v) for (candidate, _), v in zip(effects, values, strict=True)]
 
     def prediction(p: Array) -> Array:
         return problem.predict_all(*unpack(p))
@@ -301,9 +301,10 @@ def fit(
             break
     x, fitted = unpack(p)
     final = jacobian(p, base)
-    covariance = np.asarray(np.linalg.pinv(final.T @ final + np.diag(prior**2), rcond=1e-12) * np.outer(scale, scale), float)
+    natural = np.concatenate([scale, [parameter.slope(float(number)) for (_, parameter), number in zip(free, p[n:], strict=True)]])
+    covariance = np.asarray(np.linalg.pinv(final.T @ final + np.diag(prior**2), rcond=1e-12) * np.outer(natural, natural), float)
     return Fit(
-        x, tuple(fitted), base, _cost((base - problem.measured) * weight, p * prior, False), final / scale, covariance
+        x, tuple(fitted), base, _cost((base - problem.measured) * weight, p * prior, False), final / natural, covariance
     )
 
 

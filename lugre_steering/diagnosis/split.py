@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.recording import Array
 
 Mask = NDArray[np.bool_]
 
@@ -17,6 +18,7 @@ BLOCK_S = 8.0
 GAP_S = 1.0
 CYCLE = 3
 """One block in so many is held out."""
+CLEARLY = 1.5
 CLUSTER_S = 2.0
 """Errors closer than this count as one for intervals and tests."""
 
@@ -30,8 +32,11 @@ class Split:
     cluster: NDArray[np.int64]
 
 
-def split(problem: Problem) -> Split:
-    """Blocks of 8 s (shorter in short bags), every third held out, gaps of 1 s at both sides of each change of role."""
+def split(problem: Problem, phase: int = 0) -> Split:
+    """Blocks of 8 s (shorter in short bags), every third held out, gaps of 1 s at both sides of each change of role.
+
+    ``phase`` 0 ... CYCLE - 1 shifts which third it is; together they hold out everything once but the first blocks.
+    """
     fit, held = np.zeros(problem.valid.size, bool), np.zeros(problem.valid.size, bool)
     cluster = np.zeros(problem.valid.size, np.int64)
     first = 0
@@ -41,11 +46,11 @@ def split(problem: Problem) -> Split:
         block = min(BLOCK_S, max(2.0, elapsed[-1] / 9.0))
         gap = min(GAP_S, 0.15 * block)
         index = (elapsed / block).astype(int)
-        role = _held(index, bag)
+        role = _held(index, bag + phase)
         within = elapsed - index * block
         edge = np.zeros(run.time.size, bool)
         for step in (-1, 1):
-            neighbour = _held(index + step, bag)
+            neighbour = _held(index + step, bag + phase)
             near = within < gap if step < 0 else within > block - gap
             edge |= near & (neighbour != role)
         held[part] = role & ~edge & run.valid
@@ -55,7 +60,22 @@ def split(problem: Problem) -> Split:
     return Split(fit, held, cluster)
 
 
-def _held(index: NDArray[np.int64], bag: int) -> Mask:
+def balanced(problem: Problem, excess: Array) -> Split:
+    """The split whose two parts both see what the baseline leaves over: ``excess`` (n,) is its energy above noise.
+
+    What happens in a few blocks only would else be held out altogether, or never judged. The first split stands unless
+    another is clearly better.
+    """
+    candidates = [split(problem, phase) for phase in range(CYCLE)]
+    seen = [
+        (max(float(excess[roles.fit].sum()), 0.0), max(float(excess[roles.held].sum()), 0.0)) for roles in candidates
+    ]
+    worth = [min(fit, (CYCLE - 1) * held) + 0.25 * fit for fit, held in seen]
+    best = int(np.argmax(worth))
+    return candidates[best] if worth[best] > CLEARLY * worth[0] else candidates[0]
+
+
+def _held(index: NDArray[np.int64], shift: int) -> Mask:
     """Whether blocks are held out; never the first, which alone shows the bristles that a bag starts with."""
-    held: Mask = (index > 0) & ((index + bag) % CYCLE == CYCLE - 1)
+    held: Mask = (index > 0) & ((index + shift) % CYCLE == CYCLE - 1)
     return held

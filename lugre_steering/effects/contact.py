@@ -7,9 +7,12 @@ from lugre_steering.effects.entry import Effect, Parameter
 EFFECTS = (
     Effect(
         "viscous_friction", "contact", 1, "Viscous adhesion of the rubber",
-        "M += sigma_2 omega", "Canudas de Wit et al., IEEE TAC 40 (1995) 419; dropped by Liang et al. 2022",
+        "M += sigma_2 omega / (1 + thinning |omega|)", "Canudas de Wit et al., IEEE TAC 40 (1995) 419; dropped by Liang et al. 2022",
         "odd in the rate, zero at rest", "steering rate",
-        (Parameter("sigma_2", "N m s/rad", "viscous coefficient of one track", 5e3, 0.0, 5e5),),
+        (
+            Parameter("sigma_2", "N m s/rad", "viscous coefficient of one track", 5e3, 0.0, 5e5),
+            Parameter("thinning", "s/rad", "inverse rate at which it has halved", 3.0, 0.0, 100.0, optional=True),
+        ),
         ("line_loss_linear",),
     ),
     Effect(

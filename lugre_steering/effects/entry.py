@@ -10,6 +10,9 @@ from dataclasses import dataclass
 STAGES = ("motion", "contact", "thermal", "parallel_torque", "measurement")
 
 
+LOG_SCALE = 0.3
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number of an effect. Amplitudes (no ``grid``) are neutral at zero; shapes are tried over a grid before the fit.
@@ -32,6 +35,22 @@ class Parameter:
     @property
     def is_shape(self) -> bool:
         return bool(self.grid)
+
+    @property
+    def logarithmic(self) -> bool:
+        """Positive shapes (times, angles, capacities) are fitted by their logarithm: halving is as far as doubling."""
+        return self.is_shape and self.low > 0.0
+
+    def scaled(self, value: float) -> float:
+        """The value as fits see it: about one unit is a change worth seeing."""
+        return math.log(value) / LOG_SCALE if self.logarithmic else value / self.scale
+
+    def unscaled(self, number: float) -> float:
+        return math.exp(number * LOG_SCALE) if self.logarithmic else number * self.scale
+
+    def slope(self, number: float) -> float:
+        """Change of the value per unit of its scaled number."""
+        return LOG_SCALE * self.unscaled(number) if self.logarithmic else self.scale
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ EFFECTS = (
             Parameter("viscous", "N m s/rad", "of one track", 1e3, 0.0, 2e5, optional=True),
             Parameter("holding", "1", "share kept at standstill by the seals", 0.5, 0.0, 1.0, (0.0, 1.0)),
             Parameter("breakaway", "1", "raise at low rate (Stribeck)", 0.3, 0.0, 3.0, optional=True),
-            Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.3, optional=True),
+            Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.05, optional=True),
         ),
         ("back_pressure", "line_loss_linear"),
     ),
@@ -36,7 +36,7 @@ EFFECTS = (
         (
             Parameter("torque", "N m", "of the vehicle", 300.0, 0.0, 2e4),
             Parameter("flow", "s/rad", "growth with the return flow", 3.0, 0.0, 100.0, optional=True),
-            Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.3, optional=True),
+            Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.05, optional=True),
         ),
         ("cylinder_friction",),
     ),
@@ -47,11 +47,13 @@ EFFECTS = (
     ),
     Effect(
         "trapped_pressure", "measurement", 2, "Trapped oil leaks away at standstill",
-        "M (1 - share (1 - exp(-dwell / tau)))", "Merritt 1967 (leakage of a blocked cylinder)", "exponential decay in holds",
+        "M (1 - share (1 - exp(-dwell / tau))), refilled in motion", "Merritt 1967 (leakage of a blocked cylinder)",
+        "exponential decay in holds",
         "dwell",
         (
             Parameter("share", "1", "of the torque lost in the end", 0.05, 0.0, 1.0),
             Parameter("time_constant", "s", "of the leak", 5.0, 0.2, 500.0, (1.0, 4.0, 15.0)),
+            Parameter("refill_time", "s", "until the torque is back in motion", 0.1, 0.0, 2.0, optional=True),
         ),
         ("stress_relaxation",),
     ),
