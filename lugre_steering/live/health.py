@@ -68,6 +68,7 @@ class Health:
         self._then_arrivals = list(self.arrivals)
         self._then_residuals = 0
         self._then_saturated = 0
+        self._then_exceptions = 0
 
     def set_topics(self, topics: Sequence[str]) -> None:
         """Full names of the input topics, in the order of the channels."""
@@ -166,7 +167,8 @@ class Health:
         return self._status("residual", WARN if saturated or not count else OK, message, values)
 
     def _outputs(self, monotonic_ns: int) -> DiagnosticStatus:
-        faulty = self.faulty(monotonic_ns)
+        faulty = self.faulty(monotonic_ns) or self.exceptions > self._then_exceptions  # every exception is told once
+        self._then_exceptions = self.exceptions
         level = ERROR if faulty else (WARN if self.exceptions else OK)
         message = f"withheld after an exception: {self.last_exception}" if faulty else "running"
         values: dict[str, object] = {"exceptions": self.exceptions, "last exception": self.last_exception}
