@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wrong wiring, found by comparing the recording with the nominal model: signs, units, exchanged channels, clocks, zeros.
 
-Each suspicion is a hypothesis: the recording as it would be with that one fault undone. It is reported when the nominal
-model then agrees very much better and well, which no physics of the catalogue brings about; hypotheses that agree equally
-well are named together.
+Each suspicion is a hypothesis: the recording as it would be with one fault undone, or two where one does not suffice. It is
+reported when the nominal model then agrees very much better and well, which no physics of the catalogue brings about;
+hypotheses that agree equally well are named together, and none may leave the angles of a mirrored vehicle.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from lugre_steering.chain.step import torque_side
 from lugre_steering.diagnosis.dataset import Run, angle_noise, prepare
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.units import words
 from lugre_steering.vehicle import Vehicle
 
 BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
@@ -41,6 +42,14 @@ GEOMETRY_RAD, GEOMETRY_RATIO = float(np.radians(0.5)), 3.0
 """Root mean square by which the worse steering geometry must miss, and by which factor more than the other."""
 TURNED_RAD = np.pi / 2.0
 """No steered track turns this far."""
+UNLIKE = 0.4
+"""Correlation of measured and nominal torque below which something is wrong, whatever it is; with hidden physics it is 0.9."""
+POOR = 0.25
+"""Relative error left by a hypothesis that cannot be all; a friction level off by GAIN leaves less."""
+MIRROR = (
+    "More than one wiring fault is possible: of exchanged angle sensors, all angle signs flipped and the lines of every circuit "
+    "exchanged, any one looks like the other two together."
+)
 SKEW_S = 0.1
 """Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted."""
 SKEW_RANGE_S = 5.0
@@ -57,21 +66,37 @@ PRESSURE_UNITS = {"kPa": 1e3, "psi": 6894.757, "bar": 1e5, "MPa": 1e6}
 
 
 @dataclass(frozen=True)
-class _Hypothesis:
-    """One fault undone: the relative error that the nominal model then leaves, and by which factor it must fall."""
-
+class _Fault:
     finding: str
     topics: tuple[str, ...]
     statement: str
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """Faults undone: the relative error that the nominal model then leaves, and by which factor it must fall."""
+
+    faults: tuple[_Fault, ...]
     error: float
     better: float = BETTER
+
+    @property
+    def statement(self) -> str:
+        return " and ".join(fault.statement for fault in self.faults)
+
+    @property
+    def topics(self) -> int:
+        return sum(len(fault.topics) for fault in self.faults)
+
+
+Faults = tuple[_Fault, ...]
 
 
 def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
     """Findings about signs, units, exchanged channels, clocks and zeros; ``recording`` without bad samples."""
     whole = _span(recording)
     found = _angle_unit(recording, vehicle)
-    if found is None:
+    if not found:
         try:
             run = prepare(recording, vehicle)
         except DataError:
@@ -79,11 +104,9 @@ def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
         if float(np.ptp(run.theta)) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
             return ()
         found = _wrong(recording, vehicle, run)
-    if found is not None:
-        return (Finding(found.finding, ", ".join(found.topics), found.statement, whole),)
-    return tuple(
-        replace(finding, intervals_s=whole) for check in (_skew, _drifts) for finding in check(vehicle, run)
-    )
+    if found:
+        return tuple(Finding(fault.finding, ", ".join(fault.topics), fault.statement, whole) for fault in found)
+    return tuple(replace(finding, intervals_s=whole) for check in (_skew, _drifts) for finding in check(vehicle, run))
 
 
 def _span(recording: Recording) -> tuple[tuple[float, float], ...]:
@@ -102,7 +125,7 @@ def _foreign_unit(vehicle: Vehicle) -> tuple[str, float]:
     return ("degrees", float(np.pi / 180.0)) if vehicle.coordinate.unit == "rad" else ("mm", 1e-3)
 
 
-def _angle_unit(recording: Recording, vehicle: Vehicle) -> _Hypothesis | None:
+def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
     """Angles by their magnitude alone."""
     unit, factor = _foreign_unit(vehicle)
     wrong = []
@@ -113,10 +136,12 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> _Hypothesis | None:
         turned = 0.0 if signal is None or not count else float(np.abs(signal.value).max())
         if absurd > ABSURD_SHARE * (count + absurd) or (vehicle.track is not None and turned > TURNED_RAD):
             wrong.append(topic)
+    wrong = list(dict.fromkeys(wrong))
     if not wrong:
-        return None
-    statement = f"{' and '.join(wrong)}: far beyond any steering angle; probably in {unit} (multiply by {factor:.6g})"
-    return _Hypothesis("unit_suspect", tuple(wrong), statement, 0.0)
+        return ()
+    far = words(vehicle, "far beyond any steering angle")
+    statement = f"{' and '.join(wrong)}: {far}; probably in {unit} (multiply by {factor:.6g})"
+    return (_Fault("unit_suspect", tuple(wrong), statement),)
 
 
 def _torques(model: Model, run: Run) -> Array:
@@ -134,105 +159,181 @@ def _error(run: Run, measured: Array, expected: Array) -> float:
     return float(np.sqrt(max(aa - 2.0 * gain * ab + gain**2 * bb, 0.0) / max(aa, gain**2 * bb, 1e-30)))
 
 
-def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> _Hypothesis | None:
-    """The simplest hypothesis among the best, if it is convincing."""
+def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
+    """The faults of the simplest hypothesis among the best, if it is convincing."""
     model = build_model(vehicle)
-    expected = _torques(model, run)
-    total = expected.sum(axis=0)
+    total = _torques(model, run).sum(axis=0)
     as_is = _error(run, run.measured, total)
     correlation = float(np.corrcoef(run.measured[run.valid], total[run.valid])[0, 1])
     mirrored = _mirrored(vehicle, run)
-    if mirrored and correlation > 0.0:
-        topics = tuple(_topics(vehicle, Kind.ANGLE).values())
-        statement = f"{' and '.join(topics)} are exchanged: the outer track would turn further than the inner one"
-        return _Hypothesis("swapped_angles", topics, statement, 0.0)
-    hypotheses = [*_signals_wrong(vehicle, run, total), *_signs(vehicle, run, expected, mirrored)]
+    if mirrored and as_is <= GOOD:
+        return _noted(vehicle, _exchanged_angles(vehicle), ".")
+    single = list(_hypotheses(vehicle, run, model, 1))
     if as_is > GOOD:
-        hypotheses += _angle_units(recording, vehicle, model)
-    convincing = [h for h in hypotheses if h.error < min(GOOD, h.better * as_is)]
+        single += _angle_units(recording, vehicle, model)
+    convincing = [h for h in single if h.error < min(GOOD, h.better * as_is)]
+    if as_is > GOOD:
+        needed = BETTER * min([as_is, *(h.error for h in single)])
+        convincing = [h for h in _hypotheses(vehicle, run, model, 2) if h.error < min(GOOD, needed)] or convincing
+    if not convincing and mirrored and correlation > 0.0:
+        return _noted(vehicle, _exchanged_angles(vehicle), ".")
     if not convincing:
         work = float(np.sum((run.measured * run.omega.mean(axis=0))[run.valid]))
         opposed = correlation < OPPOSED and work < 0.0
         tiny = float(np.std(run.measured)) < TINY * float(np.std(total))
-        poor = {"sign_flipped"} if opposed else {"unit_suspect"} if tiny else set()
-        convincing = [h for h in hypotheses if h.finding in poor and h.error < as_is]
+        poor = "sign_flipped" if opposed else "unit_suspect" if tiny else ""
+        convincing = [h for h in single if h.faults[0].finding == poor and h.error < as_is]
+        if abs(correlation) < UNLIKE:  # which channel it is, an error that stays poor does not tell
+            convincing = [h for h in convincing if h.topics == max(other.topics for other in convincing)]
     if not convincing:
-        return None
+        return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE else ()
     best = min(h.error for h in convincing)
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
-    first = min(tied, key=lambda h: len(h.topics))
+    first = min(tied, key=lambda h: h.topics)
     rivals = "".join(f" The same data would come from this: {h.statement}." for h in tied if h is not first)
     agrees = f" (relative error of the nominal model {as_is:.2f} as recorded, {first.error:.2f} with that undone)"
-    return replace(first, statement=first.statement + agrees + "." + rivals)
+    if first.error > POOR:
+        rivals += " That is still poor: more than one wiring fault is possible."
+    return _noted(vehicle, first.faults, f"{agrees}.{rivals}")
 
 
-def _signals_wrong(vehicle: Vehicle, run: Run, total: Array) -> Iterator[_Hypothesis]:
-    """Exchanged lines, and units of pressures or of the torque sensor."""
-    gains = run.torque_per_line
+def _noted(vehicle: Vehicle, faults: Faults, note: str) -> Faults:
+    """Faults with a note, and with what a vehicle that is alike on both sides cannot tell."""
+    whole = {_exchanged_angles(vehicle)[0].topics, tuple(_topics(vehicle, Kind.PRESSURE).values())}
+    if len(faults) == 1 and faults[0].finding != "unit_suspect" and faults[0].topics in whole and _both_tracks(vehicle):
+        note += " " + MIRROR
+    together = {fault: [other.statement for other in faults if other is not fault] for fault in faults}
+    return tuple(
+        replace(
+            fault, statement=fault.statement + "".join(f"; together with another fault: {o}" for o in others) + note
+        )
+        for fault, others in together.items()
+    )
+
+
+def _unlike(vehicle: Vehicle, correlation: float) -> Faults:
+    """Nothing fits, and yet the recording is nothing like the model. Not blocking: it may be a model without what matters."""
+    topics = tuple(dict.fromkeys(c.topic for c in vehicle.channels if c.kind is not Kind.AIR_TEMPERATURE))
+    statement = (
+        f"{', '.join(topics)}: the measured torque is nothing like that of the nominal model (correlation {correlation:.2f}), and no "
+        "single wiring fault or pair of them explains it; more than one wiring fault is possible, or the vehicle file lacks what "
+        "matters most; check signs, units and plugs before believing any physics named here"
+    )
+    return (_Fault("wiring_suspect", topics, words(vehicle, statement)),)
+
+
+def _hypotheses(vehicle: Vehicle, run: Run, model: Model, count: int) -> Iterator[_Hypothesis]:
+    """Every combination of ``count`` faults of angles and of pressures (or torque)."""
+    for of_angles, moved in _angles_undone(vehicle, run):
+        if len(of_angles) > count or _mirrored(vehicle, moved):
+            continue
+        # The chain is not quite odd (gravity), so undone motion runs through it again.
+        expected = _torques(model, moved).sum(axis=0)
+        gains = run.gains if vehicle.hydraulics is None else line_gains(vehicle, moved.theta)
+        for of_signals, pressure, better in _signals_undone(vehicle, run, count - len(of_angles)):
+            if len(of_angles) + len(of_signals) == count:
+                measured = np.einsum("slt,lt->t", gains, pressure)
+                yield _Hypothesis((*of_angles, *of_signals), _error(run, measured, expected), better)
+
+
+def _exchanged_angles(vehicle: Vehicle) -> Faults:
+    topics = tuple(_topics(vehicle, Kind.ANGLE).values())
+    statement = f"{' and '.join(topics)} are exchanged: the outer track would turn further than the inner one"
+    return (_Fault("swapped_angles", topics, statement),)
+
+
+def _angles_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Run]]:
+    """Motion with nothing undone, with one or all signs flipped, and with the sides exchanged (and flipped) too."""
+    topics = _topics(vehicle, Kind.ANGLE)
+    sensors = tuple(dict.fromkeys(topics.values()))
+    flips = [(), *((topic,) for topic in sensors), *([sensors] if len(sensors) > 1 else [])]
+    towards = "" if vehicle.track is None else " (positive turns the track to the left)"
+    for exchanged in (False, True) if _both_tracks(vehicle) else (False,):
+        for flipped in flips:
+            # Signs belong to the channels as they are wired, before they are exchanged.
+            sign = np.where([topics[side] in flipped for side in vehicle.sides], -1.0, 1.0)[:, None]
+            rows = (sign * values for values in (run.theta, run.omega, run.alpha))
+            theta, omega, alpha = (values[::-1] if exchanged else values for values in rows)
+            faults = _exchanged_angles(vehicle) if exchanged else ()
+            if flipped:
+                statement = f"{' and '.join(flipped)}: the sign is flipped{towards}"
+                faults = (_Fault("sign_flipped", flipped, statement), *faults)
+            yield faults, replace(run, theta=theta, omega=omega, alpha=alpha)
+
+
+def _signals_undone(vehicle: Vehicle, run: Run, count: int) -> Iterator[tuple[Faults, Array, float]]:
+    """Pressures (lines, n), or the torque of a sensor, with up to ``count`` faults undone, and by which factor the error must
+    fall: one or all units, and exchanged lines; sign and unit of a torque sensor."""
+    for of_units, pressure, better in _units_undone(vehicle, run):
+        if len(of_units) > count:
+            continue
+        yield of_units, pressure, better
+        for faults, order, sign in _plugs(vehicle) if len(of_units) < count else ():
+            yield (*of_units, *faults), sign * pressure[list(order)], BETTER
+
+
+def _plugs(vehicle: Vehicle) -> Iterator[tuple[Faults, tuple[int, ...], float]]:
+    """Orders and signs in which the signals may be connected."""
     if vehicle.hydraulics is None:
         (topic,) = _topics(vehicle, Kind.TORQUE).values()
-        yield _Hypothesis("sign_flipped", (topic,), f"{topic}: the sign is flipped", _error(run, -run.measured, total))
-        force = vehicle.coordinate.force_unit
-        statement = f"{topic}: probably in k{force} (multiply by 1000)"
-        yield _Hypothesis("unit_suspect", (topic,), statement, _error(run, 1e3 * run.measured, total))
+        yield (_Fault("sign_flipped", (topic,), f"{topic}: the sign is flipped"),), (0,), -1.0
+        return
+    topics = list(_topics(vehicle, Kind.PRESSURE).values())
+    for i, j in combinations(range(len(topics)), 2):
+        order = list(range(len(topics)))
+        order[i], order[j] = j, i
+        statement = f"{topics[i]} and {topics[j]} are exchanged; check the plugs of the two sensors"
+        yield (_Fault("swapped_lines", (topics[i], topics[j]), statement),), tuple(order), 1.0
+    circuits = {frozenset((c.cap, c.rod)) for c in vehicle.hydraulics.cylinders.values()}
+    lines = vehicle.hydraulics.lines
+    partner = {line: next(iter(c - {line}), line) for c in circuits for line in c}
+    if len(circuits) > 1 and all(partner.get(line, line) in lines for line in lines):
+        statement = f"{', '.join(topics)}: the two lines of every circuit are exchanged"
+        order = [lines.index(partner.get(line, line)) for line in lines]
+        yield (_Fault("swapped_lines", tuple(topics), statement),), tuple(order), 1.0
+
+
+def _units_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Array, float]]:
+    yield (), run.pressure, BETTER
+    if vehicle.hydraulics is None:
+        (topic,) = _topics(vehicle, Kind.TORQUE).values()
+        statement = f"{topic}: probably in k{vehicle.coordinate.force_unit} (multiply by 1000)"
+        yield (_Fault("unit_suspect", (topic,), statement),), 1e3 * run.pressure, BETTER
         return
     topics = list(_topics(vehicle, Kind.PRESSURE).values())
     highest = np.abs(run.pressure).max(axis=1)
-    for i, j in combinations(range(len(topics)), 2):
-        measured = run.measured + (gains[i] - gains[j]) * (run.pressure[j] - run.pressure[i])
-        statement = f"{topics[i]} and {topics[j]} are exchanged; check the plugs of the two sensors"
-        yield _Hypothesis("swapped_lines", (topics[i], topics[j]), statement, _error(run, measured, total))
     for unit, factor in PRESSURE_UNITS.items():
         statement = f"probably in {unit} (multiply by {factor:g})"
-        every = f"{', '.join(topics)}: {statement}"
-        yield _Hypothesis("unit_suspect", tuple(topics), every, _error(run, factor * run.measured, total))
-        for topic, gain, pressure, high in zip(topics, gains, run.pressure, highest, strict=True):
+        every = _Fault("unit_suspect", tuple(topics), f"{', '.join(topics)}: {statement}")
+        yield (every,), factor * run.pressure, BETTER
+        for i, (topic, high) in enumerate(zip(topics, highest, strict=True)):
             if 0.01 < factor * high / vehicle.sensors.pressure_range_Pa < 1.1:
-                measured = run.measured + gain * (factor - 1.0) * pressure
+                pressure = run.pressure.copy()
+                pressure[i] *= factor
                 # A line that hardly works in this recording changes little, but its magnitude already speaks.
                 better = 1.0 if high < TINY * np.median(highest) else BETTER
-                yield _Hypothesis("unit_suspect", (topic,), f"{topic}: {statement}", _error(run, measured, total), better)
-
-
-def _signs(vehicle: Vehicle, run: Run, expected: Array, mirrored: bool | None) -> Iterator[_Hypothesis]:
-    """Flipped angles, one or all; the chain is not quite odd (gravity), so flipped motion runs through it again.
-
-    All angles flipped look like all circuits exchanged, except to the steering geometry (``mirrored``, if it tells).
-    """
-    topics = _topics(vehicle, Kind.ANGLE)
-    turned = replace(run, theta=-run.theta, omega=-run.omega, alpha=-run.alpha)
-    flipped = _torques(build_model(vehicle), turned)
-    choices = [{side} for side in vehicle.sides] + ([set(vehicle.sides)] if len(vehicle.sides) > 1 else [])
-    for choice in choices:
-        flip = np.array([side in choice for side in vehicle.sides])[:, None]
-        measured = run.measured
-        if vehicle.hydraulics is not None:
-            measured = np.einsum("slt,lt->t", line_gains(vehicle, np.where(flip, -run.theta, run.theta)), run.pressure)
-        error = _error(run, measured, np.where(flip, flipped, expected).sum(axis=0))
-        if len(choice) == 1 or mirrored is not False:
-            named = tuple(topics[side] for side in vehicle.sides if side in choice)
-            statement = f"{' and '.join(named)}: the sign is flipped (positive turns the track to the left)"
-            yield _Hypothesis("sign_flipped", named, statement, error)
-        if len(choice) == len(vehicle.sides) and vehicle.hydraulics is not None and not mirrored:
-            lines = tuple(_topics(vehicle, Kind.PRESSURE).values())
-            statement = f"{', '.join(lines)}: the two lines of every circuit are exchanged"
-            yield _Hypothesis("swapped_lines", lines, statement, error)
+                yield (_Fault("unit_suspect", (topic,), f"{topic}: {statement}"),), pressure, better
 
 
 def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterator[_Hypothesis]:
     """Angles in another unit, too small to see it by magnitude: smoothed again, since their noise scales with them."""
     unit, factor = _foreign_unit(vehicle)
     topics = _topics(vehicle, Kind.ANGLE)
-    choices = [vehicle.sides] + ([(side,) for side in vehicle.sides] if len(vehicle.sides) > 1 else [])
-    for choice in choices:
+    sensors = tuple(dict.fromkeys(topics.values()))
+    for named in (sensors, *((sensor,) for sensor in sensors if len(sensors) > 1)):
         scaled = {
-            side: Signal(s.time_s, s.value * factor) if side in choice else s for side, s in recording.angle.items()
+            side: Signal(s.time_s, s.value * factor) if topics[side] in named else s
+            for side, s in recording.angle.items()
         }
         run = prepare(replace(recording, angle=scaled), vehicle)
-        named = tuple(topics[side] for side in choice)
         statement = f"{' and '.join(named)}: probably in {unit} (multiply by {factor:.6g})"
         error = _error(run, run.measured, _torques(model, run).sum(axis=0))
-        yield _Hypothesis("unit_suspect", named, statement, error)
+        yield _Hypothesis((_Fault("unit_suspect", named, statement),), error)
+
+
+def _both_tracks(vehicle: Vehicle) -> bool:
+    """Whether both tracks have an angle sensor of their own."""
+    return set(vehicle.sides) == {"left", "right"} and vehicle.sensors.angle_from is None
 
 
 def _mirrored(vehicle: Vehicle, run: Run) -> bool | None:
@@ -241,7 +342,7 @@ def _mirrored(vehicle: Vehicle, run: Run) -> bool | None:
     The inner track turns further, cot(left) - cot(right) = -b / L; with the sides exchanged, or with both signs flipped, the
     outer one would. Primary source: Ackermann condition, e.g. Gillespie 1992, chapter 8.
     """
-    if vehicle.axle is None or set(vehicle.sides) != {"left", "right"}:
+    if vehicle.axle is None or not _both_tracks(vehicle):
         return None
     left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
     t, ratio = np.tan(left), vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m

@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lugre_steering import vehicle as vehicle_file
+from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis.dataset import prepare
 from lugre_steering.diagnosis.problem import Problem, fit
@@ -250,6 +251,104 @@ def test_wrong_wiring_stops_the_diagnosis(fault: str, sound: Recording) -> None:
     assert said in quality.findings[0].statement
     start, end = float(sound.angle["left"].time_s[0]), float(sound.angle["left"].time_s[-1])
     assert overlap(quality.findings[0].intervals_s, [(start, end)]) > 0.8
+
+
+def flipped(side: str) -> Fault:
+    return angle(side, scaled(-1.0))
+
+
+MAIN, AUX = (("main_a", "main_b"), ("aux_a", "aux_b"))
+MAIN_TOPICS, AUX_TOPICS = (", ".join(PRESSURE[line] for line in pair) for pair in (MAIN, AUX))
+TWICE: dict[str, tuple[Fault, Fault, set[tuple[str, str]]]] = {
+    "sign and main lines": (flipped("left"), exchanged(MAIN), {("sign_flipped", LEFT), ("swapped_lines", MAIN_TOPICS)}),
+    "sign and auxiliary lines": (flipped("right"), exchanged(AUX), {("sign_flipped", RIGHT), ("swapped_lines", AUX_TOPICS)}),
+    "sign and plugs across": (
+        flipped("right"), exchanged(("main_b", "aux_a")),
+        {("sign_flipped", RIGHT), ("swapped_lines", f"{PRESSURE['main_b']}, {PRESSURE['aux_a']}")},
+    ),
+    "both signs and main lines": (
+        lambda r: flipped("left")(flipped("right")(r)), exchanged(MAIN),
+        {("sign_flipped", f"{LEFT}, {RIGHT}"), ("swapped_lines", MAIN_TOPICS)},
+    ),
+    "sign and unit": (flipped("left"), pressure(scaled(1e-5), *LINES), {("sign_flipped", LEFT), ("unit_suspect", EVERY_LINE)}),
+    "sign and unit of one line": (
+        flipped("right"), pressure(scaled(1e-6), "main_a"), {("sign_flipped", RIGHT), ("unit_suspect", PRESSURE["main_a"])},
+    ),
+    "unit and lines": (
+        pressure(scaled(1e-5), *LINES), exchanged(MAIN), {("unit_suspect", EVERY_LINE), ("swapped_lines", MAIN_TOPICS)},
+    ),
+    "sign, then sides": (
+        flipped("left"), lambda r: replace(r, angle={"left": r.angle["right"], "right": r.angle["left"]}),
+        {("sign_flipped", RIGHT), ("swapped_angles", f"{LEFT}, {RIGHT}")},  # the flipped sensor sits at the right input now
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("faults", TWICE)
+def test_two_faults_at_once_are_both_named(faults: str, sound: Recording) -> None:
+    first, second, expected = TWICE[faults]
+    quality = inspect(second(first(sound)), VEHICLE)
+    assert set(names(quality.findings)) == expected
+    assert quality.blocking == quality.findings
+    for finding in quality.findings:
+        assert "together with another fault" in finding.statement
+
+
+def test_what_a_mirror_cannot_tell_is_said(sound: Recording) -> None:
+    """Both signs flipped and all lines exchanged: the mirrored vehicle, as with exchanged angle sensors."""
+    (found,) = inspect(exchanged(MAIN, AUX)(flipped("left")(flipped("right")(sound))), VEHICLE).findings
+    assert found.finding == "swapped_angles"
+    assert "More than one wiring fault is possible" in found.statement
+
+
+@pytest.mark.parametrize(
+    ("third", "name"), [(later(-1.2), "wiring_suspect"), (scaled(1e-5), "unit_suspect"), (scaled(1e-3), "unit_suspect")]
+)
+def test_more_faults_than_can_be_told_are_no_single_one(third: Edit, name: str, sound: Recording) -> None:
+    """Three at once: no channel is singled out."""
+    bad = pressure(third, *LINES)(exchanged(MAIN)(flipped("right")(sound)))
+    (found,) = inspect(bad, VEHICLE).findings
+    assert found.finding == name
+    assert set(PRESSURE.values()) <= set(found.topic.split(", "))
+    assert "ore than one wiring fault is possible" in found.statement
+
+
+def one_sensor_recording(vehicle: Vehicle) -> Recording:
+    sweeps = Manoeuvre("one", "", (Hold(2.0), *(Sweep(20.0 * (-1.0) ** i, 4.0 + i, 2.0) for i in range(5))))
+    made = simulate(vehicle, motion_of(sweeps, vehicle), sensing_of(vehicle))
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    return Recording(
+        "one", 0, both_from(vehicle, signals["right"]), {line: signals[line] for line in ("main_a", "main_b")}
+    )
+
+
+def both_from(vehicle: Vehicle, right: Signal) -> dict[str, Signal]:
+    """As reading does: the left angle from the right one."""
+    ratio = next(channel.ackermann for channel in vehicle.channels if channel.name == "left")
+    return {"left": Signal(right.time_s, other_track(right.value, right.value, ratio)[0]), "right": right}
+
+
+@pytest.mark.parametrize("fault", ["none", "sign", "lines", "degrees", "sign and unit"])
+def test_wiring_of_one_angle_sensor_and_one_pressure_pair(fault: str) -> None:
+    vehicle = vehicle_file.load(config_folder() / "one_angle_sensor_example.yaml")
+    recording = one_sensor_recording(vehicle)
+    if "sign" in fault:
+        recording = replace(recording, angle=both_from(vehicle, scaled(-1.0)(recording.angle["right"])))
+    if fault == "degrees":
+        recording = replace(recording, angle=both_from(vehicle, scaled(180.0 / math.pi)(recording.angle["right"])))
+    if fault == "lines":
+        recording = exchanged(("main_a", "main_b"))(recording)
+    if "unit" in fault:
+        recording = pressure(scaled(1e-5), "main_a", "main_b")(recording)
+    findings = inspect(recording, vehicle).findings
+    both = f"{PRESSURE['main_a']}, {PRESSURE['main_b']}"
+    expected = {
+        "none": [], "sign": [("sign_flipped", RIGHT)], "lines": [("sign_flipped", RIGHT)], "degrees": [("unit_suspect", RIGHT)],
+        "sign and unit": [("sign_flipped", RIGHT), ("unit_suspect", both)],
+    }  # fmt: skip
+    assert [f for f in names(findings) if f[0] in ("sign_flipped", "unit_suspect", "swapped_lines")] == expected[fault]
+    if fault in ("sign", "lines"):  # with one sensor no geometry tells them apart
+        assert f"{PRESSURE['main_a']} and {PRESSURE['main_b']} are exchanged" in findings[0].statement
 
 
 @pytest.mark.parametrize("skew_s", [0.15, -0.3])
