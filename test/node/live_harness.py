@@ -78,16 +78,13 @@ def environment() -> dict[str, str]:
     }
 
 
-class LiveNode:
-    """The node in its own process; use as a context manager."""
+class Live:
+    """A process that brings the node up; use as a context manager."""
 
-    def __init__(self, *ros_args: str, command: Sequence[str] = ("-m", "lugre_steering.node"), vehicle: Path = VEHICLE):
+    def __init__(self, command: Sequence[str], env: Mapping[str, str]) -> None:
         self.log = Path(tempfile.mkstemp(prefix="live_node_", suffix=".log")[1])
-        arguments = ["--ros-args", "-p", f"vehicle_file:={vehicle}", *ros_args]
         with self.log.open("w") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, *command, *arguments], stdout=log, stderr=subprocess.STDOUT, env=environment()
-            )
+            self.process = subprocess.Popen([*command], stdout=log, stderr=subprocess.STDOUT, env=env)
         deadline = time.monotonic() + START_TIMEOUT_S
         while " ready" not in self.output:
             if self.process.poll() is not None or time.monotonic() > deadline:
@@ -113,6 +110,14 @@ class LiveNode:
             self.process.terminate()
             self.process.wait(timeout=20.0)
         self.log.unlink()
+
+
+class LiveNode(Live):
+    """The node of this source tree."""
+
+    def __init__(self, *ros_args: str, command: Sequence[str] = ("-m", "lugre_steering.node"), vehicle: Path = VEHICLE):
+        arguments = ["--ros-args", "-p", f"vehicle_file:={vehicle}", *ros_args]
+        super().__init__([sys.executable, *command, *arguments], environment())
 
 
 class World:

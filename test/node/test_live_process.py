@@ -112,14 +112,3 @@ def test_the_node_imports_no_plotting_bags_or_command_line() -> None:
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(), check=True)
     assert done.stdout.strip() == ""
-
-
-def test_launch_file() -> None:
-    file = PACKAGE_ROOT / "launch" / "estimator.launch.py"
-    code = compile(file.read_text(), str(file), "exec")
-    pytest.importorskip("launch")
-    pytest.importorskip("launch_ros")
-    namespace: dict[str, object] = {}
-    exec(code, namespace)
-    if not any("lugre_steering" in path for path in sys.path):
-        pytest.skip("package not installed in an ament prefix")
