@@ -31,10 +31,12 @@ from lugre_steering.vehicle import EffectEntry, Vehicle
 NULL_DRAWS = 16
 MIN_SLIDING = 2.0
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart."""
-UNLISTED_EXCESS, SLOW_DOUBT, FAST_EXCESS = 0.25, 0.5, 1.0
+UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
 """Energy left over, in noise variances, that makes a verdict: slow and above the doubt about slow noise, or of any kind."""
 LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
 """Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
+CONTRADICTED = 0.02
+"""Growth of the held-out error that overrules a name."""
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""
 
@@ -144,8 +146,8 @@ class _Conclusion:
         problem, roles, found = self.problem, self.roles, self.found
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         judged = verify.verify(problem, weight, found.baseline, found.final, roles, self.seed)
-        # The search has already tested significance; held-out data must not contradict it.
-        named = bool(found.found) and judged.gain > 0.0
+        # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
+        named = bool(found.found) and judged.gain > -CONTRADICTED
         final = found.final if named else found.baseline
         whole = fit(problem, weight, final.effects, final.x, evaluations=12)
         residual = problem.measured - found.final.prediction
@@ -256,7 +258,7 @@ class _Conclusion:
         slow, nothing = self._slow_energy(residual * weight), self._slow_energy(self.noise.draws * weight)
         excess = float(np.mean((residual * weight)[used] ** 2)) - 1.0
         # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
-        structured = slow - nothing > max(UNLISTED_EXCESS, SLOW_DOUBT * nothing) or excess > FAST_EXCESS
+        structured = slow - nothing > max(UNLISTED_EXCESS, name.SLOW_DOUBT * nothing) or excess > FAST_EXCESS
         if not structured:
             return (
                 {
@@ -277,6 +279,12 @@ class _Conclusion:
         held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
         proposal = unlisted.propose(stacked, residual, fitted, held, units.is_linear(problem.vehicle))
+        pattern = self.found.pattern if not final.effects else None
+        if pattern is not None:
+            before, after = name.cost(problem, self.found.baseline, held), pattern.cost(problem, held)
+            gain = 1.0 - after / max(before, 1e-9)
+            if gain > (proposal.gain if proposal is not None else 0.02):
+                proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
         if proposal is not None:
             formula = f"{units.law(problem.vehicle, proposal.text)} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
         where = []

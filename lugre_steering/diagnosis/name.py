@@ -11,6 +11,7 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.diagnosis.fingerprint import Score, screen
+from lugre_steering.diagnosis.foreign import Pattern, strongest
 from lugre_steering.diagnosis.noise import Noise
 from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
 from lugre_steering.diagnosis.split import Split
@@ -21,6 +22,8 @@ SHORTLIST = 7
 FALSE_DISCOVERY_RATE = 0.01
 OWN_ERROR = 0.05
 """Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
+SLOW_DOUBT = 0.5
+"""Share by which the slow noise may be more than standstill shows."""
 WHOLE = (0.75, 0.09, 0.93)
 """Share of the excess that named physics must explain together, else it is unlisted: at an excess of one noise variance, per
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
@@ -28,6 +31,8 @@ LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
 VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
+PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
+"""Excess from which patterns outside the catalogue compete, and share of the names' gain that counts as a difference."""
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
 """A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
@@ -69,6 +74,8 @@ class Search:
     listed: bool
     first_scores: tuple[Score, ...]
     trials: tuple[Trial, ...]
+    pattern: Pattern | None
+    """The strongest pattern that no entry makes, where there was anything to explain."""
 
 
 def cost(problem: Problem, result: Fit, weight: Array) -> float:
@@ -125,16 +132,25 @@ def search(
         steps, current = _prune(steps, problem, weight, samples, current)
         if best.cost - samples < OWN_ERROR * samples:
             break
-    kept = _keep(steps, problem, weight, start_cost, samples)
+    kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + SLOW_DOUBT * noise.slow_share)
     final, found = (steps[kept - 1][0], [item for _, item, _ in steps[:kept]]) if kept else (baseline, [])
     for index in range(kept):
         progress(f"rivals of {found[index].score.candidate.label}")
         final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples)
+    pattern = strongest(problem, baseline, weight) if excess > PATTERN_EXCESS * samples else None
+    if pattern is not None and found and _foreign(pattern.cost(problem, weight), cost(problem, final, weight), start_cost, len(found)):
+        final, found = baseline, []
     explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
     return Search(
-        baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), kept > 0 or not steps,
-        first_scores, tuple(all_trials),
+        baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), bool(found) or not steps,
+        first_scores, tuple(all_trials), pattern,
     )  # fmt: skip
+
+
+def _foreign(with_pattern: float, named: float, start: float, names: int) -> bool:
+    """Whether one pattern outside the catalogue explains the recording better than the names, or several names no better."""
+    margin = PATTERN_MARGIN * (start - named)
+    return with_pattern < named + (margin if names > 1 else -margin)
 
 
 def _confront(
@@ -190,15 +206,18 @@ def _prune(
 
 
 def _keep(
-    steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float
+    steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float, doubt: float
 ) -> int:
-    """How many steps of the build-up stand: the fewest that explain the whole, unless the next explains most of the rest."""
+    """How many steps of the build-up stand: the fewest that explain the whole, unless the next explains most of the rest.
+
+    ``doubt``: energy per sample, in noise variances, that may be left over with nothing hidden.
+    """
     kept = 0
     excess = max((start - samples) / samples, 1.0)
     needed = min(WHOLE[0] + WHOLE[1] * float(np.log10(excess)), WHOLE[2])
     for i, (result, _, gained) in enumerate(steps):
         after = cost(problem, result, weight)
-        whole = (start - after) / max(start - samples * (1.0 + OWN_ERROR), start - after, 1e-9)
+        whole = (start - after) / max(start - samples * (1.0 + doubt), start - after, 1e-9)
         if whole >= needed and gained >= LAST:
             kept = i + 1
     return kept

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise with a memory: what the sensors and the motion estimate can put into a residual without any missing physics.
 
-Three sources, all measured on the recording itself: the slow torque noise of standstill stretches (as an autoregressive
-process); the fast one all along the recording, where it may grow with load and motion (pump ripple, vibration), since no
+Three sources, all measured on the recording itself: the slow torque noise of standstill stretches (by its
+autocorrelation); the fast one all along the recording, where it may grow with load and motion (pump ripple, vibration), since no
 physics of a steered contact is that fast for long; and the error that angle noise causes through smoother and chain (by
 repeating both with fresh angle noise).
 """
@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_toeplitz, toeplitz
+from scipy.linalg import toeplitz
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt
 
 from lugre_steering.chain.step import REST_RATE_RAD_S
 from lugre_steering.diagnosis.dataset import Run, angle_noise, motion
@@ -39,18 +39,22 @@ SUDDEN = 3.0
 
 @dataclass(frozen=True)
 class QuietNoise:
-    """Torque noise seen at standstill: level relative to the sheet, and AR coefficients of the standardised noise."""
+    """Torque noise seen at standstill: level relative to the sheet, and autocorrelation by lag, zero beyond the last."""
 
     level: float
-    coefficients: Array
-    innovation: float
+    correlation: Array
 
     def draw(self, size: int, rng: np.random.Generator) -> Array:
-        """Standardised noise (size,) with unit variance times ``level``."""
-        warm = 200
-        white = rng.standard_normal(size + warm) * self.innovation
-        coloured: Array = lfilter([1.0], np.concatenate([[1.0], -self.coefficients]), white)[warm:]
-        return coloured * self.level
+        """Standardised noise (size,) with unit variance times ``level``, by its spectrum (circulant embedding)."""
+        lags, length = self.correlation.size - 1, size + self.correlation.size
+        cyclic = np.zeros(length)
+        cyclic[: lags + 1] = self.correlation
+        cyclic[length - lags :] += self.correlation[:0:-1]
+        # An estimated correlation need not be one: where its spectrum is negative, there is nothing.
+        power = np.maximum(np.fft.rfft(cyclic).real, 0.0)
+        power *= length / (power[0] + 2.0 * power[1 : (length + 1) // 2].sum() + (power[-1] if length % 2 == 0 else 0.0))
+        drawn = np.fft.irfft(np.sqrt(power) * np.fft.rfft(rng.standard_normal(length)), length)[:size]
+        return np.asarray(drawn * self.level)
 
 
 def standstill(run: Run, minimum_s: float = 1.0) -> list[slice]:
@@ -77,7 +81,7 @@ def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     size = min(round(CHUNK_S / dt), int(np.median([stretch.size for stretch in stretches]))) if stretches else 0
     chunks = [s[k : k + size] for s in stretches for k in range(0, s.size - size + 1, max(size, 1))]
     if size <= 2 * order or len(chunks) * size * dt < MIN_QUIET_S:
-        return QuietNoise(1.0, np.zeros(1), 1.0)
+        return QuietNoise(1.0, np.ones(1))
     clean = _detrend(np.array(chunks).T)
     seen = _autocovariance(clean, order)
     memories = np.exp(-np.arange(size) / np.maximum(np.array(MEMORIES_S) / dt, 1e-9)[:, None])
@@ -90,9 +94,7 @@ def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     significance = covariance / covariance[0]
     significance[1:] = np.where(np.abs(significance[1:]) > 3.0 / np.sqrt(clean.size), significance[1:], 0.0)
     significance *= 1.0 - np.arange(order + 1) / (order + 1)
-    coefficients = solve_toeplitz(significance[:-1], significance[1:])
-    innovation = float(np.sqrt(max(1.0 - coefficients @ significance[1:], 0.02)))
-    return QuietNoise(float(np.sqrt(covariance[0])), coefficients, innovation)
+    return QuietNoise(float(np.sqrt(covariance[0])), significance)
 
 
 def _detrend(columns: Array) -> Array:
@@ -113,6 +115,8 @@ class Noise:
 
     sigma: Array
     draws: Array
+    slow_share: float
+    """Share of the noise energy that is slow; short standstills tell it to some half only."""
 
     @property
     def floor(self) -> float:
@@ -190,13 +194,15 @@ def noise_model(
     steps = [run.time[1] - run.time[0] for run in problem.runs]
     known = np.concatenate([np.mean((e - slow_part(e, dt)) ** 2, axis=0) for e, dt in zip(errors, steps, strict=True)])
     fast = fast_variance(problem, problem.measured - base, known)
-    sigmas, residuals = [], []
+    sigmas, slow_sigmas, residuals = [], [], []
     for bag, (run, part) in enumerate(parts):
         rng = np.random.default_rng([seed, bag, 1])
         torque = np.array([quiet.draw(run.time.size, rng) for _ in range(draws)])
         slow = slow_part(torque, steps[bag])
         swift = (torque - slow) / np.std(torque - slow)
         variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / steps[bag])))
-        sigmas.append(np.sqrt(np.var(slow) * run.sigma**2 + fast[part] + variance))
+        slow_sigmas.append(np.std(slow) * run.sigma)
+        sigmas.append(np.sqrt(slow_sigmas[-1] ** 2 + fast[part] + variance))
         residuals.append(slow * run.sigma + swift * np.sqrt(fast[part]) - errors[bag])
-    return Noise(np.concatenate(sigmas), np.concatenate(residuals, axis=1))
+    sigma = np.concatenate(sigmas)
+    return Noise(sigma, np.concatenate(residuals, axis=1), float(np.mean((np.concatenate(slow_sigmas) / sigma) ** 2)))
