@@ -102,9 +102,10 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     if s.started == 0.0:
         begin(p, s, theta)
     s.time += dt
-    stiffness_ratio, friction_ratio, outside = ratios(
-        rubber, p.table_low, p.table_step, s.temperature + p.flash_temperature_resistance * s.flash_power
-    )
+    stiffness_ratio, friction_ratio, outside = ratios(rubber, p.table_low, p.table_step, s.temperature)
+    if p.flash_temperature_resistance != 0.0:
+        hot = s.temperature + p.flash_temperature_resistance * s.flash_power
+        _, friction_ratio, outside = ratios(rubber, p.table_low, p.table_step, hot)
     s.saturated += outside
     stiffness = p.sigma_0 * stiffness_ratio
     length = p.coulomb_torque * friction_ratio / stiffness

@@ -110,7 +110,7 @@ def _unit(problem: Problem, relative_to: str) -> float:
 
 
 def _windows(problem: Problem, effect: Effect) -> list[Candidate]:
-    """Angle windows shared by all bags, and time windows of single bags."""
+    """Angle windows and time windows; each is tried in all bags and in single ones."""
     free = ("change",)
     low = min(float(run.theta.min()) for run in problem.runs)
     high = max(float(run.theta.max()) for run in problem.runs)
@@ -120,13 +120,12 @@ def _windows(problem: Problem, effect: Effect) -> list[Candidate]:
         for a, b in itertools.combinations(edges, 2)
         if b - a < 0.99 * (edges[-1] - edges[0])
     ]
-    for bag, run in enumerate(problem.runs):
-        times = np.linspace(run.time[0] - 1.0, run.time[-1] + 1.0, WINDOW_EDGES)
-        found += [
-            Candidate(effect, (("time_start", float(a)), ("time_end", float(b))), bags=(bag,), free=free)
-            for a, b in itertools.combinations(times, 2)
-            if b - a < 0.99 * (times[-1] - times[0])
-        ]
+    times = np.linspace(-1.0, max(float(run.time[-1]) for run in problem.runs) + 1.0, WINDOW_EDGES)
+    found += [
+        Candidate(effect, (("time_start", float(a)), ("time_end", float(b))), free=free)
+        for a, b in itertools.combinations(times, 2)
+        if b - a < 0.99 * (times[-1] - times[0])
+    ]
     return found
 
 

@@ -278,7 +278,7 @@ def _cornered(problem: Problem, current: Fit) -> bool:
 
 
 def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
-    """A promising trial from its next best shapes as well (valleys are narrow), then refined."""
+    """A promising trial from its next best shapes and from the sheet as well (valleys are narrow), then refined."""
     tried = trial.score.candidate
     variants = [
         score for score in scores
@@ -286,6 +286,7 @@ def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: 
         and score.candidate.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
     ]  # fmt: skip
     others = [try_effect(problem, weight, current, score) for score in variants[:VARIANTS]]
+    others += [try_effect(problem, weight, replace(current, x=problem.start()), trial.score)]
     return refine(problem, weight, min([trial, *others], key=lambda each: each.cost))
 
 

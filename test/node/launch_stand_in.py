@@ -98,6 +98,9 @@ class Node:
 
 
 class LaunchService:
+    def __init__(self, *, noninteractive: bool) -> None:
+        assert noninteractive  # signals come to this process only
+
     def include_launch_description(self, included: IncludeLaunchDescription) -> None:
         """Read the launch file and settle its arguments."""
         entities = runpy.run_path(included.source.path)["generate_launch_description"]().entities

@@ -34,7 +34,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 
 file, *arguments = sys.argv[1:]
 pairs = [argument.split(":=", 1) for argument in arguments]
-service = LaunchService()
+service = LaunchService(noninteractive=True)  # passes SIGINT on: no terminal does it
 service.include_launch_description(IncludeLaunchDescription(PythonLaunchDescriptionSource(file), launch_arguments=pairs))
 sys.exit(service.run())
 """
