@@ -19,10 +19,10 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis.bursts import all_bursts, set_aside
 from lugre_steering.diagnosis.dataset import Run, prepare
-from lugre_steering.diagnosis.name import Search, search
-from lugre_steering.diagnosis.noise import noise_model
-from lugre_steering.diagnosis.problem import Problem, fit
-from lugre_steering.diagnosis.split import Split, split
+from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.name import Search
+from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.split import Split
 from lugre_steering.importing import import_table
 from lugre_steering.simulate.manoeuvres import BUILT_IN, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate
@@ -53,11 +53,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
 
 def diagnosed(runs: Sequence[Run]) -> tuple[Problem, Split, Search]:
     problem = Problem(vehicle_file.load(VEHICLE), runs)
-    roles = split(problem)
-    baseline = fit(problem, roles.fit / np.concatenate([run.sigma for run in runs]))
-    noise = noise_model(problem, baseline.x, (), draws=12, seed=1)
-    baseline = fit(problem, roles.fit / noise.sigma, start=baseline.x)
-    return problem, roles, search(problem, noise, roles, baseline)
+    _, roles, found = investigate(problem, seed=1)
+    return problem, roles, found
 
 
 def residual(problem: Problem, found: Search) -> np.ndarray:

@@ -18,17 +18,17 @@ from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.bursts import set_aside
 from lugre_steering.diagnosis.dataset import Run, prepare
 from lugre_steering.diagnosis.fingerprint import Score
-from lugre_steering.diagnosis.noise import Noise, noise_model, slow_part
+from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.noise import Noise, slow_part
 from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
 from lugre_steering.diagnosis.quality import Quality, inspect
 from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence, finite
-from lugre_steering.diagnosis.split import Split, balanced, split
+from lugre_steering.diagnosis.split import Split, split
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Recording
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
-NULL_DRAWS = 16
 MIN_SLIDING = 2.0
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart."""
 UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
@@ -95,29 +95,16 @@ def diagnose_recordings(
         )
         return _insufficient(qualities, vehicle, findings, statement, advice)
     progress("recalibrating the baseline")
-    noise, roles, baseline = _recalibrate(problem, seed)
-    found = name.search(problem, noise, roles, baseline, progress)
+    noise, roles, found = investigate(problem, seed, progress)
     left = problem.measured - found.final.prediction
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
         findings += [_entry(finding, bag) for bag, finding in disturbed.items()]
         problem = Problem(vehicle, runs)
-        noise, roles, baseline = _recalibrate(problem, seed)
-        found = name.search(problem, noise, roles, baseline, progress)
+        noise, roles, found = investigate(problem, seed, progress)
     progress("verifying on held-out data")
     return _Conclusion(problem, noise, roles, found, seed, material, progress).diagnosis(findings)
-
-
-def _recalibrate(problem: Problem, seed: int) -> tuple[Noise, Split, Fit]:
-    """Baseline fitted with sheet noise first, then with the noise measured at that fit, on the split that suits its errors."""
-    sheet = np.concatenate([run.sigma for run in problem.runs])
-    weight = np.where(split(problem).fit, 1.0 / sheet, 0.0)
-    starts = [fit(problem, weight, evaluations=25), fit(problem, weight, robust=True, evaluations=25)]
-    first = min((fit(problem, weight, start=start.x, evaluations=10) for start in starts), key=lambda f: f.cost)
-    noise = noise_model(problem, first.x, (), draws=NULL_DRAWS, seed=seed)
-    roles = balanced(problem, ((problem.measured - first.prediction) / noise.sigma) ** 2 - 1.0)
-    return noise, roles, fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=first.x)
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,8 @@ VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
 """Excess from which patterns outside the catalogue compete, and share of the names' gain that counts as a difference."""
+MEMORY = 4.0
+"""Samples that count as one, roughly: errors have a memory."""
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
 """A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
@@ -301,7 +303,9 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
     richer = replace(candidate, free=candidate.free + tuple(optional))
     result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=20)
-    deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0))[-len(optional) :]
+    # What the model leaves over makes its numbers less sure than noise alone would.
+    misfit = max(cost(problem, result, weight) / max(float(np.count_nonzero(weight)), 1.0), 1.0)
+    deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]
     fitted = result.effects[-1][1]
     needed = tuple(name for name, sd in zip(optional, deviation, strict=True) if abs(fitted[name]) > 4.0 * sd)
     if len(needed) < len(optional):
@@ -309,7 +313,7 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
         leaner = replace(candidate, free=candidate.free + needed)
         result = fit(problem, weight, [*earlier, (leaner, fitted)], result.x, evaluations=8)
     better = cost(problem, result, weight)
-    return Trial(trial.score, result, better) if better < trial.cost - 10.0 * max(len(needed), 1) else trial
+    return Trial(trial.score, result, better) if better < trial.cost - 10.0 * misfit * max(len(needed), 1) else trial
 
 
 def tied(

@@ -3,7 +3,7 @@
 """Noise with a memory: what the sensors and the motion estimate can put into a residual without any missing physics.
 
 Three sources, all measured on the recording itself: the slow torque noise of standstill stretches (by its
-autocorrelation); the fast one all along the recording, where it may grow with load and motion (pump ripple, vibration), since no
+autocorrelation); in oil the fast one all along the recording, where it grows with load and motion (pump ripple), since no
 physics of a steered contact is that fast for long; and the error that angle noise causes through smoother and chain (by
 repeating both with fresh angle noise).
 """
@@ -32,7 +32,7 @@ MIN_QUIET_S = 3.0
 MOTION_PROFILE_S = 0.5
 SPLIT_HZ = 2.5
 """Between slow noise, known from standstill only, and fast noise, known from the residual wherever nothing sudden happens."""
-WINDOW_S = 1.0
+WINDOW_S = 0.25
 SUDDEN = 3.0
 """Times its expected fast energy beyond which a window holds an event rather than noise."""
 
@@ -137,8 +137,7 @@ def fast_variance(problem: Problem, residual: Array, known: Array) -> Array:
     """
     shapes, energies = [], []
     for run, part in _parts(problem):
-        dt = run.time[1] - run.time[0]
-        fast = residual[part] - slow_part(residual[part], dt)
+        fast = _without_motion(run, residual[part])
         moving = np.abs(run.omega).max(axis=0) > REST_RATE_RAD_S
         shapes.append(np.array([run.sigma**2, run.measured**2, moving * run.sigma**2]))
         energies.append(fast**2 - known[part])
@@ -160,6 +159,17 @@ def fast_variance(problem: Problem, residual: Array, known: Array) -> Array:
         share, _ = nnls(rows[quiet] / expected[quiet, None], target[quiet] / expected[quiet])
         expected = np.maximum(rows @ share, 1e-3 * max(float(np.median(target[sound])), 1e-30))
     return np.asarray((share / scale) @ shape)
+
+
+def _without_motion(run: Run, residual: Array) -> Array:
+    """Fast part of a residual (n,) without what is proportional to motion and torque or their changes: that is physics."""
+    dt = run.time[1] - run.time[0]
+    omega, alpha, torque = run.omega.sum(axis=0), run.alpha.sum(axis=0), run.measured - residual
+    drivers = np.array([omega, alpha, torque, np.gradient(torque, dt), np.sign(omega) * (np.abs(omega) > REST_RATE_RAD_S), residual])
+    fast = drivers - slow_part(drivers, dt)
+    causes = fast[:-1, run.valid].T / np.maximum(np.std(fast[:-1, run.valid], axis=1), 1e-30)
+    shares = np.linalg.lstsq(causes, fast[-1, run.valid], rcond=1e-8)[0]
+    return np.asarray(fast[-1] - shares @ (fast[:-1] / np.maximum(np.std(fast[:-1, run.valid], axis=1), 1e-30)[:, None]))
 
 
 def _parts(problem: Problem) -> list[tuple[Run, slice]]:
@@ -193,16 +203,19 @@ def noise_model(
     errors = in_threads(repeat, range(len(parts)))
     steps = [run.time[1] - run.time[0] for run in problem.runs]
     known = np.concatenate([np.mean((e - slow_part(e, dt)) ** 2, axis=0) for e, dt in zip(errors, steps, strict=True)])
-    fast = fast_variance(problem, problem.measured - base, known)
+    # Only oil carries pump ripple; a torque sensor is as noisy in motion as at rest.
+    hydraulic = problem.vehicle.hydraulics is not None
+    fast = fast_variance(problem, problem.measured - base, known) if hydraulic else None
     sigmas, slow_sigmas, residuals = [], [], []
     for bag, (run, part) in enumerate(parts):
         rng = np.random.default_rng([seed, bag, 1])
         torque = np.array([quiet.draw(run.time.size, rng) for _ in range(draws)])
         slow = slow_part(torque, steps[bag])
-        swift = (torque - slow) / np.std(torque - slow)
+        swift = torque - slow
+        swift_sigma = np.std(swift) * run.sigma if fast is None else np.sqrt(fast[part])
         variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / steps[bag])))
         slow_sigmas.append(np.std(slow) * run.sigma)
-        sigmas.append(np.sqrt(slow_sigmas[-1] ** 2 + fast[part] + variance))
-        residuals.append(slow * run.sigma + swift * np.sqrt(fast[part]) - errors[bag])
+        sigmas.append(np.sqrt(slow_sigmas[-1] ** 2 + swift_sigma**2 + variance))
+        residuals.append(slow * run.sigma + swift / np.std(swift) * swift_sigma - errors[bag])
     sigma = np.concatenate(sigmas)
     return Noise(sigma, np.concatenate(residuals, axis=1), float(np.mean((np.concatenate(slow_sigmas) / sigma) ** 2)))
