@@ -178,9 +178,9 @@ class World:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._executor.shutdown()
-        rclpy.shutdown(context=self.context)
+        rclpy.shutdown(context=self.context)  # ends the thread's spin; only then may the executor go
         self._thread.join(5.0)
+        self._executor.shutdown()
 
     def wait(self, condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
         deadline = time.monotonic() + timeout_s
