@@ -61,7 +61,8 @@ EFFECT_FIELDS = (
     "cylinder_friction_rate_scale", "line_loss_linear_b", "line_loss_quadratic_c",
     "back_pressure_torque",
     "back_pressure_flow",
-    "back_pressure_rate_scale", "relief_saturation_ceiling", "trapped_pressure_share", "trapped_pressure_time_constant",
+    "back_pressure_rate_scale", "relief_saturation_ceiling", "relief_saturation_arm_slope",
+    "relief_saturation_arm_curvature", "trapped_pressure_share", "trapped_pressure_time_constant",
     "trapped_pressure_refill_time",
 )  # fmt: skip
 

@@ -214,6 +214,7 @@ def run_side(
     """
     out = np.zeros(time.size, OUTPUT)
     previous = float(time[0]) if previous_time is None else previous_time
+    time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))  # one compiled form
     _run(p, new_state() if state is None else state, rubber, time, theta, omega, alpha, out, previous, has_effects(p))
     return out
 
@@ -221,5 +222,6 @@ def run_side(
 def torque_side(p: Records, rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array) -> Array:
     """Whole record of one track -> torque [N m] only (n,); the fast path of fits. Same arithmetic as ``run_side``."""
     torque = np.empty(time.size)
+    time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))
     _torque(p, new_state(), rubber, np.zeros(1, OUTPUT), time, theta, omega, alpha, torque, has_effects(p))
     return torque

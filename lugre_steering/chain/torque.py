@@ -98,10 +98,13 @@ def losses(p, s, omega, d_theta, load):
 def hydraulic_limits(p, s, torque, dt, resting):
     """What the hydraulics can hold: relief_saturation clips at a ceiling, trapped_pressure leaks away at standstill.
 
+    The ceiling is a pressure, so the torque follows the arms: 1 + arm_slope u + arm_curvature u^2, u the angle toward the push.
     trapped: torque (1 - share leaked); leaked goes to 1 with tau at rest and back to 0 with ``refill_time`` in motion.
     """
     if p.relief_saturation_ceiling != 0.0:
-        limit = p.relief_saturation_ceiling / p.sides
+        toward = s.theta if torque > 0.0 else -s.theta
+        arm = 1.0 + toward * (p.relief_saturation_arm_slope + toward * p.relief_saturation_arm_curvature)
+        limit = p.relief_saturation_ceiling / p.sides * max(arm, 0.1)
         torque = max(-limit, min(limit, torque))
     if p.trapped_pressure_share != 0.0:
         if resting:

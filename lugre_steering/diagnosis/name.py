@@ -35,6 +35,9 @@ PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
 """Excess from which patterns outside the catalogue compete, and share of the names' gain that counts as a difference."""
 MEMORY = 4.0
 """Samples that count as one, roughly: errors have a memory."""
+MINOR = 0.08
+"""Share of all that is explained below which an earlier effect goes when a later one comes."""
+TRIAL_TOLERANCE = 1e-4
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
 """A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
@@ -131,7 +134,7 @@ def search(
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
         steps.append((best.fit, Found(best.score, names, tuple(trials), before - best.cost), gained))
         current = best.fit
-        steps, current = _prune(steps, problem, weight, samples, current)
+        steps, current = _prune(steps, problem, weight, samples, start_cost, current)
         if best.cost - samples < OWN_ERROR * samples:
             break
     kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + SLOW_DOUBT * noise.slow_share)
@@ -188,13 +191,14 @@ def _confront(
 
 
 def _prune(
-    steps: list[tuple[Fit, Found, float]], problem: Problem, weight: Array, samples: float, current: Fit
+    steps: list[tuple[Fit, Found, float]], problem: Problem, weight: Array, samples: float, start: float, current: Fit
 ) -> tuple[list[tuple[Fit, Found, float]], Fit]:
-    """Drop earlier effects that the latest one has made superfluous."""
+    """Drop earlier effects that the latest one has made superfluous: they had only filled in for its shape."""
     for index in range(len(steps) - 2, -1, -1):
         rest = [effect for i, effect in enumerate(current.effects) if i != index]
-        without = fit(problem, weight, rest, current.x, evaluations=8)
-        if cost(problem, without, weight) - cost(problem, current, weight) < OWN_ERROR * samples:
+        without = fit(problem, weight, rest, current.x, evaluations=20, tolerance=1e-5)
+        after = cost(problem, current, weight)
+        if cost(problem, without, weight) - after < max(OWN_ERROR * samples, MINOR * (start - after)):
             dropped = steps[index][1]
             current = without
             last = steps[-1][1]
@@ -267,7 +271,9 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
     if _cornered(problem, current):
         # Recalibration was bent to imitate what is missing; from there the way back may be closed.
         starts.append(problem.start())
-    fits = [fit(problem, weight, effects, start, evaluations=8) for start in starts]
+    fits = [fit(problem, weight, effects, start, evaluations=8, tolerance=MINOR = 0.08
+"""Share of all that is explained below which an earlier effect goes when a later one comes."""
+TRIAL_TOLERANCE) for start in starts]
     costs = [cost(problem, result, weight) for result in fits]
     best = int(np.argmin(costs))
     return Trial(score, fits[best], costs[best])
@@ -297,12 +303,12 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     candidate, values = trial.fit.effects[-1]
     optional = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     if not optional:
-        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=20)
+        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=20, tolerance=1e-5)
         return Trial(trial.score, result, cost(problem, result, weight))
     earlier = trial.fit.effects[:-1]
     start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
     richer = replace(candidate, free=candidate.free + tuple(optional))
-    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=20)
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=20, tolerance=1e-5)
     # What the model leaves over makes its numbers less sure than noise alone would.
     misfit = max(cost(problem, result, weight) / max(float(np.count_nonzero(weight)), 1.0), 1.0)
     deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]

@@ -247,11 +247,13 @@ def fit(
     evaluations: int = 12,
     robust: bool = False,
     priors: bool = True,
+    tolerance: float = 1e-6,
 ) -> Fit:
     """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
-    ``robust`` bounds the influence of samples beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
+    ``tolerance``: relative fall of the cost per step below which the fit ends. ``robust`` bounds the influence of samples
+    beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
     x0 = problem.start() if start is None else start
     low, high = problem.bounds()
@@ -297,7 +299,7 @@ def fit(
         else:
             break
         p, base, damping = trial, moved, max(damping / 6.0, 1e-9)
-        if before - after < 1e-6 * after:
+        if before - after < tolerance * after:
             break
     x, fitted = unpack(p)
     final = jacobian(p, base)

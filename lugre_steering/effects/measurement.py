@@ -42,8 +42,13 @@ EFFECTS = (
     ),
     Effect(
         "relief_saturation", "measurement", 2, "Relief valve limits the torque",
-        "|M| <= ceiling", "Merritt 1967", "a flat torque ceiling", "torque",
-        (Parameter("ceiling", "N m", "of the vehicle", 1e3, 1e3, 1e7),), ("end_stop",),
+        "|M| <= ceiling (1 + arm_slope u + arm_curvature u^2), u = theta sgn(M)", "Merritt 1967", "a torque ceiling", "torque",
+        (
+            Parameter("ceiling", "N m", "of the vehicle", 1e3, 1e3, 1e7),
+            Parameter("arm_slope", "1/rad", "of the cylinder arms toward the push", 0.05, -2.0, 2.0, optional=True),
+            Parameter("arm_curvature", "1/rad^2", "of the cylinder arms", 0.1, -5.0, 5.0, optional=True),
+        ),
+        ("end_stop",),
     ),
     Effect(
         "trapped_pressure", "measurement", 2, "Trapped oil leaks away at standstill",
