@@ -271,9 +271,7 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
     if _cornered(problem, current):
         # Recalibration was bent to imitate what is missing; from there the way back may be closed.
         starts.append(problem.start())
-    fits = [fit(problem, weight, effects, start, evaluations=8, tolerance=MINOR = 0.08
-"""Share of all that is explained below which an earlier effect goes when a later one comes."""
-TRIAL_TOLERANCE) for start in starts]
+    fits = [fit(problem, weight, effects, start, evaluations=8, tolerance=TRIAL_TOLERANCE) for start in starts]
     costs = [cost(problem, result, weight) for result in fits]
     best = int(np.argmin(costs))
     return Trial(score, fits[best], costs[best])
