@@ -71,18 +71,21 @@ def level_factor(p, s, sign):
 
 
 @law
-def aged_level(p, s, d_theta, resting):
-    """static_ageing: extra level as a share of Coulomb friction, rate * ln(1 + dwell / t_c), lost over a slip scale.
+def aged_level(p, s, d_theta, dt, length):
+    """static_ageing: extra level as a share of Coulomb friction, rate * ln(1 + age / t_c), d age/dt = 1 - age |dtheta/dt| / D.
 
-    Log-time strengthening of resting contacts (Dieterich 1972; Rice and Ruina 1983).
+    Ageing law of resting and sliding contacts (Dieterich 1972; Rice and Ruina 1983), exact for a constant rate in a step.
+    Only sliding renews a contact, the share |z| / length of the motion; bristles that merely bend keep theirs.
     """
     if p.static_ageing_rate == 0.0:
         return 0.0
-    if resting:
-        s.ageing = max(s.ageing, math.log1p(s.dwell / p.static_ageing_dwell))
+    slip = abs(d_theta) * min(1.0, abs(s.z) / length) / p.static_ageing_slip_scale
+    if slip < 1e-9:
+        s.age += dt
     else:
-        s.ageing *= exp(-abs(d_theta) / p.static_ageing_slip_scale)
-    return p.static_ageing_rate * s.ageing
+        sliding = dt / slip
+        s.age = sliding + (s.age - sliding) * exp(-slip)
+    return p.static_ageing_rate * math.log1p(s.age / p.static_ageing_dwell)
 
 
 @law

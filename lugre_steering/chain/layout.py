@@ -83,7 +83,7 @@ STATE = np.dtype(
         ("air_temperature", np.float64),  # latest ambient [degC]
         ("slip", np.float64),  # accumulated |contact angle| [rad]
         ("dwell", np.float64),  # time at standstill [s]
-        ("ageing", np.float64),  # log-dwell memory of the static level
+        ("age", np.float64),  # mean age of the contacts [s]
         ("relaxed", np.float64),  # relaxed share of the elastic torque
         ("direction", np.float64),  # sign of the last contact motion
         ("since_reversal", np.float64),  # contact angle since the last reversal [rad]

@@ -121,7 +121,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     if effects:
         faster = tangent_factor(p, s, d_theta, sign, length)
         level *= level_factor(p, s, sign)
-        aged = aged_level(p, s, d_theta, resting)
+        aged = aged_level(p, s, d_theta, dt, length)
     g = stribeck(omega, p.static_torque, p.coulomb_torque, p.stribeck_speed, p.stribeck_exponent)
     g = level * (g + p.coulomb_torque * aged)
     z = s.z

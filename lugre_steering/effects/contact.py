@@ -17,13 +17,13 @@ EFFECTS = (
     ),
     Effect(
         "static_ageing", "contact", 1, "Contact strengthens while it rests",
-        "g += Mc rate ln(1 + dwell / t_c), lost as exp(-slip / slip_scale)",
+        "g += Mc rate ln(1 + age / t_c), d age/dt = 1 - age |dtheta/dt| / slip_scale",
         "Dieterich, J. Geophys. Res. 77 (1972) 3690; Rice and Ruina, J. Appl. Mech. 50 (1983) 343",
         "torque peak after a restart that grows with the logarithm of the dwell before it", "dwell",
         (
-            Parameter("rate", "1", "relative gain per e-fold of dwell", 0.01, 0.0, 0.3),
+            Parameter("rate", "1", "relative gain per e-fold of age", 0.01, 0.0, 0.3),
             Parameter("dwell", "s", "time constant t_c", 1.0, 0.01, 100.0, (0.1, 1.0)),
-            Parameter("slip_scale", "rad", "slip that erases the gain", 0.1, 0.005, 2.0, (0.02, 0.06, 0.2)),
+            Parameter("slip_scale", "rad", "slip that renews the contacts", 0.1, 0.005, 2.0, (0.02, 0.06, 0.2)),
         ),
         ("stress_relaxation",),
     ),
