@@ -106,11 +106,11 @@ def relaxed_share(p, s, d_theta, resting):
 
 
 @law
-def tangent_factor(p, s, d_theta, sign, length):
+def tangent_factor(p, s, d_theta, sign):
     """Presliding stiffness relative to the baseline, as a factor on the bristle's own motion (1 when neutral).
 
     Payne: 1 + a / (1 + (angle since reversal / angle)**2), stiffer for small amplitudes (Payne 1962, Kraus 1984);
-    Mullins: 1 + a (1 - z_max / length), virgin rubber is stiffer until it was once fully sheared (Mullins 1948).
+    Mullins: 1 + a erfc((z_max - |z|) / width), rubber is stiffer where it was never sheared as far (Ogden and Roxburgh 1999).
     The factor scales dz, not sigma_0, so the torque never jumps.
     """
     factor = 1.0
@@ -121,5 +121,5 @@ def tangent_factor(p, s, d_theta, sign, length):
         s.since_reversal += abs(d_theta)
         factor += p.payne_softening_amplitude / (1.0 + strain * strain)
     if p.mullins_softening_amplitude != 0.0:
-        factor += p.mullins_softening_amplitude * max(0.0, 1.0 - s.z_max / length)
+        factor += p.mullins_softening_amplitude * math.erfc((s.z_max - abs(s.z)) / p.mullins_softening_width)
     return factor

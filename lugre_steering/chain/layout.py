@@ -44,7 +44,8 @@ EFFECT_FIELDS = (
     "static_ageing_rate", "static_ageing_dwell", "static_ageing_slip_scale", "stress_relaxation_per_decade",
     "stress_relaxation_onset",
     "stress_relaxation_recovery_angle", "payne_softening_amplitude", "payne_softening_angle",
-    "mullins_softening_amplitude", "viscous_friction_sigma_2", "viscous_friction_thinning", "distributed_contact_spread",
+    "mullins_softening_amplitude", "mullins_softening_width", "viscous_friction_sigma_2", "viscous_friction_thinning",
+    "distributed_contact_spread",
     # thermal
     "heat_partition_ground_share", "carcass_heat_sink_conductance", "carcass_heat_sink_capacity",
     "flash_temperature_resistance", "flash_temperature_saturation_power", "flash_temperature_time_constant",

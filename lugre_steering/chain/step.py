@@ -119,7 +119,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
 
     level, aged, faster = friction_ratio, 0.0, 1.0
     if effects:
-        faster = tangent_factor(p, s, d_theta, sign, length)
+        faster = tangent_factor(p, s, d_theta, sign)
         level *= level_factor(p, s, sign)
         aged = aged_level(p, s, d_theta, dt, length)
     g = stribeck(omega, p.static_torque, p.coulomb_torque, p.stribeck_speed, p.stribeck_exponent)

@@ -52,9 +52,13 @@ EFFECTS = (
     ),
     Effect(
         "mullins_softening", "contact", 2, "Virgin rubber softens on its first full shear",
-        "dz/dtheta times 1 + a (1 - z_max / L)", "Mullins, Rubber Chem. Technol. 21 (1948) 281",
-        "only the first sweep of a recording is stiffer", "first sweep",
-        (Parameter("amplitude", "1", "relative stiffening of virgin rubber", 0.2, 0.0, 3.0),),
+        "dz/dtheta times 1 + a erfc((z_max - |z|) / width)",
+        "Mullins, Rubber Chem. Technol. 21 (1948) 281; Ogden and Roxburgh, Proc. R. Soc. A 455 (1999) 2861",
+        "the first sweep is stiffer, later ones only near the farthest shear", "first sweep",
+        (
+            Parameter("amplitude", "1", "relative stiffening of virgin rubber", 0.2, 0.0, 3.0),
+            Parameter("width", "rad", "deflection below the largest over which it fades", 0.02, 0.001, 0.5, (0.008, 0.03)),
+        ),
         ("wear_polishing",),
     ),
     Effect(
