@@ -210,13 +210,22 @@ class _Conclusion:
                 "id": candidate.effect.id, "stage": candidate.effect.stage,
                 "statement": (
                     f"{self._title(candidate.effect.id)}: {law}. Up to {self._torque(size)} "
-                    f"({100 * size / amplitude:.1f} % of the torque amplitude, {label})"
+                    f"({100 * size / amplitude:.1f} % of the torque amplitude, {label}){self._since(candidate)}"
                     + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
                 ),
                 "p_value": item.score.p_value, "parameters": parameters, "where": where, "energy_share": share,
                 "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,
             })  # fmt: skip
         return sorted(entries, key=lambda entry: -entry["energy_share"])
+
+    def _since(self, candidate: Candidate) -> str:
+        """When an effect began that was not there from the start."""
+        begun = [
+            f"{run.name} from {since - run.time[0]:.0f} s on" if since <= run.time[-1] else f"not in {run.name}"
+            for run, since in zip(self.problem.runs, candidate.since, strict=False)
+            if since > run.time[0]
+        ]
+        return f", {', '.join(begun)}" if begun else ""
 
     def _where(self, candidate: Candidate, part: Array) -> list[dict[str, Any]]:
         entries = []
@@ -327,7 +336,7 @@ class _Conclusion:
         entries = list(problem.vehicle.effects)
         last = len(problem.runs) - 1
         for candidate, values in whole.effects if effects else ():
-            if not candidate.active_in(last):
+            if not candidate.active_in(last) or candidate.start(last) > problem.runs[last].time[-1]:
                 continue
             keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
             if candidate.effect.per_line:

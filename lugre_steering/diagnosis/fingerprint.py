@@ -26,6 +26,10 @@ HYDRAULIC = (
     "cylinder_friction",
 )  # fmt: skip
 """Nothing of a joint that is driven and measured without oil (friction between drive and joint is its own friction)."""
+LATE = (0.3, 0.45, 0.6)
+"""Shares of the longest recording at which an effect that begins late is tried."""
+NEVER_LATE = ("surface_patch", "mullins_softening")
+"""Has its own time window; acts on the first sweep."""
 CEILINGS = (0.8, 0.88, 0.94, 0.98)
 
 
@@ -154,6 +158,8 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
     residuals = residuals - (residuals @ basis) @ basis.T
     base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
     energy = float(residuals[0] @ residuals[0])
+    time = np.concatenate([run.time for run in problem.runs])
+    starts = [share * float(time.max()) for share in LATE]
 
     def score(candidate: Candidate) -> list[Score]:
         columns = signature(problem, fit, base, candidate) * weight[:, None]
@@ -163,6 +169,11 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
             for bag in range(len(problem.runs)):
                 alone = replace(candidate, bags=(bag,))
                 part = score_columns(alone, columns * (problem.bag == bag)[:, None], basis, residuals, energy)
+                found += [part] if part is not None else []
+        if candidate.bags is None and full is not None and candidate.effect.id not in NEVER_LATE:
+            for start in starts:
+                late = replace(candidate, since=(start,) * len(problem.runs))
+                part = score_columns(late, columns * (time >= start)[:, None], basis, residuals, energy)
                 found += [part] if part is not None else []
         return found
 

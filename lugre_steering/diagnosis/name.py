@@ -29,6 +29,7 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
+RETIMED = 2
 VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
@@ -256,8 +257,9 @@ def choose(scores: Sequence[Score], samples: float) -> list[Score]:
 
 
 def _parsimony(new: Score, old: Score) -> float:
-    """An effect in one bag only must beat the same effect in all bags clearly."""
-    return 1.1 if new.candidate.bags is not None and old.candidate.bags is None else 1.0
+    """An effect in one bag only, or from a time on, must beat the same effect everywhere clearly."""
+    partial = [score.candidate.bags is not None or bool(score.candidate.since) for score in (new, old)]
+    return 1.1 if partial == [True, False] else 1.0
 
 
 def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
@@ -288,12 +290,35 @@ def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: 
     tried = trial.score.candidate
     variants = [
         score for score in scores
-        if score.candidate.label == tried.label and score.candidate.bags == tried.bags
-        and score.candidate.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
+        if (c := score.candidate).label == tried.label and (c.bags, c.since) == (tried.bags, tried.since)
+        and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
     ]  # fmt: skip
     others = [try_effect(problem, weight, current, score) for score in variants[:VARIANTS]]
     others += [try_effect(problem, weight, replace(current, x=problem.start()), trial.score)]
-    return refine(problem, weight, min([trial, *others], key=lambda each: each.cost))
+    best = min([trial, *others], key=lambda each: each.cost)
+    for _ in range(RETIMED if tried.since else 0):
+        best = retime(problem, weight, best)
+    return refine(problem, weight, best)
+
+
+def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
+    """A late effect from the instants that fit best, one per bag, with its values fitted anew.
+
+    For given values the best instant of a bag follows from sums: errors without the effect before it, with it from then on.
+    """
+    *earlier, (candidate, values) = trial.fit.effects
+    always = problem.predict_all(trial.fit.x, [*earlier, (replace(candidate, since=()), values)])
+    without = problem.predict_all(trial.fit.x, earlier)
+    gains = ((problem.measured - without) * weight) ** 2 - ((problem.measured - always) * weight) ** 2
+    since = []
+    for run, part in zip(problem.runs, np.split(gains, problem.edges[1:-1]), strict=True):
+        from_here = np.append(np.cumsum(part[::-1])[::-1], 0.0)
+        best = int(np.argmax(from_here))
+        since.append(float(run.time[best]) if best < run.time.size else np.inf)
+    effects = [*earlier, (replace(candidate, since=tuple(since)), values)]
+    result = fit(problem, weight, effects, trial.fit.x, evaluations=8, tolerance=TRIAL_TOLERANCE)
+    better = cost(problem, result, weight)
+    return Trial(trial.score, result, better) if better < trial.cost else trial
 
 
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:

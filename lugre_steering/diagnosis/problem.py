@@ -79,13 +79,17 @@ def calibrations_for(vehicle: Vehicle) -> tuple[Calibration, ...]:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect as it is tried: with fixed shape values, on one line or all bags, with free parameters named in ``free``."""
+    """An effect as it is tried: with fixed shape values, on one line or all bags, with free parameters named in ``free``.
+
+    ``since``: time [s] in each bag from which it acts; empty if it always does.
+    """
 
     effect: Effect
     shapes: tuple[tuple[str, float], ...] = ()
     line: str = ""
     bags: tuple[int, ...] | None = None
     free: tuple[str, ...] = ()
+    since: tuple[float, ...] = ()
 
     @property
     def label(self) -> str:
@@ -96,6 +100,9 @@ class Candidate:
 
     def active_in(self, bag: int) -> bool:
         return self.bags is None or bag in self.bags
+
+    def start(self, bag: int) -> float:
+        return self.since[bag] if self.since else -np.inf
 
 
 Values = Mapping[str, float]
@@ -158,18 +165,17 @@ class Problem:
     def torque(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
     ) -> Array:
-        """Model torque of one bag (n,), before the sensors; ``run`` in place of the bag's own motion."""
+        """Model torque of one bag (n,) with all effects on, before the sensors; ``run`` in place of the bag's own motion."""
         run = run or self.runs[bag]
         record = self.model.parameters[0].copy()
         for field, value in self.fields(x).items():
             record[field] = value
         record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
         for candidate, values in effects:
-            if candidate.active_in(bag):
-                for name, value in values.items():
-                    field = f"{candidate.effect.id}_{name}"
-                    if field in EFFECT_FIELDS:
-                        record[field] = value
+            for name, value in values.items():
+                field = f"{candidate.effect.id}_{name}"
+                if field in EFFECT_FIELDS:
+                    record[field] = value
         total = np.zeros(run.time.size)
         for side in range(run.theta.shape[0]):
             total += torque_side(record, self.model.rubber, run.time, run.theta[side], run.omega[side], run.alpha[side])
@@ -180,11 +186,18 @@ class Problem:
     ) -> Array:
         """Measured torque that the model expects in one bag (n,): sensor effects included."""
         run = run or self.runs[bag]
-        torque = self.torque(bag, x, effects, run)
-        for candidate, values in effects:
-            if candidate.active_in(bag):
-                torque = self._through_sensor(run, candidate, values, torque)
-        return torque / self.gain(x)
+        here = [effect for effect in effects if effect[0].active_in(bag)]
+        expected = np.zeros(run.time.size)
+        # What begins late is blended in: its own memory of the time before does not matter to what it does after.
+        for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in here)}):
+            begun = run.time >= start
+            if begun.any():
+                acting = [effect for effect in here if effect[0].start(bag) <= start]
+                torque = self.torque(bag, x, acting, run)
+                for candidate, values in acting:
+                    torque = self._through_sensor(run, candidate, values, torque)
+                expected[begun] = torque[begun]
+        return expected / self.gain(x)
 
     def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array) -> Array:
         """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
