@@ -30,6 +30,8 @@ decade above, and at most. Strong signals show more of their shape, so a right n
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
 RETIMED = 2
+PARTIAL = 0.1
+"""Share by which an effect in one bag only, or from a time on, must explain more than the same everywhere."""
 VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
@@ -113,7 +115,7 @@ def search(
         trials = []
         for score in shortlist:
             progress(f"fitting {score.candidate.label}")
-            trials.append(try_effect(problem, weight, current, score))
+            trials.append(_everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
         trials.sort(key=lambda trial: trial.cost)
         trials = [deepen(problem, weight, current, trial, scores) for trial in trials[:3]] + trials[3:]
         trials.sort(key=lambda trial: trial.cost)
@@ -258,8 +260,7 @@ def choose(scores: Sequence[Score], samples: float) -> list[Score]:
 
 def _parsimony(new: Score, old: Score) -> float:
     """An effect in one bag only, or from a time on, must beat the same effect everywhere clearly."""
-    partial = [score.candidate.bags is not None or bool(score.candidate.since) for score in (new, old)]
-    return 1.1 if partial == [True, False] else 1.0
+    return 1.0 + PARTIAL if _partial(new) and not _partial(old) else 1.0
 
 
 def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
@@ -279,6 +280,22 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
     return Trial(score, fits[best], costs[best])
 
 
+def _everywhere(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
+    """A trial of an effect in one bag only, or from a time on, against the same everywhere, which is the simpler claim."""
+    if not _partial(trial.score):
+        return trial
+    whole = next((s for s in scores if s.candidate.label == trial.score.candidate.label and not _partial(s)), None)
+    if whole is None:
+        return trial
+    simpler = try_effect(problem, weight, current, whole)
+    gain = cost(problem, current, weight) - trial.cost
+    return simpler if simpler.cost < trial.cost + PARTIAL * gain else trial
+
+
+def _partial(score: Score) -> bool:
+    return score.candidate.bags is not None or bool(score.candidate.since)
+
+
 def _cornered(problem: Problem, current: Fit) -> bool:
     """Whether a calibration value lies implausibly far from the sheet."""
     prior = np.array([calibration.prior for calibration in problem.calibrations])
@@ -286,7 +303,10 @@ def _cornered(problem: Problem, current: Fit) -> bool:
 
 
 def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
-    """A promising trial from its next best shapes and from the sheet as well (valleys are narrow), then refined."""
+    """A promising trial also from its next best shapes, and at its typical size from the sheet; then refined.
+
+    Valleys are narrow, and a linear guess far from the truth may lie beyond the next hill.
+    """
     tried = trial.score.candidate
     variants = [
         score for score in scores
@@ -294,7 +314,8 @@ def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: 
         and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
     ]  # fmt: skip
     others = [try_effect(problem, weight, current, score) for score in variants[:VARIANTS]]
-    others += [try_effect(problem, weight, replace(current, x=problem.start()), trial.score)]
+    typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))
+    others += [try_effect(problem, weight, replace(current, x=problem.start()), typical)]
     best = min([trial, *others], key=lambda each: each.cost)
     for _ in range(RETIMED if tried.since else 0):
         best = retime(problem, weight, best)
