@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from lugre_steering.diagnosis import flexible
 from lugre_steering.diagnosis.fingerprint import Score, screen
 from lugre_steering.diagnosis.foreign import Pattern, strongest
 from lugre_steering.diagnosis.noise import Noise
@@ -29,6 +30,8 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
+FREER = 0.7
+"""Share of a further effect's gain that a freer shape of an earlier one may have at most."""
 RETIMED = 2
 PARTIAL = 0.1
 """Share by which an effect in one bag only, or from a time on, must explain more than the same everywhere."""
@@ -130,6 +133,9 @@ def search(
             continue
         all_trials += trials
         if before - best.cost < OWN_ERROR * samples:
+            break
+        freer = max((flexible.explained(problem, current, weight, i) for i in range(len(current.effects))), default=0.0)
+        if freer > FREER * (before - best.cost):
             break
         rivals = tied(problem, weight, split, best, trials[1:], before, samples)
         best, rivals = simplest(best, rivals)

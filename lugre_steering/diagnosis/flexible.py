@@ -1,0 +1,41 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How much of what is left over a freer shape of an effect already named would explain: a test before a second name.
+
+The effect's torque is multiplied by a piecewise linear function of its own coordinate that keeps its sign, with the
+recalibration free beside it. A wrong shape of the first effect must not be given a name of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from lugre_steering.diagnosis import locate
+from lugre_steering.diagnosis.problem import Fit, Problem
+from lugre_steering.recording import Array
+
+KNOTS = 7
+OTHER_AXIS = {"motion": "torque", "thermal": "accumulated slip", "parallel_torque": "steering angle", "measurement": "torque"}
+"""Coordinate for effects whose own one is no signal, by stage; angle since reversal for the contact."""
+
+
+def explained(problem: Problem, current: Fit, weight: Array, index: int) -> float:
+    """Energy that a free shape of one effect of a fit takes from its errors, in noise variances."""
+    effect = current.effects[index][0].effect
+    axes = [locate.coordinates(run, run.measured) for run in problem.runs]
+    axis = effect.coordinate if effect.coordinate in axes[0] else OTHER_AXIS.get(effect.stage, "angle since reversal")
+    coordinate = np.concatenate([bag[axis] for bag in axes])
+    part = locate.contribution(problem, current, index)
+    acting = np.abs(part) * weight > 1e-3 * np.max(np.abs(part) * weight)
+    knots = np.unique(np.quantile(coordinate[acting], np.linspace(0.0, 1.0, KNOTS))) if acting.any() else np.zeros(0)
+    if knots.size < 3:
+        return 0.0
+    hats = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
+    tangent = current.jacobian[:, np.linalg.norm(current.jacobian, axis=0) > 0.0]
+    columns = np.column_stack([(hats * part).T, tangent / np.linalg.norm(tangent, axis=0)]) * weight[:, None]
+    error = (problem.measured - current.prediction) * weight
+    q, r = np.linalg.qr(columns)
+    low = np.concatenate([np.full(knots.size, -1.0), np.full(tangent.shape[1], -np.inf)])
+    solution = lsq_linear(r + 1e-12 * np.eye(r.shape[0]), q.T @ error, (low, np.full(low.size, np.inf))).x
+    return float(error @ error - np.sum((error - columns @ solution) ** 2))
