@@ -152,8 +152,10 @@ def search(
         progress(f"rivals of {found[index].score.candidate.label}")
         final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples)
     pattern = strongest(problem, baseline, weight) if excess > PATTERN_EXCESS * samples else None
-    if pattern is not None and found and _foreign(pattern.cost(problem, weight), cost(problem, final, weight), start_cost, len(found)):
-        final, found = baseline, []
+    if pattern is not None and found:
+        named = [cost(problem, steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
+        if _foreign(pattern.cost(problem, weight), named, start_cost):
+            final, found = baseline, []
     explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
     return Search(
         baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), bool(found) or not steps,
@@ -161,10 +163,15 @@ def search(
     )  # fmt: skip
 
 
-def _foreign(with_pattern: float, named: float, start: float, names: int) -> bool:
-    """Whether one pattern outside the catalogue explains the recording better than the names, or several names no better."""
-    margin = PATTERN_MARGIN * (start - named)
-    return with_pattern < named + (margin if names > 1 else -margin)
+def _foreign(with_pattern: float, named: Sequence[float], start: float) -> bool:
+    """Whether one pattern outside the catalogue explains the recording better than a name, or as well as several.
+
+    ``named``: cost with the only name, or with the first of several and with all of them.
+    """
+    margin = PATTERN_MARGIN * (start - named[-1])
+    if len(named) == 1:
+        return with_pattern < named[0] - margin
+    return with_pattern < min(named[0], named[-1] + margin)
 
 
 def _confront(
