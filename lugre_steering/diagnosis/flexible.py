@@ -33,9 +33,10 @@ def explained(problem: Problem, current: Fit, weight: Array, index: int) -> floa
         return 0.0
     hats = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
     tangent = current.jacobian[:, np.linalg.norm(current.jacobian, axis=0) > 0.0]
-    columns = np.column_stack([(hats * part).T, tangent / np.linalg.norm(tangent, axis=0)]) * weight[:, None]
+    # What recalibration alone would still gain is no merit of the shape.
+    basis, _ = np.linalg.qr(tangent / np.linalg.norm(tangent, axis=0) * weight[:, None])
     error = (problem.measured - current.prediction) * weight
-    q, r = np.linalg.qr(columns)
-    low = np.concatenate([np.full(knots.size, -1.0), np.full(tangent.shape[1], -np.inf)])
-    solution = lsq_linear(r + 1e-12 * np.eye(r.shape[0]), q.T @ error, (low, np.full(low.size, np.inf))).x
+    columns = (hats * part).T * weight[:, None]
+    error, columns = error - basis @ (basis.T @ error), columns - basis @ (basis.T @ columns)
+    solution = lsq_linear(columns, error, (-1.0, np.inf)).x
     return float(error @ error - np.sum((error - columns @ solution) ** 2))

@@ -30,6 +30,8 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
+SLIGHT = 0.02
+"""Share of the whole excess that a further effect must explain: no law of the first is truer than that."""
 FREER = 0.7
 """Share of a further effect's gain that a freer shape of an earlier one may have at most."""
 RETIMED = 2
@@ -132,7 +134,7 @@ def search(
                 excess = start_cost - samples
             continue
         all_trials += trials
-        if before - best.cost < OWN_ERROR * samples:
+        if before - best.cost < max(OWN_ERROR * samples, SLIGHT * (start_cost - samples) if steps else 0.0):
             break
         freer = max((flexible.explained(problem, current, weight, i) for i in range(len(current.effects))), default=0.0)
         if freer > FREER * (before - best.cost):

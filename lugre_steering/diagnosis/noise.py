@@ -33,6 +33,8 @@ MOTION_PROFILE_S = 0.5
 SPLIT_HZ = 2.5
 """Between slow noise, known from standstill only, and fast noise, known from the residual wherever nothing sudden happens."""
 WINDOW_S = 0.25
+AT_LEAST = 0.5
+"""Share of the noise that the sheet gives its sensors, below which none is believed to be."""
 SUDDEN = 3.0
 """Times its expected fast energy beyond which a window holds an event rather than noise."""
 
@@ -130,21 +132,16 @@ def slow_part(values: Array, dt: float) -> Array:
     return np.asarray(sosfiltfilt(butter(2, corner, fs=1.0 / dt, output="sos"), values))
 
 
-def fast_variance(problem: Problem, residual: Array, known: Array) -> Array:
-    """Variance (n,) of the fast torque noise [N2 m2]: a sum of shares that are constant, go with the load, or with motion.
+def fast_variance(run: Run, residual: Array, known: Array) -> Array:
+    """Variance (n,) of the fast torque noise of a run [N2 m2]: shares that are constant, go with the load, or with motion.
 
     ``residual`` (n,) of a fitted model; ``known`` (n,) is the fast energy that another source has put into it.
     """
-    shapes, energies = [], []
-    for run, part in _parts(problem):
-        fast = _without_motion(run, residual[part])
-        moving = np.abs(run.omega).max(axis=0) > REST_RATE_RAD_S
-        shapes.append(np.array([run.sigma**2, run.measured**2, moving * run.sigma**2]))
-        energies.append(fast**2 - known[part])
-    shape, energy = np.concatenate(shapes, axis=1), np.concatenate(energies)
-    dt = problem.runs[0].time[1] - problem.runs[0].time[0]
-    windows = np.arange(energy.size) // max(1, round(WINDOW_S / dt))
-    used = problem.valid.astype(float)
+    moving = np.abs(run.omega).max(axis=0) > REST_RATE_RAD_S
+    shape = np.array([run.sigma**2, run.measured**2, moving * run.sigma**2])
+    energy = _without_motion(run, residual) ** 2 - known
+    windows = np.arange(energy.size) // max(1, round(WINDOW_S / (run.time[1] - run.time[0])))
+    used = run.valid.astype(float)
     count = np.maximum(np.bincount(windows, used), 1.0)
     means = np.array([np.bincount(windows, row * used) / count for row in (*shape, energy)])
     scale = np.maximum(means[:-1].mean(axis=1), 1e-30)
@@ -201,19 +198,19 @@ def noise_model(
 
     parts = _parts(problem)
     errors = in_threads(repeat, range(len(parts)))
-    steps = [run.time[1] - run.time[0] for run in problem.runs]
-    known = np.concatenate([np.mean((e - slow_part(e, dt)) ** 2, axis=0) for e, dt in zip(errors, steps, strict=True)])
     # Only oil carries pump ripple; a torque sensor is as noisy in motion as at rest.
     hydraulic = problem.vehicle.hydraulics is not None
-    fast = fast_variance(problem, problem.measured - base, known) if hydraulic else None
     sigmas, slow_sigmas, residuals = [], [], []
     for bag, (run, part) in enumerate(parts):
-        rng = np.random.default_rng([seed, bag, 1])
+        rng, dt = np.random.default_rng([seed, bag, 1]), run.time[1] - run.time[0]
         torque = np.array([quiet.draw(run.time.size, rng) for _ in range(draws)])
-        slow = slow_part(torque, steps[bag])
+        slow = slow_part(torque, dt)
         swift = torque - slow
-        swift_sigma = np.std(swift) * run.sigma if fast is None else np.sqrt(fast[part])
-        variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / steps[bag])))
+        swift_sigma = np.std(swift) * run.sigma
+        if hydraulic:
+            known = np.mean((errors[bag] - slow_part(errors[bag], dt)) ** 2, axis=0)
+            swift_sigma = np.maximum(np.sqrt(fast_variance(run, problem.measured[part] - base[part], known)), AT_LEAST * run.sigma)
+        variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / dt)))
         slow_sigmas.append(np.std(slow) * run.sigma)
         sigmas.append(np.sqrt(slow_sigmas[-1] ** 2 + swift_sigma**2 + variance))
         residuals.append(slow * run.sigma + swift / np.std(swift) * swift_sigma - errors[bag])
