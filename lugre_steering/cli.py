@@ -9,7 +9,7 @@ import functools
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -66,6 +66,22 @@ def spinner() -> Iterator[Callable[[str], None]]:
         return
     with console().status("") as status:
         yield lambda text: status.update(text)
+
+
+@contextmanager
+def step_bar(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
+    """A bar over the named steps, on a terminal only: a text that begins with a step moves it there, any other is a detail."""
+    with Progress(console=console(), disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task("", total=len(steps))
+        reached = 0
+
+        def show(text: str) -> None:
+            nonlocal reached
+            reached = max([reached, *(i for i, step in enumerate(steps) if text.startswith(step))])
+            bar.update(task, description=text, completed=reached)
+
+        yield show
+        bar.update(task, completed=len(steps))
 
 
 def print_json(result: Any) -> None:
@@ -238,9 +254,9 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
-    from lugre_steering.diagnosis.command import run
+    from lugre_steering.diagnosis.command import STEPS, run
 
-    with spinner() as progress:
+    with step_bar(STEPS) as progress:
         result = run(bags, vehicle, out, seed=seed, material=material, report=report, progress=progress)
     if as_json:
         print_json(result)

@@ -14,6 +14,12 @@ from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
 from lugre_steering.errors import BagError, LugreSteeringError
 from lugre_steering.vehicle import load, save
 
+STEPS = (
+    "reading", "checking the data", "estimating the motion", "recalibrating", "fingerprints", "rivals", "verifying",
+    "next experiment", "writing the report",
+)  # fmt: skip
+"""The words with which the steps of a diagnosis announce themselves, in order."""
+
 
 def run(
     bags: Sequence[Path],
