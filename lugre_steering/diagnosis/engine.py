@@ -211,12 +211,35 @@ class _Conclusion:
                 "statement": (
                     f"{self._title(candidate.effect.id)}: {law}. Up to {self._torque(size)} "
                     f"({100 * size / amplitude:.1f} % of the torque amplitude, {label}){self._since(candidate)}"
+                    + self._lines(whole, index, item)
                     + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
                 ),
                 "p_value": item.score.p_value, "parameters": parameters, "where": where, "energy_share": share,
                 "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,
             })  # fmt: skip
         return sorted(entries, key=lambda entry: -entry["energy_share"])
+
+    def _lines(self, whole: Fit, index: int, item: name.Found) -> str:
+        """Other pressure lines on which the same error would fit as well, with its size there."""
+        problem, hydraulics = self.problem, self.problem.vehicle.hydraulics
+        candidate, values = whole.effects[index]
+        if not candidate.effect.per_line or hydraulics is None:
+            return ""
+        weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
+        rest = [effect for i, effect in enumerate(whole.effects) if i != index]
+
+        def with_line(line: str) -> name.Trial:
+            fitted = fit(problem, weight, [*rest, (replace(candidate, line=line), values)], whole.x, evaluations=6)
+            return name.Trial(item.score, fitted, name.cost(problem, fitted, weight))
+
+        own = with_line(candidate.line)
+        others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
+        before = name.cost(problem, fit(problem, weight, rest, whole.x, evaluations=6), weight)
+        tied = name.tied(problem, weight, self.roles, own, others, before, float(problem.valid.sum()))
+        key = candidate.free[0]
+        unit = self._unit(candidate.parameter(key).unit)
+        found = [f"{trial.candidate.line} ({trial.fit.effects[-1][1][key]:.3g} {unit})" for trial in tied]
+        return f"; line {candidate.line} cannot be told from {', '.join(found)}" if found else ""
 
     def _since(self, candidate: Candidate) -> str:
         """When an effect began that was not there from the start."""
@@ -345,6 +368,10 @@ class _Conclusion:
         provenance = {
             "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
             "heldout_rmse_Nm": round(verify.rmse(problem, whole, self.roles.held), 3),
+            "recalibrated": {
+                field: {"sheet": float(problem.model.parameters[0][0][field]), "now": round(value, 6)}
+                for field, value in problem.fields(whole.x).items()
+            },
         }  # fmt: skip
         changed = apply_calibration(problem.vehicle, problem, whole.x)
         return replace(changed, effects=tuple(entries), provenance=provenance)
@@ -356,8 +383,11 @@ class _Conclusion:
         named = {effect["id"] for effect in effects}
         ties = {rival for effect in effects for rival in effect["indistinguishable_from"]}
         trials: dict[str, name.Trial] = {}
+        alone = len(found.baseline.effects) + 1
         for trial in found.trials:
-            trials.setdefault(trial.candidate.label, trial)
+            # Beside an effect found before, a gain would not be the candidate's own.
+            if len(trial.fit.effects) == alone:
+                trials.setdefault(trial.candidate.label, trial)
         rows, seen = [], set()
         for score in found.first_scores:
             label = score.candidate.label

@@ -392,7 +392,7 @@ def tied(
     error = ((problem.measured - best.fit.prediction) * weight) ** 2
     misfit = max(best.cost - samples, 0.0)
     for other in others:
-        if other.candidate.effect.id == best.candidate.effect.id or before - other.cost < 0.5 * (before - best.cost):
+        if other.candidate.label == best.candidate.label or before - other.cost < 0.5 * (before - best.cost):
             continue
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
