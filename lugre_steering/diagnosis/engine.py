@@ -184,7 +184,8 @@ class _Conclusion:
         problem, found = self.problem, self.found
         weight = np.where(problem.valid, 1.0 / self.noise.sigma, 0.0)
         covariance = verify.robust_covariance(problem, whole, weight, self.roles.cluster)
-        position, entries = problem.nuisances, []
+        spread = verify.jackknife(problem, whole, weight)
+        position, entries = 0, []
         start = name.cost(problem, found.baseline, np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0))
         removed = start - name.cost(problem, found.final, np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0))
         total = sum(item.gain for item in found.found)
@@ -192,10 +193,11 @@ class _Conclusion:
         for index, ((candidate, values), item) in enumerate(zip(whole.effects, found.found, strict=True)):
             parameters = {}
             for key in candidate.free:
-                sd = float(np.sqrt(max(covariance[position, position], 0.0)))
+                place = problem.nuisances + position
+                half = verify.WIDTH * max(float(np.sqrt(max(covariance[place, place], 0.0))), float(spread[position]))
                 label = candidate.line if candidate.effect.per_line else key
                 parameters[label] = {
-                    "value": values[key], "ci95": [values[key] - 1.96 * sd, values[key] + 1.96 * sd],
+                    "value": values[key], "ci95": [values[key] - half, values[key] + half],
                     "unit": self._unit(candidate.parameter(key).unit),
                 }  # fmt: skip
                 position += 1

@@ -7,12 +7,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
 from lugre_steering.diagnosis.problem import Fit, Problem, fit
 from lugre_steering.diagnosis.split import CYCLE, Mask, Split, split
 from lugre_steering.recording import Array, IntArray
 
 RESAMPLES = 2000
+STRETCHES = 6
+WIDTH = float(stats.t.ppf(0.975, STRETCHES - 1))
+"""Half width of a 95 % interval in standard deviations known from STRETCHES estimates."""
 
 
 def rmse(problem: Problem, result: Fit, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
@@ -66,6 +70,24 @@ def _judge(before: Array, after: Array, held: Mask, clusters: IntArray, seed: in
     low, high = np.quantile(gains, [0.025, 0.975])
     rms = [float(np.sqrt(total.sum() / held.sum())) for total in (before_sum, after_sum)]
     return Verdict(rms[0], rms[1], 1.0 - rms[1] / rms[0], (float(low), float(high)))
+
+
+def jackknife(problem: Problem, result: Fit, weight: Array) -> Array:
+    """Standard deviations (q,) of the free effect parameters: the fit repeated without each of some long stretches in turn.
+
+    Errors of the laws themselves differ from stretch to stretch, so they widen it as they should (Quenouille 1949).
+    """
+    parts = max(2, round(STRETCHES / len(problem.runs)))
+    stretch = np.concatenate([
+        bag * parts + np.arange(run.time.size) * parts // run.time.size for bag, run in enumerate(problem.runs)
+    ])  # fmt: skip
+    estimates = []
+    for left_out in range(int(stretch[-1]) + 1):
+        kept = np.where(stretch == left_out, 0.0, weight)
+        fitted = fit(problem, kept, result.effects, result.x, evaluations=4)
+        estimates.append([values[key] for candidate, values in fitted.effects for key in candidate.free])
+    spread = np.array(estimates)
+    return np.asarray(np.sqrt((len(spread) - 1.0) * np.var(spread, axis=0)))
 
 
 def robust_covariance(problem: Problem, result: Fit, weight: Array, cluster: IntArray) -> Array:
