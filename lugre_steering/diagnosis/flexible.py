@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of what is left over a freer shape of an effect already named would explain: a test before a second name.
 
-The effect's torque is multiplied by a piecewise linear function of its own coordinate that keeps its sign, with the
-recalibration free beside it. A wrong shape of the first effect must not be given a name of its own.
+The effect's torque is multiplied by a piecewise linear function of the size of its own coordinate that keeps its sign, with
+the recalibration free beside it. A wrong shape of the first effect must not be given a name of its own.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ def explained(problem: Problem, current: Fit, weight: Array, index: int) -> floa
     effect = current.effects[index][0].effect
     axes = [locate.coordinates(run, run.measured) for run in problem.runs]
     axis = effect.coordinate if effect.coordinate in axes[0] else OTHER_AXIS.get(effect.stage, "angle since reversal")
-    coordinate = np.concatenate([bag[axis] for bag in axes])
+    # Laws are odd or even: a difference between the two directions is physics of its own.
+    coordinate = np.abs(np.concatenate([bag[axis] for bag in axes]))
     part = locate.contribution(problem, current, index)
     acting = np.abs(part) * weight > 1e-3 * np.max(np.abs(part) * weight)
     knots = np.unique(np.quantile(coordinate[acting], np.linspace(0.0, 1.0, KNOTS))) if acting.any() else np.zeros(0)

@@ -18,7 +18,7 @@ from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
 from lugre_steering.diagnosis.split import Split
 from lugre_steering.recording import Array
 
-MAX_EFFECTS = 3
+MAX_EFFECTS, MAX_ROUNDS = 3, 8
 SHORTLIST = 7
 FALSE_DISCOVERY_RATE = 0.01
 OWN_ERROR = 0.05
@@ -30,8 +30,9 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
-SLIGHT = 0.02
-"""Share of the whole excess that a further effect must explain: no law of the first is truer than that."""
+SLIGHT, SURE = 0.02, 0.3
+"""Share of the whole excess that a further effect must explain (no law of the first is truer than that), unless its energy
+is so large against the noise."""
 FREER = 0.7
 """Share of a further effect's gain that a freer shape of an earlier one may have at most."""
 RETIMED = 2
@@ -43,8 +44,6 @@ PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
 """Excess from which patterns outside the catalogue compete, and share of the names' gain that counts as a difference."""
 MEMORY = 4.0
 """Samples that count as one, roughly: errors have a memory."""
-MINOR = 0.08
-"""Share of all that is explained below which an earlier effect goes when a later one comes."""
 TRIAL_TOLERANCE = 1e-4
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
@@ -108,7 +107,9 @@ def search(
     current, restarts = baseline, 0
     first_scores: tuple[Score, ...] = ()
     all_trials: list[Trial] = []
-    while len(steps) < MAX_EFFECTS:
+    for _ in range(MAX_ROUNDS):
+        if len(steps) == MAX_EFFECTS:
+            break
         progress("fingerprints")
         taken = [candidate.effect.id for candidate, _ in current.effects]
         scores = screen(problem, current, weight, noise.draws, taken)
@@ -134,7 +135,7 @@ def search(
                 excess = start_cost - samples
             continue
         all_trials += trials
-        if before - best.cost < max(OWN_ERROR * samples, SLIGHT * (start_cost - samples) if steps else 0.0):
+        if before - best.cost < (_slight(start_cost, samples) if steps else OWN_ERROR * samples):
             break
         freer = max((flexible.explained(problem, current, weight, i) for i in range(len(current.effects))), default=0.0)
         if freer > FREER * (before - best.cost):
@@ -216,7 +217,7 @@ def _prune(
         rest = [effect for i, effect in enumerate(current.effects) if i != index]
         without = fit(problem, weight, rest, current.x, evaluations=20, tolerance=1e-5)
         after = cost(problem, current, weight)
-        if cost(problem, without, weight) - after < max(OWN_ERROR * samples, MINOR * (start - after)):
+        if cost(problem, without, weight) - after < _slight(start, samples):
             dropped = steps[index][1]
             current = without
             last = steps[-1][1]
@@ -227,6 +228,11 @@ def _prune(
                 (without, replace(last, gain=last.gain + dropped.gain), steps[-1][2]),
             ]
     return steps, current
+
+
+def _slight(start: float, samples: float) -> float:
+    """Energy below which an effect beside others is not believed."""
+    return max(OWN_ERROR * samples, min(SLIGHT * (start - samples), SURE * samples))
 
 
 def _keep(

@@ -45,6 +45,8 @@ class QuietNoise:
 
     level: float
     correlation: Array
+    assumed: bool = False
+    """Whether the recording rests too little to tell, so that the sheet's white noise stands for it."""
 
     def draw(self, size: int, rng: np.random.Generator) -> Array:
         """Standardised noise (size,) with unit variance times ``level``, by its spectrum (circulant embedding)."""
@@ -83,7 +85,7 @@ def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     size = min(round(CHUNK_S / dt), int(np.median([stretch.size for stretch in stretches]))) if stretches else 0
     chunks = [s[k : k + size] for s in stretches for k in range(0, s.size - size + 1, max(size, 1))]
     if size <= 2 * order or len(chunks) * size * dt < MIN_QUIET_S:
-        return QuietNoise(1.0, np.ones(1))
+        return QuietNoise(1.0, np.ones(1), assumed=True)
     clean = _detrend(np.array(chunks).T)
     seen = _autocovariance(clean, order)
     memories = np.exp(-np.arange(size) / np.maximum(np.array(MEMORIES_S) / dt, 1e-9)[:, None])
@@ -210,6 +212,8 @@ def noise_model(
         if hydraulic:
             known = np.mean((errors[bag] - slow_part(errors[bag], dt)) ** 2, axis=0)
             swift_sigma = np.maximum(np.sqrt(fast_variance(run, problem.measured[part] - base[part], known)), AT_LEAST * run.sigma)
+            if quiet.assumed:  # white noise is as strong below as above
+                slow *= float(np.mean(swift_sigma / (np.std(swift) * run.sigma)))
         variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / dt)))
         slow_sigmas.append(np.std(slow) * run.sigma)
         sigmas.append(np.sqrt(slow_sigmas[-1] ** 2 + swift_sigma**2 + variance))
