@@ -219,7 +219,10 @@ def run_all(
     budget_s: float | None = None,
     progress: Callable[[str, int, int | None], None] = lambda *_: None,
 ) -> list[Row]:
-    """Run what the journal does not have yet, one process per core; no case is begun once ``budget_s`` has passed."""
+    """Run what the journal does not have yet, one process per core; no case is begun once ``budget_s`` has passed.
+
+    An interruption (Ctrl-C) ends it with the cases finished so far.
+    """
     version, begun = source_version(), time.monotonic()
     known: Mapping[str, Row] = finished(journal, version, peers)
     rows = [known[f"{case.name} {case.seed}"] for case in cases if f"{case.name} {case.seed}" in known]
@@ -238,7 +241,11 @@ def run_all(
                 running.add(pool.submit(run, Job(waiting.pop(0), sheet_file, version, peers)))
             if not running:
                 break
-            done, running = wait(running, return_when=FIRST_COMPLETED)
+            try:
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+            except KeyboardInterrupt:  # score what is there; the same command goes on later
+                pool.shutdown(wait=False, cancel_futures=True)
+                break
             for future in done:
                 try:
                     rows.append(future.result())
