@@ -23,7 +23,8 @@ from lugre_steering.recording import Array
 
 ROUNDS = 3
 """Alternations between pattern and recalibration, which is not linear."""
-RING_DAMPING = 0.03
+RING_DAMPING, RING_STEPS = 0.03, 5
+"""Damping ratio that is tried, and steps of its integration per sample."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +142,12 @@ def _ring(force: Array, step: float, pulsation: float, damping: float) -> Array:
     """Deflection of a lightly damped mode in units of the force that holds it: x'' + 2 d w x' + w**2 x = w**2 F."""
     out = np.empty(force.size)
     x, speed = force[0], 0.0
+    fine = step / RING_STEPS
     for k in range(force.size):
-        speed += step * (pulsation**2 * (force[k] - x) - 2.0 * damping * pulsation * speed)
-        x += step * speed
+        before = force[max(k - 1, 0)]
+        for i in range(RING_STEPS):
+            push = before + (force[k] - before) * (i + 0.5) / RING_STEPS
+            speed += fine * (pulsation**2 * (push - x) - 2.0 * damping * pulsation * speed)
+            x += fine * speed
         out[k] = x
     return out

@@ -1,0 +1,176 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of the search on small problems whose answer is known: noise, split, late effects, foreign patterns, freer shapes."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lugre_steering.calibration import coverage
+from lugre_steering.diagnosis import flexible, foreign, name, noise, split, verify
+from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.fingerprint import Score
+from lugre_steering.diagnosis.problem import Candidate, Problem, fit
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.simulate.command import load_vehicle
+from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
+
+SIGMA = 80.0
+DRIVE = Manoeuvre(
+    "drive",
+    "",
+    tuple(
+        part
+        for _ in range(3)
+        for part in (Hold(1.5), Sweep(18.0, 6.0, 1.0), Sweep(-14.0, 3.0, 1.0), Sweep(3.0, 9.0, 0.5))
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """A run of some 70 s, twice, whose torque is exactly the model's plus white noise."""
+    sheet = load_vehicle(None)
+    runs = [prepare(recording, sheet) for recording in coverage.record(sheet, [DRIVE, replace(DRIVE, name="again")], 5)]
+    made = Problem(sheet, runs)
+    return with_torque(made, made.predict_all(made.start()))
+
+
+def with_torque(problem: Problem, torque: np.ndarray) -> Problem:
+    """The same motion with another measured torque, white noise of SIGMA added."""
+    measured = torque + SIGMA * np.random.default_rng(3).standard_normal(torque.size)
+    pieces = np.split(measured, problem.edges[1:-1])
+    return Problem(
+        problem.vehicle, [replace(run, measured=part) for run, part in zip(problem.runs, pieces, strict=True)]
+    )
+
+
+def effect(id_: str, **values: float) -> tuple[Candidate, dict[str, float]]:
+    free = tuple(p.name for p in CATALOGUE[id_].parameters if p.name in values)
+    return Candidate(CATALOGUE[id_], free=free), values
+
+
+def weight(problem: Problem) -> np.ndarray:
+    return np.where(problem.valid, 1.0 / SIGMA, 0.0)
+
+
+@pytest.mark.parametrize("correlation", [[1.0], [1.0, 0.6, 0.3, 0.1], [1.0, 0.99, -0.99, 0.9]])
+def test_drawn_noise_has_the_level_and_stays_finite_for_any_estimate(correlation: list[float]) -> None:
+    drawn = noise.QuietNoise(2.0, np.array(correlation)).draw(200_000, np.random.default_rng(1))
+    assert np.std(drawn) == pytest.approx(2.0, rel=0.02)
+    if correlation[-1] < 0.2:  # a possible one is met at every lag
+        seen = [np.mean(drawn[: drawn.size - lag] * drawn[lag:]) / 4.0 for lag in range(len(correlation))]
+        assert seen == pytest.approx(correlation, abs=0.02)
+
+
+def test_fast_noise_that_grows_with_the_load_is_measured(problem: Problem) -> None:
+    run = problem.runs[0]
+    load = np.abs(run.measured)
+    ripple = 0.01 * load * np.sqrt(2.0) * np.sin(2.0 * np.pi * 9.0 * run.time)
+    white = 50.0 * np.random.default_rng(2).standard_normal(run.time.size)
+    noisy = replace(run, measured=run.measured + ripple + white)
+    found = noise.fast_variance(noisy, ripple + white, np.zeros(run.time.size))
+    above = 50.0**2 * (1.0 - noise.SPLIT_HZ * 2.0 * (run.time[1] - run.time[0]))
+    low, high = load < np.quantile(load, 0.2), load > np.quantile(load, 0.8)
+    assert np.mean(found[low]) == pytest.approx(above + np.mean((0.01 * load[low]) ** 2), rel=0.25)
+    assert np.mean(found[high]) == pytest.approx(above + np.mean((0.01 * load[high]) ** 2), rel=0.25)
+
+
+def test_the_split_lets_both_parts_see_a_single_event(problem: Problem) -> None:
+    first = split.split(problem)
+    excess = np.zeros(problem.valid.size)
+    assert np.array_equal(split.balanced(problem, excess).held, first.held)
+    blind = np.flatnonzero(first.held)[:300]
+    excess[blind] = 100.0  # happens in a held-out block alone
+    chosen = split.balanced(problem, excess)
+    assert excess[first.fit].sum() == 0.0
+    assert excess[chosen.fit].sum() > 0.0
+    held = [split.split(problem, phase).held for phase in range(split.CYCLE)]
+    assert np.max(np.sum(held, axis=0)) == 1
+
+
+def test_a_late_effect_acts_from_its_start_and_is_timed(problem: Problem) -> None:
+    candidate, values = effect("slope_bias", torque=400.0)
+    starts = (30.0, 41.0)
+    late = [(replace(candidate, since=starts), values)]
+    x = problem.start()
+    change = problem.predict_all(x, late) - problem.predict_all(x)
+    time = np.concatenate([run.time for run in problem.runs])
+    begun = time >= np.array(starts)[problem.bag]
+    assert np.allclose(change, np.where(begun, 400.0, 0.0), atol=1e-6)
+    hidden = with_torque(problem, problem.predict_all(x, late))
+    guess = replace(candidate, since=(20.0, 20.0))
+    result = fit(hidden, weight(hidden), [(guess, {"torque": 200.0})])
+    score = Score(guess, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    trial = name.Trial(score, result, name.cost(hidden, result, weight(hidden)))
+    for _ in range(name.RETIMED):
+        trial = name.retime(hidden, weight(hidden), trial)
+    assert trial.candidate.since == pytest.approx(starts, abs=0.3)
+    assert trial.fit.effects[0][1]["torque"] == pytest.approx(400.0, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["periodic", "memory", "ringing"])
+def test_foreign_patterns_are_recovered(problem: Problem, kind: str) -> None:
+    x = problem.start()
+    base = problem.predict_all(x)
+    parts = []
+    for run, model in zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True):
+        dt = run.time[1] - run.time[0]
+        if kind == "periodic":
+            parts.append(300.0 * np.sin(2.0 * np.pi * run.theta / np.radians(4.0)).sum(axis=0))
+        elif kind == "memory":  # the exact answer of a Maxwell element to steps of the rate
+            answer = np.zeros(run.time.size)
+            for i in range(1, answer.size):
+                answer[i] = answer[i - 1] + dt / 3.0 * (20_000.0 * run.omega[:, i].sum() - answer[i - 1])
+            parts.append(answer)
+        else:
+            pulsation, position, speed = 2.0 * np.pi * 1.2, model[0], 0.0
+            answer = np.zeros(run.time.size)
+            for i in range(answer.size):
+                for part in range(20):
+                    push = model[max(i - 1, 0)] + (model[i] - model[max(i - 1, 0)]) * (part + 0.5) / 20.0
+                    speed += dt / 20.0 * (pulsation**2 * (push - position) - 0.06 * pulsation * speed)
+                    position += dt / 20.0 * speed
+                answer[i] = 0.1 * (position - model[i])
+            parts.append(answer)
+    hidden = with_torque(problem, base + np.concatenate(parts))
+    baseline = fit(hidden, weight(hidden))
+    found = foreign.strongest(hidden, baseline, weight(hidden))
+    written = {
+        "periodic": r"sin\(2 pi theta / ([\d.]+) deg",
+        "memory": r"low-pass\(([\d.]+) s\) of omega",
+        "ringing": r"mode of ([\d.]+) Hz",
+    }
+    value = float(re.search(written[kind], found.text).group(1))
+    assert value == pytest.approx({"periodic": 4.0, "memory": 3.0, "ringing": 1.2}[kind], rel=0.03)
+    assert found.cost(hidden, weight(hidden)) < 1.1 * hidden.valid.sum()
+
+
+def test_a_freer_shape_takes_what_a_wrong_law_leaves_and_no_more(problem: Problem) -> None:
+    """A quadratic loss fitted by a linear one is only its shape; an offset beside it is not."""
+    x = problem.start()
+    for id_, values, taken in (("line_loss_quadratic", {"c": 3e4}, True), ("slope_bias", {"torque": 300.0}, False)):
+        linear = effect("line_loss_linear", b=2e4)
+        truth = [effect(id_, **values)] if taken else [linear, effect(id_, **values)]
+        hidden = with_torque(problem, problem.predict_all(x, truth))
+        wrong = fit(hidden, weight(hidden), [linear])
+        right = fit(hidden, weight(hidden), truth)
+        gain = name.cost(hidden, wrong, weight(hidden)) - name.cost(hidden, right, weight(hidden))
+        share = flexible.explained(hidden, wrong, weight(hidden), 0) / gain
+        assert share > name.FREER if taken else share < 0.3
+
+
+def test_the_jackknife_widens_where_the_law_is_wrong(problem: Problem) -> None:
+    x = problem.start()
+    right = with_torque(problem, problem.predict_all(x, [effect("line_loss_linear", b=2e4)]))
+    wrong = with_torque(problem, problem.predict_all(x, [effect("line_loss_quadratic", c=2e5)]))
+    spreads = []
+    for hidden in (right, wrong):
+        result = fit(hidden, weight(hidden), [effect("line_loss_linear", b=2e4)])
+        (spread,) = verify.jackknife(hidden, result, weight(hidden))
+        noise_alone = float(np.sqrt(result.covariance[-1, -1]))
+        spreads.append(spread / noise_alone)
+    assert 0.2 < spreads[0] < 4.0
+    assert spreads[1] > 3.0 * spreads[0]
