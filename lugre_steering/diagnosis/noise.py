@@ -149,14 +149,15 @@ def fast_variance(run: Run, residual: Array, known: Array) -> Array:
     scale = np.maximum(means[:-1].mean(axis=1), 1e-30)
     rows, target = (means[:-1] / scale[:, None]).T, means[-1]
     sound = np.bincount(windows, used) > 0.5 * count.max()
-    expected = np.full(target.size, np.median(target[sound]) if sound.any() else 0.0)
+    middle = max(float(np.median(target[sound])) if sound.any() else 0.0, 1e-30)
+    expected = np.full(target.size, middle)
     share = np.zeros(scale.size)
     for _ in range(4):
-        quiet = sound & (target < SUDDEN * np.maximum(expected, 1e-30))
+        quiet = sound & (target < SUDDEN * expected)
         if quiet.sum() < 3 * scale.size:
             break
         share, _ = nnls(rows[quiet] / expected[quiet, None], target[quiet] / expected[quiet])
-        expected = np.maximum(rows @ share, 1e-3 * max(float(np.median(target[sound])), 1e-30))
+        expected = np.maximum(rows @ share, 1e-3 * middle)
     return np.asarray((share / scale) @ shape)
 
 

@@ -78,6 +78,11 @@ def test_fast_noise_that_grows_with_the_load_is_measured(problem: Problem) -> No
     assert np.mean(found[high]) == pytest.approx(above + np.mean((0.01 * load[high]) ** 2), rel=0.25)
 
 
+def test_a_residual_without_any_noise_has_none(problem: Problem) -> None:
+    run = problem.runs[0]
+    assert np.array_equal(noise.fast_variance(run, np.zeros(run.time.size), np.zeros(run.time.size)), np.zeros(run.time.size))
+
+
 def test_the_split_lets_both_parts_see_a_single_event(problem: Problem) -> None:
     first = split.split(problem)
     excess = np.zeros(problem.valid.size)
