@@ -185,8 +185,8 @@ def _confront(
     rest = [effect for i, effect in enumerate(final.effects) if i != index]
     without = fit(problem, weight, rest, final.x, evaluations=6)
     scores = screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest])
-    strongest = [score.candidate.effect.id for score in scores[:3]]
-    names = {*own.effect.rivals, *item.rivals, *strongest} - {own.effect.id}
+    leading = [score.candidate.effect.id for score in scores[:3]]
+    names = {*own.effect.rivals, *item.rivals, *leading} - {own.effect.id}
     best: dict[str, Score] = {}
     for score in scores:
         best.setdefault(score.candidate.effect.id, score)
