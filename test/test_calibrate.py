@@ -19,7 +19,8 @@ from lugre_steering.chain.model import Model, build_model
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.dataset import prepare
-from lugre_steering.diagnosis.problem import Problem, fit
+from lugre_steering.diagnosis.fit import fit
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.errors import DataError
 from lugre_steering.replay import replay
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep
@@ -97,7 +98,7 @@ def test_an_error_in_temperature_sensitivity_goes_into_the_heat_capacity(long_ru
     other = Problem(SHEET, done.problem.runs, done.problem.calibrations)
     other.model = Model(other.model.parameters, other.model.rubber**exponent)
     index = [c.name for c in other.calibrations].index("heat_capacity")
-    moved = fit(other, done.estimate.weight, start=done.estimate.x, robust=True, evaluations=40).x[index]
+    moved = fit(other, done.estimate.weight, start=done.estimate.x, robust=True, linearisations=40).x[index]
     assert (moved - done.estimate.x[index]) / math.log(exponent) == pytest.approx(said, rel=0.15)
     assert said == pytest.approx(1.0, abs=0.3)
 

@@ -37,20 +37,12 @@ import numpy as np
 
 from lugre_steering import __version__, units
 from lugre_steering.bag import read_recording
-from lugre_steering.calibration.estimate import EVALUATIONS, Effects, Estimate, estimate
+from lugre_steering.calibration.estimate import LINEARISATIONS, Effects, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
 from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.dataset import prepare
-from lugre_steering.diagnosis.problem import (
-    GAIN,
-    KINGPIN,
-    STATIC,
-    Calibration,
-    Candidate,
-    Problem,
-    calibrations_for,
-    fit,
-)
+from lugre_steering.diagnosis.fit import fit
+from lugre_steering.diagnosis.problem import GAIN, KINGPIN, STATIC, Calibration, Candidate, Problem, calibrations_for
 from lugre_steering.diagnosis.split import split
 from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.errors import DataError
@@ -281,7 +273,7 @@ def heldout_rmse(problem: Problem, result: Estimate, effects: Effects, priors: b
     if not parts.held.any() or not parts.fit.any():
         return {"sheet": None, "calibrated": None}
     weight = np.where(parts.fit, result.weight, 0.0)
-    other = fit(problem, weight, effects, result.x, evaluations=EVALUATIONS, robust=True, priors=priors)
+    other = fit(problem, weight, effects, result.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     sheet = problem.predict_all(problem.start(), effects)
     return {
         "sheet": _rms((problem.measured - sheet)[parts.held]),

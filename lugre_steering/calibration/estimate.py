@@ -20,12 +20,13 @@ from scipy import stats
 from scipy.signal import correlate
 
 from lugre_steering.diagnosis.dataset import Run, motion
-from lugre_steering.diagnosis.noise import noise_model
-from lugre_steering.diagnosis.problem import ROBUST, Candidate, Fit, Problem, Values, fit
+from lugre_steering.diagnosis.fit import ROBUST, Fit, fit
+from lugre_steering.diagnosis.noise import noise_model, repeated_motion
+from lugre_steering.diagnosis.problem import Candidate, Problem, Values
 from lugre_steering.recording import Array
 
 DRAWS = 16
-EVALUATIONS = 40
+LINEARISATIONS = 40
 BLOCK_S = 2.0
 """Shortest block over which scores are summed; longer where residuals remember longer."""
 MEMORIES = 4.0
@@ -87,13 +88,13 @@ def estimate(
     """Fit all valid samples, learn the noise, fit again with it, and work out the covariance."""
     valid = problem.valid.astype(float)
     weight = valid / np.concatenate([run.sigma for run in problem.runs])
-    first = fit(problem, weight, effects, evaluations=EVALUATIONS, robust=True, priors=priors)
-    noise = noise_model(problem, first.x, effects, draws=draws, seed=seed)
+    first = fit(problem, weight, effects, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    noise = noise_model(problem, first.x, effects, repeated_motion(problem, draws, seed), seed=seed)
     weight = valid / noise.sigma
     step = step_error(problem, first.x, effects)
     refined = copy.copy(problem)
     refined.measured = problem.measured - step  # the same as adding the error to every prediction
-    final = fit(refined, weight, effects, first.x, evaluations=EVALUATIONS, robust=True, priors=priors)
+    final = fit(refined, weight, effects, first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     residual = refined.measured - final.prediction
     cluster = _clusters(problem, residual * weight)
     scales = problem.scales()

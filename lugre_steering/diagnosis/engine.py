@@ -18,9 +18,10 @@ from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.bursts import set_aside
 from lugre_steering.diagnosis.dataset import Run, prepare
 from lugre_steering.diagnosis.fingerprint import Score
+from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.noise import Noise, slow_part
-from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
+from lugre_steering.diagnosis.problem import Candidate, Problem
 from lugre_steering.diagnosis.quality import Quality, inspect
 from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence, finite
 from lugre_steering.diagnosis.split import Split, split
@@ -136,7 +137,7 @@ class _Conclusion:
         # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
         named = bool(found.found) and judged.gain > -CONTRADICTED
         final = found.final if named else found.baseline
-        whole = fit(problem, weight, final.effects, final.x, evaluations=12)
+        whole = fit(problem, weight, final.effects, final.x, linearisations=12)
         residual = problem.measured - found.final.prediction
         left, left_text, structured = self._left_over(residual, final)
         if named:
@@ -231,12 +232,12 @@ class _Conclusion:
         rest = [effect for i, effect in enumerate(whole.effects) if i != index]
 
         def with_line(line: str) -> name.Trial:
-            fitted = fit(problem, weight, [*rest, (replace(candidate, line=line), values)], whole.x, evaluations=6)
+            fitted = fit(problem, weight, [*rest, (replace(candidate, line=line), values)], whole.x, linearisations=6)
             return name.Trial(item.score, fitted, name.cost(problem, fitted, weight))
 
         own = with_line(candidate.line)
         others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
-        before = name.cost(problem, fit(problem, weight, rest, whole.x, evaluations=6), weight)
+        before = name.cost(problem, fit(problem, weight, rest, whole.x, linearisations=6), weight)
         tied = name.tied(problem, weight, self.roles, own, others, before, float(problem.valid.sum()))
         key = candidate.free[0]
         unit = self._unit(candidate.parameter(key).unit)
@@ -293,7 +294,7 @@ class _Conclusion:
             )
         if not final.effects:
             # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
-            sound = fit(problem, np.where(self.roles.fit, weight, 0.0), (), final.x, robust=True, evaluations=25)
+            sound = fit(problem, np.where(self.roles.fit, weight, 0.0), (), final.x, robust=True, linearisations=25)
             residual = problem.measured - sound.prediction
             axis, share, _ = locate.telling_coordinate(stacked, residual, weight, self.noise.draws)
         formula = None

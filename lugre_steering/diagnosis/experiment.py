@@ -12,7 +12,8 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.dataset import Run
-from lugre_steering.diagnosis.problem import Candidate, Fit, Problem
+from lugre_steering.diagnosis.fit import Fit
+from lugre_steering.diagnosis.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
 

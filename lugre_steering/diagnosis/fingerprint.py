@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, Values, in_threads
+from lugre_steering.diagnosis.fit import Fit
+from lugre_steering.diagnosis.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.effects.entry import Effect
 from lugre_steering.recording import Array
@@ -153,7 +154,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
 
     ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
     """
-    basis, _ = np.linalg.qr(_tangent(fit) * weight[:, None])
+    basis, _ = np.linalg.qr(_tangent(fit))
     residuals = np.vstack([problem.measured - fit.prediction, draws]) * weight
     residuals = residuals - (residuals @ basis) @ basis.T
     base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
@@ -221,7 +222,7 @@ def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals:
 
 
 def _tangent(fit: Fit) -> Array:
-    """Jacobian columns (n, q) of everything already free, without those that do nothing."""
+    """Weighted Jacobian columns (n, q) of everything already free, normalised, without those that do nothing."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
     kept: Array = fit.jacobian[:, norms > 0.0] / norms[norms > 0.0]
     return kept

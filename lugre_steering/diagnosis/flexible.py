@@ -12,7 +12,8 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from lugre_steering.diagnosis import locate
-from lugre_steering.diagnosis.problem import Fit, Problem
+from lugre_steering.diagnosis.fit import Fit
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.recording import Array
 
 KNOTS = 7
@@ -35,7 +36,7 @@ def explained(problem: Problem, current: Fit, weight: Array, index: int) -> floa
     hats = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
     tangent = current.jacobian[:, np.linalg.norm(current.jacobian, axis=0) > 0.0]
     # What recalibration alone would still gain is no merit of the shape.
-    basis, _ = np.linalg.qr(tangent / np.linalg.norm(tangent, axis=0) * weight[:, None])
+    basis, _ = np.linalg.qr(tangent / np.linalg.norm(tangent, axis=0))
     error = (problem.measured - current.prediction) * weight
     columns = (hats * part).T * weight[:, None]
     error, columns = error - basis @ (basis.T @ error), columns - basis @ (basis.T @ columns)

@@ -18,7 +18,8 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from lugre_steering import units
-from lugre_steering.diagnosis.problem import Fit, Problem, fit
+from lugre_steering.diagnosis.fit import Fit, fit
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.recording import Array
 
 ROUNDS = 3
@@ -70,7 +71,7 @@ def strongest(problem: Problem, baseline: Fit, weight: Array) -> Pattern:
         coefficients = _left(problem, beside, weight, columns)[1]
         torque = columns @ coefficients
         rest.measured = problem.measured - torque
-        beside = fit(rest, weight, start=beside.x, evaluations=6)
+        beside = fit(rest, weight, start=beside.x, linearisations=6)
     return Pattern(torque, beside, family.text(value, coefficients))
 
 

@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from lugre_steering.diagnosis.dataset import Run
+from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.name import Search, search
-from lugre_steering.diagnosis.noise import Noise, noise_model
-from lugre_steering.diagnosis.problem import Fit, Problem, fit
+from lugre_steering.diagnosis.noise import Noise, noise_model, repeated_motion
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.diagnosis.split import Split, balanced, split
 
 NULL_DRAWS = 16
@@ -22,10 +24,11 @@ def investigate(
     problem: Problem, seed: int, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[Noise, Split, Search]:
     """Recalibrate and search; again if what was found shows that part of the noise had been physics."""
-    noise, roles, baseline = recalibrate(problem, seed)
+    repeated = repeated_motion(problem, NULL_DRAWS, seed)
+    noise, roles, baseline = recalibrate(problem, repeated, seed)
     found = search(problem, noise, roles, baseline, progress)
     for _ in range(NOISE_ROUNDS if found.found else 0):
-        quieter = noise_model(problem, found.final.x, found.final.effects, draws=NULL_DRAWS, seed=seed)
+        quieter = noise_model(problem, found.final.x, found.final.effects, repeated, seed=seed)
         if quieter.floor > QUIETER * noise.floor:
             break
         noise = quieter
@@ -34,12 +37,12 @@ def investigate(
     return noise, roles, found
 
 
-def recalibrate(problem: Problem, seed: int) -> tuple[Noise, Split, Fit]:
+def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:
     """Baseline fitted with sheet noise first, then with the noise measured at that fit, on the split that suits its errors."""
     sheet = np.concatenate([run.sigma for run in problem.runs])
     weight = np.where(split(problem).fit, 1.0 / sheet, 0.0)
-    starts = [fit(problem, weight, evaluations=25), fit(problem, weight, robust=True, evaluations=25)]
-    first = min((fit(problem, weight, start=start.x, evaluations=10) for start in starts), key=lambda f: f.cost)
-    noise = noise_model(problem, first.x, (), draws=NULL_DRAWS, seed=seed)
+    starts = [fit(problem, weight, linearisations=25), fit(problem, weight, robust=True, linearisations=25)]
+    first = min((fit(problem, weight, start=start.x, linearisations=10) for start in starts), key=lambda f: f.cost)
+    noise = noise_model(problem, first.x, (), repeated, seed=seed)
     roles = balanced(problem, ((problem.measured - first.prediction) / noise.sigma) ** 2 - 1.0)
     return noise, roles, fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=first.x)

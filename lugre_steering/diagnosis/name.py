@@ -12,9 +12,10 @@ from scipy import stats
 
 from lugre_steering.diagnosis import flexible
 from lugre_steering.diagnosis.fingerprint import Score, screen
+from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.foreign import Pattern, strongest
 from lugre_steering.diagnosis.noise import Noise
-from lugre_steering.diagnosis.problem import Candidate, Fit, Problem, fit
+from lugre_steering.diagnosis.problem import Candidate, Problem
 from lugre_steering.diagnosis.split import Split
 from lugre_steering.recording import Array
 
@@ -57,6 +58,8 @@ class Trial:
     score: Score
     fit: Fit
     cost: float
+    deep: bool = False
+    """Whether it was fitted from several starts and refined."""
 
     @property
     def candidate(self) -> Candidate:
@@ -127,7 +130,7 @@ def search(
         trials.sort(key=lambda trial: trial.cost)
         best, before = trials[0], cost(problem, current, weight)
         # A trial may have led the calibration out of a local minimum: then the gain is not the effect's, so look again.
-        again = fit(problem, weight, current.effects, best.fit.x, evaluations=12)
+        again = fit(problem, weight, current.effects, best.fit.x, linearisations=12)
         if cost(problem, again, weight) < 0.9 * before and restarts < MAX_EFFECTS:
             current, restarts = again, restarts + 1
             if not steps:
@@ -183,7 +186,7 @@ def _confront(
     """One accepted effect against its known and met rivals, everything else of the final model in place."""
     own, values = final.effects[index]
     rest = [effect for i, effect in enumerate(final.effects) if i != index]
-    without = fit(problem, weight, rest, final.x, evaluations=6)
+    without = fit(problem, weight, rest, final.x, linearisations=6)
     scores = screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest])
     leading = [score.candidate.effect.id for score in scores[:3]]
     names = {*own.effect.rivals, *item.rivals, *leading} - {own.effect.id}
@@ -194,8 +197,12 @@ def _confront(
     # The effect under question stands last, where trials keep theirs.
     ordered = replace(final, effects=(*rest, (own, values)))
     champion = Trial(best.get(own.effect.id, item.score), ordered, cost(problem, final, weight))
+    # Where nothing stands beside it, these have been fitted as deeply before.
+    known = {trial.candidate.effect.id: trial for trial in item.trials if trial.deep and len(trial.fit.effects) == 1}
     trials = [
-        deepen(problem, weight, without, try_effect(problem, weight, without, best[name]), scores)
+        known[name]
+        if name in known and not rest
+        else deepen(problem, weight, without, try_effect(problem, weight, without, best[name]), scores)
         for name in sorted(names)
         if name in best and best[name].explained > 0.3 * champion.score.explained
     ]
@@ -205,8 +212,8 @@ def _confront(
     names_left = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
     effects = list(chosen.fit.effects)
     effects.insert(index, effects.pop())
-    known = (*item.trials, *trials)
-    return replace(chosen.fit, effects=tuple(effects)), Found(chosen.score, names_left, known, before - chosen.cost)
+    all_trials = (*item.trials, *trials)
+    return replace(chosen.fit, effects=tuple(effects)), Found(chosen.score, names_left, all_trials, before - chosen.cost)
 
 
 def _prune(
@@ -215,7 +222,7 @@ def _prune(
     """Drop earlier effects that the latest one has made superfluous: they had only filled in for its shape."""
     for index in range(len(steps) - 2, -1, -1):
         rest = [effect for i, effect in enumerate(current.effects) if i != index]
-        without = fit(problem, weight, rest, current.x, evaluations=20, tolerance=1e-5)
+        without = fit(problem, weight, rest, current.x, linearisations=20, tolerance=1e-5)
         after = cost(problem, current, weight)
         if cost(problem, without, weight) - after < _slight(start, samples):
             dropped = steps[index][1]
@@ -285,20 +292,23 @@ def _parsimony(new: Score, old: Score) -> float:
 
 
 def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
-    """Joint fit of calibration, earlier effects and this candidate, its shapes set free as well."""
+    """Joint fit of calibration, earlier effects and this candidate; again from the sheet if the calibration is cornered."""
+    trial = _fitted(problem, weight, current, score, current.x)
+    if not _cornered(problem, current):
+        return trial
+    # Recalibration was bent to imitate what is missing; from there the way back may be closed.
+    return min([trial, _fitted(problem, weight, current, score, problem.start())], key=lambda each: each.cost)
+
+
+def _fitted(problem: Problem, weight: Array, current: Fit, score: Score, start: Array) -> Trial:
+    """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
     candidate = score.candidate
     free = tuple(
         p.name for p in candidate.effect.parameters if p.name in candidate.free or p.name in dict(candidate.shapes)
     )
     effects = [*current.effects, (replace(candidate, free=free), score.values)]
-    starts = [current.x]
-    if _cornered(problem, current):
-        # Recalibration was bent to imitate what is missing; from there the way back may be closed.
-        starts.append(problem.start())
-    fits = [fit(problem, weight, effects, start, evaluations=8, tolerance=TRIAL_TOLERANCE) for start in starts]
-    costs = [cost(problem, result, weight) for result in fits]
-    best = int(np.argmin(costs))
-    return Trial(score, fits[best], costs[best])
+    result = fit(problem, weight, effects, start, linearisations=8, tolerance=TRIAL_TOLERANCE)
+    return Trial(score, result, cost(problem, result, weight))
 
 
 def _everywhere(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
@@ -334,13 +344,13 @@ def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: 
         if (c := score.candidate).label == tried.label and (c.bags, c.since) == (tried.bags, tried.since)
         and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
     ]  # fmt: skip
-    others = [try_effect(problem, weight, current, score) for score in variants[:VARIANTS]]
+    others = [_fitted(problem, weight, current, score, trial.fit.x) for score in variants[:VARIANTS]]
     typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))
-    others += [try_effect(problem, weight, replace(current, x=problem.start()), typical)]
+    others.append(_fitted(problem, weight, current, typical, problem.start()))
     best = min([trial, *others], key=lambda each: each.cost)
     for _ in range(RETIMED if tried.since else 0):
         best = retime(problem, weight, best)
-    return refine(problem, weight, best)
+    return replace(refine(problem, weight, best), deep=True)
 
 
 def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
@@ -358,7 +368,7 @@ def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
         best = int(np.argmax(from_here))
         since.append(float(run.time[best]) if best < run.time.size else np.inf)
     effects = [*earlier, (replace(candidate, since=tuple(since)), values)]
-    result = fit(problem, weight, effects, trial.fit.x, evaluations=8, tolerance=TRIAL_TOLERANCE)
+    result = fit(problem, weight, effects, trial.fit.x, linearisations=8, tolerance=TRIAL_TOLERANCE)
     better = cost(problem, result, weight)
     return Trial(trial.score, result, better) if better < trial.cost else trial
 
@@ -368,12 +378,12 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     candidate, values = trial.fit.effects[-1]
     optional = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     if not optional:
-        result = fit(problem, weight, trial.fit.effects, trial.fit.x, evaluations=20, tolerance=1e-5)
+        result = fit(problem, weight, trial.fit.effects, trial.fit.x, linearisations=20, tolerance=1e-5)
         return Trial(trial.score, result, cost(problem, result, weight))
     earlier = trial.fit.effects[:-1]
     start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
     richer = replace(candidate, free=candidate.free + tuple(optional))
-    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, evaluations=20, tolerance=1e-5)
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=20, tolerance=1e-5)
     # What the model leaves over makes its numbers less sure than noise alone would.
     misfit = max(cost(problem, result, weight) / max(float(np.count_nonzero(weight)), 1.0), 1.0)
     deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]
@@ -382,7 +392,7 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     if len(needed) < len(optional):
         fitted = {name: value for name, value in fitted.items() if name not in optional or name in needed}
         leaner = replace(candidate, free=candidate.free + needed)
-        result = fit(problem, weight, [*earlier, (leaner, fitted)], result.x, evaluations=8)
+        result = fit(problem, weight, [*earlier, (leaner, fitted)], result.x, linearisations=8)
     better = cost(problem, result, weight)
     return Trial(trial.score, result, better) if better < trial.cost - 10.0 * misfit * max(len(needed), 1) else trial
 

@@ -177,30 +177,38 @@ def _parts(problem: Problem) -> list[tuple[Run, slice]]:
     return [(run, slice(a, b)) for run, (a, b) in zip(problem.runs, edges, strict=True)]
 
 
-def noise_model(
-    problem: Problem, x: Array, effects: Sequence[tuple[Candidate, Values]], *, draws: int, seed: int
-) -> Noise:
-    """Noise of the residual at a fitted model, from ``draws`` repetitions."""
-    quiet = quiet_noise(problem.runs)
+def repeated_motion(problem: Problem, draws: int, seed: int) -> list[list[Run]]:
+    """The runs of each bag with their motion as ``draws`` fresh draws of angle noise would have shown it."""
     sheet = angle_noise(problem.vehicle)
-    base = problem.predict_all(x, effects)
 
-    def repeat(bag: int) -> Array:
-        """What fresh angle noise changes in the prediction of one bag (draws, n)."""
-        rng = np.random.default_rng([seed, bag])
-        run, part = parts[bag]
-        errors = np.empty((draws, run.time.size))
-        for i in range(draws):
-            # One sensor for both tracks makes one error.
-            sensors = 1 if problem.vehicle.sensors.angle_from else len(run.theta)
+    def repeat(bag: int) -> list[Run]:
+        rng, run = np.random.default_rng([seed, bag]), problem.runs[bag]
+        # One sensor for both tracks makes one error.
+        sensors = 1 if problem.vehicle.sensors.angle_from else len(run.theta)
+        repeated = []
+        for _ in range(draws):
             noisy = run.theta + sheet * rng.standard_normal((sensors, run.time.size))
             theta = np.array([smooth_angle(row, sheet) for row in noisy])
             omega, alpha = motion(run.time, theta)
-            errors[i] = problem.predict(bag, x, effects, replace(run, theta=theta, omega=omega, alpha=alpha)) - base[part]
-        return errors
+            repeated.append(replace(run, theta=theta, omega=omega, alpha=alpha))
+        return repeated
 
-    parts = _parts(problem)
-    errors = in_threads(repeat, range(len(parts)))
+    return in_threads(repeat, range(len(problem.runs)))
+
+
+def noise_model(
+    problem: Problem, x: Array, effects: Sequence[tuple[Candidate, Values]], repeated: Sequence[Sequence[Run]], *, seed: int
+) -> Noise:
+    """Noise of the residual at a fitted model; ``repeated`` motion tells what the angle noise makes of it."""
+    quiet = quiet_noise(problem.runs)
+    base = problem.predict_all(x, effects)
+    parts, draws = _parts(problem), len(repeated[0])
+
+    def changes(bag: int) -> Array:
+        """Change of the prediction of one bag by each repetition (draws, n) [N m]."""
+        return np.array([problem.predict(bag, x, effects, run) for run in repeated[bag]]) - base[parts[bag][1]]
+
+    errors = in_threads(changes, range(len(parts)))
     # Only oil carries pump ripple; a torque sensor is as noisy in motion as at rest.
     hydraulic = problem.vehicle.hydraulics is not None
     sigmas, slow_sigmas, residuals = [], [], []

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.problem import Fit, Problem, fit
+from lugre_steering.diagnosis.fit import Fit, fit
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.diagnosis.split import CYCLE, Mask, Split, split
 from lugre_steering.recording import Array, IntArray
 
@@ -51,7 +52,7 @@ def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles
         other = split(problem, phase)
         fitted = np.where(other.fit, weight, 0.0)
         for errors, model in ((before, baseline), (after, augmented)):
-            refitted = fit(problem, fitted, model.effects, model.x, evaluations=8)
+            refitted = fit(problem, fitted, model.effects, model.x, linearisations=8)
             errors[other.held] = (problem.measured - refitted.prediction)[other.held] ** 2
         seen |= other.held
     return replace(_judge(before, after, seen, roles.cluster, seed), rotated=True)
@@ -84,7 +85,7 @@ def jackknife(problem: Problem, result: Fit, weight: Array) -> Array:
     estimates = []
     for left_out in range(int(stretch[-1]) + 1):
         kept = np.where(stretch == left_out, 0.0, weight)
-        fitted = fit(problem, kept, result.effects, result.x, evaluations=4)
+        fitted = fit(problem, kept, result.effects, result.x, linearisations=4)
         estimates.append([values[key] for candidate, values in fitted.effects for key in candidate.free])
     spread = np.array(estimates)
     return np.asarray(np.sqrt((len(spread) - 1.0) * np.var(spread, axis=0)))
@@ -92,7 +93,7 @@ def jackknife(problem: Problem, result: Fit, weight: Array) -> Array:
 
 def robust_covariance(problem: Problem, result: Fit, weight: Array, cluster: IntArray) -> Array:
     """Covariance of all fitted values (cluster-robust sandwich; Liang and Zeger 1986), at least the homoscedastic one."""
-    scores = result.jacobian * ((problem.measured - result.prediction) * weight**2)[:, None]
+    scores = result.jacobian * ((problem.measured - result.prediction) * weight)[:, None]
     count = int(cluster.max()) + 1
     summed = np.zeros((count, scores.shape[1]))
     np.add.at(summed, cluster, scores)

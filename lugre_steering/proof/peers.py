@@ -33,8 +33,9 @@ from numpy.typing import NDArray
 
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.fit import fit
 from lugre_steering.diagnosis.locate import coordinates
-from lugre_steering.diagnosis.problem import GAIN, KINGPIN, Problem, calibrations_for, fit
+from lugre_steering.diagnosis.problem import GAIN, KINGPIN, Problem, calibrations_for
 from lugre_steering.diagnosis.split import Split, split
 from lugre_steering.vehicle import load
 
@@ -108,8 +109,8 @@ def compare(bags: Sequence[Path], vehicle_file: Path) -> dict[str, dict[str, Any
     problem = Problem(vehicle, runs)
     roles = split(problem)
     weight = np.where(roles.fit, 1.0 / np.concatenate([run.sigma for run in runs]), 0.0)
-    start = fit(problem, weight, robust=True, evaluations=25)
-    baseline = fit(problem, weight, start=start.x, evaluations=15)
+    start = fit(problem, weight, robust=True, linearisations=25)
+    baseline = fit(problem, weight, start=start.x, linearisations=15)
     parts = [slice(a, b) for a, b in zip(problem.edges, problem.edges[1:], strict=False)]
     axes = [coordinates(run, baseline.prediction[part]) for run, part in zip(runs, parts, strict=True)]
     data = Data({name: np.concatenate([bag[name] for bag in axes]) for name in INPUTS}, problem.measured - baseline.prediction, roles)
@@ -117,7 +118,7 @@ def compare(bags: Sequence[Path], vehicle_file: Path) -> dict[str, dict[str, Any
     begun = time.perf_counter()
     loose = Problem(vehicle, runs, (*calibrations_for(vehicle), KINGPIN, GAIN))
     x = np.concatenate([baseline.x[: len(problem.calibrations)], [0.0, 0.0], baseline.x[len(problem.calibrations) :]])
-    free = fit(loose, weight, start=x, evaluations=15, priors=False)
+    free = fit(loose, weight, start=x, linearisations=15, priors=False)
     # The gain scales the measured torque: compare in the units of the measurement.
     learned = Learned(free.prediction - baseline.prediction)
     found = {"recalibration": _judged(data, learned, time.perf_counter() - begun)}

@@ -12,7 +12,8 @@ from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis import flexible, foreign, name, noise, split, verify
 from lugre_steering.diagnosis.dataset import prepare
 from lugre_steering.diagnosis.fingerprint import Score
-from lugre_steering.diagnosis.problem import Candidate, Problem, fit
+from lugre_steering.diagnosis.fit import fit
+from lugre_steering.diagnosis.problem import Candidate, Problem
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.simulate.command import load_vehicle
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
