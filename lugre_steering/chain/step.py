@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,18 @@ def ratios(rubber, low, step, temperature):
 
 
 @law
+def share_out(p, s):
+    """Elements of the distributed contact as deflected as the one bristle, with their log-normal shares of the stiffness."""
+    total = 0.0
+    for i in range(ELEMENTS):
+        s.elements[i] = s.z
+        s.element_shares[i] = exp(p.distributed_contact_spread * _NORMAL_QUANTILES[i])
+        total += s.element_shares[i]
+    for i in range(ELEMENTS):
+        s.element_shares[i] /= total
+
+
+@law
 def begin(p, s, theta):
     """State at the first sample of a recording: bristles and temperatures as the parameters say."""
     s.started = 1.0
@@ -58,13 +71,7 @@ def begin(p, s, theta):
     s.contact_angle = theta
     s.z = p.initial_bristle
     s.z_max = abs(p.initial_bristle)
-    total = 0.0
-    for i in range(ELEMENTS):
-        s.elements[i] = p.initial_bristle
-        s.element_shares[i] = exp(p.distributed_contact_spread * _NORMAL_QUANTILES[i])
-        total += s.element_shares[i]
-    for i in range(ELEMENTS):
-        s.element_shares[i] /= total
+    share_out(p, s)
     s.temperature = p.rubber_temperature
     s.carcass_temperature = p.rubber_temperature
     s.air_temperature = p.air_temperature
@@ -175,8 +182,7 @@ def _run(p, s, rubber, time, theta, omega, alpha, out, previous, effects):
 
 
 @njit(nogil=True, cache=True)
-def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, effects):
-    previous = time[0]
+def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, previous, effects):
     for i in range(time.size):
         step(p[0], s[0], rubber, scratch[0], time[i] - previous, theta[i], omega[i], alpha[i], effects)
         torque[i] = scratch[0].torque
@@ -221,7 +227,39 @@ def run_side(
 
 def torque_side(p: Records, rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array) -> Array:
     """Whole record of one track -> torque [N m] only (n,); the fast path of fits. Same arithmetic as ``run_side``."""
-    torque = np.empty(time.size)
+    return torque_in_phases([(-np.inf, p)], rubber, time, theta, omega, alpha)
+
+
+def torque_in_phases(
+    phases: Sequence[tuple[float, Records]], rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array
+) -> Array:
+    """Like ``torque_side``, with other parameters from given times [s] on, in ascending order; the state is carried over."""
+    torque, state, scratch = np.empty(time.size), new_state(), np.zeros(1, OUTPUT)
     time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))
-    _torque(p, new_state(), rubber, np.zeros(1, OUTPUT), time, theta, omega, alpha, torque, has_effects(p))
+    edges = [*np.searchsorted(time, [start for start, _ in phases]), time.size]
+    for k, (_, p) in enumerate(phases):
+        a, b = edges[k], edges[k + 1]
+        if a == b:
+            continue
+        if a > 0:
+            _begin_late(phases[k - 1][1], p, state)
+        part = slice(a, b)
+        _torque(
+            p, state, rubber, scratch, time[part], theta[part], omega[part], alpha[part], torque[part], time[max(a - 1, 0)],
+            has_effects(p),
+        )  # fmt: skip
     return torque
+
+
+def _begin_late(before: Records, p: Records, state: Records) -> None:
+    """Effects that are new in ``p`` count time and path from now on, and elements take over what the bristle carries."""
+
+    def new(field: str) -> bool:
+        return bool(before[field][0] == 0.0 != p[field][0])
+
+    if new("wear_polishing_amount"):
+        state["slip"] = 0.0
+    if new("ambient_drift_rate"):
+        state["air_temperature"] -= p["ambient_drift_rate"] * state["time"]
+    if new("distributed_contact_spread"):
+        share_out(p[0], state[0])

@@ -13,7 +13,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis import experiment, locate, name, unlisted, verify
+from lugre_steering.diagnosis import experiment, locate, name, onset, unlisted, verify
 from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.bursts import set_aside
 from lugre_steering.diagnosis.dataset import Run, prepare
@@ -36,6 +36,8 @@ UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
 """Energy left over, in noise variances, that makes a verdict: slow and above the doubt about slow noise, or of any kind."""
 LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
 """Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
+TELLING = 0.5
+"""Share of the held-out error that a pattern outside the catalogue must explain for its own places to be told."""
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 MATERIAL_SHARE = 0.005
@@ -137,8 +139,9 @@ class _Conclusion:
         # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
         named = bool(found.found) and judged.gain > -CONTRADICTED
         final = found.final if named else found.baseline
-        whole = fit(problem, weight, final.effects, final.x, linearisations=12)
-        residual = problem.measured - found.final.prediction
+        whole = self._whole(final, weight)
+        late = any(candidate.since for candidate, _ in final.effects)
+        residual = problem.measured - (whole if late else found.final).prediction
         left, left_text, structured = self._left_over(residual, final)
         if named:
             verdict = "missing_physics"
@@ -180,6 +183,16 @@ class _Conclusion:
             self._evidence(effects),
             {e["id"]: CATALOGUE[e["id"]].coordinate for e in effects},
         )
+
+    def _whole(self, final: Fit, weight: Array) -> Fit:
+        """All valid data fitted, for the values that are reported; what began late is timed anew."""
+        whole = fit(self.problem, weight, final.effects, final.x)
+        for index, (candidate, values) in enumerate(whole.effects):
+            if candidate.since:
+                effects = [*whole.effects]
+                effects[index] = (replace(candidate, since=onset.timed(self.problem, weight, whole, index)), values)
+                whole = fit(self.problem, weight, effects, whole.x)
+        return whole
 
     def _effects(self, whole: Fit) -> list[dict[str, Any]]:
         problem, found = self.problem, self.found
@@ -301,24 +314,29 @@ class _Conclusion:
         held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
         proposal = unlisted.propose(stacked, residual, fitted, held, units.is_linear(problem.vehicle))
-        pattern = self.found.pattern if not final.effects else None
+        pattern, shape = self.found.pattern if not final.effects else None, None
         if pattern is not None:
             before, after = name.cost(problem, self.found.baseline, held), pattern.cost(problem, held)
             gain = 1.0 - after / max(before, 1e-9)
             if gain > (proposal.gain if proposal is not None else 0.02):
                 proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
+                # A pattern that explains most of it also says where it acts below the noise.
+                shape = pattern.torque if gain > TELLING else None
         if proposal is not None:
             formula = f"{units.law(problem.vehicle, proposal.text)} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
         where = []
         for run, part, values in zip(problem.runs, parts, axes, strict=True):
-            smooth = np.sqrt(np.convolve((residual[part] * weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
-            limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
-            spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
+            if shape is None:
+                smooth = np.sqrt(np.convolve((residual[part] * weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
+                limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
+                spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
+                piece = residual[part] * (smooth > limit)
+            else:
+                spans, piece = locate.intervals(run.time, shape[part]), shape[part]
             if spans:
                 where.append({
                     "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                    "range": list(locate.active_range(values[axis], residual[part] * (smooth > limit))),
-                    "unit": self._unit(locate.UNITS[axis]),
+                    "range": list(locate.active_range(values[axis], piece)), "unit": self._unit(locate.UNITS[axis]),
                 })  # fmt: skip
         text = (
             f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from lugre_steering.diagnosis import onset
 from lugre_steering.diagnosis.fit import Fit
 from lugre_steering.diagnosis.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.effects.catalogue import CATALOGUE
@@ -29,6 +30,9 @@ HYDRAULIC = (
 """Nothing of a joint that is driven and measured without oil (friction between drive and joint is its own friction)."""
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
+REMEMBERED = ("thermal", "motion")
+"""Stages whose effects, begun late, leave another trace than the end of the same effect always there: heat is remembered for
+minutes, and an angle that shifts turns the contact."""
 NEVER_LATE = ("surface_patch", "mullins_softening")
 """Has its own time window; acts on the first sweep."""
 CEILINGS = (0.8, 0.88, 0.94, 0.98)
@@ -159,8 +163,9 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
     residuals = residuals - (residuals @ basis) @ basis.T
     base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
     energy = float(residuals[0] @ residuals[0])
-    time = np.concatenate([run.time for run in problem.runs])
-    starts = [share * float(time.max()) for share in LATE]
+    longest = max(float(run.time[-1]) for run in problem.runs)
+    starts = [*((share * longest,) * len(problem.runs) for share in LATE), onset.suggested(problem, residuals[0])]
+    begun = [np.concatenate([run.time >= s for run, s in zip(problem.runs, start, strict=True)]) for start in starts]
 
     def score(candidate: Candidate) -> list[Score]:
         columns = signature(problem, fit, base, candidate) * weight[:, None]
@@ -172,9 +177,13 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
                 part = score_columns(alone, columns * (problem.bag == bag)[:, None], basis, residuals, energy)
                 found += [part] if part is not None else []
         if candidate.bags is None and full is not None and candidate.effect.id not in NEVER_LATE:
-            for start in starts:
-                late = replace(candidate, since=(start,) * len(problem.runs))
-                part = score_columns(late, columns * (time >= start)[:, None], basis, residuals, energy)
+            for start, after in zip(starts, begun, strict=True):
+                late = replace(candidate, since=start)
+                if candidate.effect.stage in REMEMBERED:
+                    changed = signature(problem, fit, base, late) * weight[:, None]
+                else:
+                    changed = columns * after[:, None]
+                part = score_columns(late, changed, basis, residuals, energy)
                 found += [part] if part is not None else []
         return found
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis import flexible
+from lugre_steering.diagnosis import flexible, onset
 from lugre_steering.diagnosis.fingerprint import Score, screen
 from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.foreign import Pattern, strongest
@@ -37,6 +37,7 @@ is so large against the noise."""
 FREER = 0.7
 """Share of a further effect's gain that a freer shape of an earlier one may have at most."""
 RETIMED = 2
+"""Rounds of timing a late effect."""
 PARTIAL = 0.1
 """Share by which an effect in one bag only, or from a time on, must explain more than the same everywhere."""
 VARIANT, VARIANTS = 0.5, 2
@@ -126,6 +127,8 @@ def search(
             progress(f"fitting {score.candidate.label}")
             trials.append(_everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
         trials.sort(key=lambda trial: trial.cost)
+        if _timed(trials[0]):
+            trials = sorted((_late(problem, weight, current, trial, scores) for trial in trials), key=lambda trial: trial.cost)
         trials = [deepen(problem, weight, current, trial, scores) for trial in trials[:3]] + trials[3:]
         trials.sort(key=lambda trial: trial.cost)
         best, before = trials[0], cost(problem, current, weight)
@@ -354,23 +357,29 @@ def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: 
 
 
 def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
-    """A late effect from the instants that fit best, one per bag, with its values fitted anew.
-
-    For given values the best instant of a bag follows from sums: errors without the effect before it, with it from then on.
-    """
+    """A late effect from the instants that fit best, one per bag, with its values fitted anew."""
     *earlier, (candidate, values) = trial.fit.effects
-    always = problem.predict_all(trial.fit.x, [*earlier, (replace(candidate, since=()), values)])
-    without = problem.predict_all(trial.fit.x, earlier)
-    gains = ((problem.measured - without) * weight) ** 2 - ((problem.measured - always) * weight) ** 2
-    since = []
-    for run, part in zip(problem.runs, np.split(gains, problem.edges[1:-1]), strict=True):
-        from_here = np.append(np.cumsum(part[::-1])[::-1], 0.0)
-        best = int(np.argmax(from_here))
-        since.append(float(run.time[best]) if best < run.time.size else np.inf)
-    effects = [*earlier, (replace(candidate, since=tuple(since)), values)]
+    since = onset.timed(problem, weight, trial.fit, len(earlier))
+    effects = [*earlier, (replace(candidate, since=since), values)]
     result = fit(problem, weight, effects, trial.fit.x, linearisations=8, tolerance=TRIAL_TOLERANCE)
     better = cost(problem, result, weight)
     return Trial(trial.score, result, better) if better < trial.cost else trial
+
+
+def _late(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
+    """A trial of an effect that is always there against the same from an instant on, which must explain clearly more."""
+    tried = trial.score.candidate
+    late = next((s for s in scores if (c := s.candidate).label == tried.label and c.bags is None and c.since), None)
+    if late is None or _partial(trial.score):
+        return trial
+    begun = retime(problem, weight, try_effect(problem, weight, current, late))
+    gain = cost(problem, current, weight) - begun.cost
+    return begun if begun.cost < trial.cost - PARTIAL * gain else trial
+
+
+def _timed(trial: Trial) -> bool:
+    """Whether what a trial found begins or ends within the recordings."""
+    return bool(trial.candidate.since) or any(trial.fit.effects[-1][1].get(edge) for edge in ("time_start", "time_end"))
 
 
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:

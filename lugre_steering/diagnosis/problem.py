@@ -15,7 +15,7 @@ import numpy as np
 
 from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.model import Model, build_model
-from lugre_steering.chain.step import torque_side
+from lugre_steering.chain.step import torque_in_phases
 from lugre_steering.diagnosis.dataset import Run
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
@@ -160,20 +160,25 @@ class Problem:
     def torque(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
     ) -> Array:
-        """Model torque of one bag (n,) with all effects on, before the sensors; ``run`` in place of the bag's own motion."""
+        """Model torque of one bag (n,) with all effects, before the sensors; ``run`` in place of the bag's own motion."""
         run = run or self.runs[bag]
         record = self.model.parameters[0].copy()
         for field, value in self.fields(x).items():
             record[field] = value
         record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
-        for candidate, values in effects:
-            for name, value in values.items():
-                field = f"{candidate.effect.id}_{name}"
-                if field in EFFECT_FIELDS:
-                    record[field] = value
+        phases = []
+        for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects)}):
+            acting = record.copy()
+            for candidate, values in effects:
+                for name, value in values.items() if candidate.start(bag) <= start else ():
+                    field = f"{candidate.effect.id}_{name}"
+                    if field in EFFECT_FIELDS:
+                        acting[field] = value
+            phases.append((start, acting))
         total = np.zeros(run.time.size)
         for side in range(run.theta.shape[0]):
-            total += torque_side(record, self.model.rubber, run.time, run.theta[side], run.omega[side], run.alpha[side])
+            motion = run.theta[side], run.omega[side], run.alpha[side]
+            total += torque_in_phases(phases, self.model.rubber, run.time, *motion)
         return total
 
     def predict(
@@ -182,19 +187,14 @@ class Problem:
         """Measured torque that the model expects in one bag (n,): sensor effects included."""
         run = run or self.runs[bag]
         here = [effect for effect in effects if effect[0].active_in(bag)]
-        expected = np.zeros(run.time.size)
-        # What begins late is blended in: its own memory of the time before does not matter to what it does after.
-        for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in here)}):
-            begun = run.time >= start
-            if begun.any():
-                acting = [effect for effect in here if effect[0].start(bag) <= start]
-                torque = self.torque(bag, x, acting, run)
-                for candidate, values in acting:
-                    torque = self._through_sensor(run, candidate, values, torque)
-                expected[begun] = torque[begun]
-        return expected / self.gain(x)
+        torque = self.torque(bag, x, here, run)
+        for candidate, values in here:
+            start = candidate.start(bag)
+            changed = self._through_sensor(run, candidate, values, torque, start)
+            torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
+        return torque / self.gain(x)
 
-    def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array) -> Array:
+    def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array, start: float) -> Array:
         """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
         name = candidate.effect.id
         if name == "pressure_lag":
@@ -203,7 +203,8 @@ class Problem:
             changed = np.interp(run.time - values["delay"], run.time, torque)
         elif name in ("pressure_offset", "pressure_drift"):
             gain = run.torque_per_line[self._lines.index(candidate.line)]
-            changed = torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * run.time)
+            drifting = run.time - max(start, 0.0)
+            changed = torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * drifting)
         elif name == "angle_offset":
             changed = torque + values["offset"] * run.side_slope.sum(axis=0)
         elif name == "angle_scale":

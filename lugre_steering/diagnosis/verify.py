@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from lugre_steering.diagnosis import onset
 from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.diagnosis.split import CYCLE, Mask, Split, split
@@ -44,7 +45,9 @@ def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles
     ``weight`` (n,) is 1 / sigma where samples are valid. Selection has seen the other thirds, their numbers have not.
     """
     before, after = (np.where(roles.held, problem.measured - r.prediction, 0.0) ** 2 for r in (baseline, augmented))
-    first = _judge(before, after, roles.held, roles.cluster, seed)
+    # Where the fitted data cannot tell when an effect began, the held-out data must not be judged by a guess.
+    sure = ~onset.undetermined(problem, np.where(roles.fit, weight, 0.0), augmented)
+    first = _judge(before, after, roles.held & sure, roles.cluster, seed)
     if not augmented.effects or first.interval[0] > 0.0 or not roles.held.any():
         return first
     seen = np.zeros(problem.valid.size, bool)
@@ -54,7 +57,7 @@ def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles
         for errors, model in ((before, baseline), (after, augmented)):
             refitted = fit(problem, fitted, model.effects, model.x, linearisations=8)
             errors[other.held] = (problem.measured - refitted.prediction)[other.held] ** 2
-        seen |= other.held
+        seen |= other.held & sure
     return replace(_judge(before, after, seen, roles.cluster, seed), rotated=True)
 
 
