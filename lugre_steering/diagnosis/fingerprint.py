@@ -35,7 +35,7 @@ REMEMBERED = ("thermal", "motion")
 minutes, and an angle that shifts turns the contact."""
 NEVER_LATE = ("surface_patch", "mullins_softening")
 """Has its own time window; acts on the first sweep."""
-CEILINGS = (0.8, 0.88, 0.94, 0.98)
+CEILINGS = (0.8, 0.88, 0.92, 0.95, 0.975, 1.0)
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,7 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
         if effect.id == "surface_patch":
             found += _windows(problem, effect)
         elif effect.id == "relief_saturation":
-            top = float(np.max(np.abs(problem.measured)))
-            found += [Candidate(effect, (("ceiling", top * c),)) for c in CEILINGS]
+            found += _ceilings(problem, effect)
         elif effect.per_line:
             lines = problem.vehicle.hydraulics.lines if problem.vehicle.hydraulics is not None else ()
             found += [Candidate(effect, (), line, free=free) for line in lines]
@@ -136,6 +135,19 @@ def _windows(problem: Problem, effect: Effect) -> list[Candidate]:
         if b - a < 0.99 * (times[-1] - times[0])
     ]
     return found
+
+
+def _ceilings(problem: Problem, effect: Effect) -> list[Candidate]:
+    """A relief pressure limits the torque by the arms of the cylinders toward the push, which the vehicle sheet knows."""
+    theta = np.concatenate([run.theta.mean(axis=0) for run in problem.runs])
+    gains = np.concatenate([run.torque_per_line for run in problem.runs], axis=1)
+    toward = np.concatenate([theta, -theta])
+    held = np.concatenate([np.maximum(gains, 0.0).sum(axis=0), np.maximum(-gains, 0.0).sum(axis=0)])
+    middle, slope, curvature = np.polynomial.polynomial.polyfit(toward, held, 2)
+    arms = (("arm_slope", float(slope / middle)), ("arm_curvature", float(curvature / middle)))
+    arm = np.where(problem.measured > 0.0, held[: theta.size], held[theta.size :]) / middle
+    top = float(np.percentile(np.abs(problem.measured) / arm, 99.9))  # the largest values hold noise
+    return [Candidate(effect, (("ceiling", top * share), *arms)) for share in CEILINGS]
 
 
 def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate) -> Array:

@@ -127,17 +127,23 @@ def search(
             progress(f"fitting {score.candidate.label}")
             trials.append(_everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
         trials.sort(key=lambda trial: trial.cost)
+        trials[0] = _late(problem, weight, current, trials[0], scores)
         if _timed(trials[0]):
-            trials = sorted((_late(problem, weight, current, trial, scores) for trial in trials), key=lambda trial: trial.cost)
+            trials[1:] = [_late(problem, weight, current, trial, scores) for trial in trials[1:]]
+            trials.sort(key=lambda trial: trial.cost)
         trials = [deepen(problem, weight, current, trial, scores) for trial in trials[:3]] + trials[3:]
         trials.sort(key=lambda trial: trial.cost)
         best, before = trials[0], cost(problem, current, weight)
         # A trial may have led the calibration out of a local minimum: then the gain is not the effect's, so look again.
         again = fit(problem, weight, current.effects, best.fit.x, linearisations=12)
-        if cost(problem, again, weight) < 0.9 * before and restarts < MAX_EFFECTS:
+        regained = before - cost(problem, again, weight)
+        if regained > max(FREER * (before - best.cost), OWN_ERROR * samples) and restarts < MAX_EFFECTS:
             current, restarts = again, restarts + 1
-            if not steps:
-                baseline, start_cost = again, cost(problem, again, weight)
+            if steps:
+                _, last, gained = steps[-1]
+                steps[-1] = (again, replace(last, gain=last.gain + regained), gained)
+            else:
+                baseline, start_cost = again, before - regained
                 excess = start_cost - samples
             continue
         all_trials += trials

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ import numpy as np
 
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.proof import hydraulics
-from lugre_steering.proof.campaign import Hiding
+from lugre_steering.proof.campaign import PEERS_EVERY, Hiding
 from lugre_steering.proof.sensors import PERIOD_S
 from lugre_steering.proof.simulator import (
     BagData,
@@ -195,8 +195,11 @@ def truth(data: CaseData, names: Sequence[str]) -> Row:
     }  # fmt: skip
 
 
-def finished(journal: Path, version: str, peers: bool) -> dict[str, Row]:
-    """Cases that a run of the same code has finished, by name and seed; a line cut off by an interruption is left out."""
+def finished(journal: Path, version: str, compared: Set[str]) -> dict[str, Row]:
+    """Cases that a run of the same code has finished, by name and seed; a line cut off by an interruption is left out.
+
+    ``compared``: names of the cases that need the answers of the peers too.
+    """
     rows: dict[str, Row] = {}
     if not journal.exists():
         return rows
@@ -205,7 +208,7 @@ def finished(journal: Path, version: str, peers: bool) -> dict[str, Row]:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
-        if row["version"] == version and row["error"] is None and ("peers" in row or not peers):
+        if row["version"] == version and row["error"] is None and ("peers" in row or row["name"] not in compared):
             rows[f"{row['name']} {row['seed']}"] = row
     return rows
 
@@ -224,7 +227,8 @@ def run_all(
     An interruption (Ctrl-C) ends it with the cases finished so far.
     """
     version, begun = source_version(), time.monotonic()
-    known: Mapping[str, Row] = finished(journal, version, peers)
+    compared = {case.name for case in cases[::PEERS_EVERY]} if peers else set()
+    known: Mapping[str, Row] = finished(journal, version, compared)
     rows = [known[f"{case.name} {case.seed}"] for case in cases if f"{case.name} {case.seed}" in known]
     waiting = [case for case in cases if f"{case.name} {case.seed}" not in known]
     workers = os.cpu_count() or 1
@@ -238,7 +242,8 @@ def run_all(
             if budget_s is not None and time.monotonic() - begun > budget_s:
                 waiting = []
             while waiting and len(running) < workers:
-                running.add(pool.submit(run, Job(waiting.pop(0), sheet_file, version, peers)))
+                case = waiting.pop(0)
+                running.add(pool.submit(run, Job(case, sheet_file, version, case.name in compared)))
             if not running:
                 break
             try:

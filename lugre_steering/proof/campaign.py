@@ -22,6 +22,8 @@ RATIOS = (0.1, 0.3, 1.0, 10.0)
 DISGUISE_RATIO = 1.0
 PAIR_RATIO = 1.0
 NULLS, REPEATS, PAIRS, UNLISTED_REPEATS = 102, 2, 24, 3
+PEERS_EVERY = 4
+"""The peers, which take about as long as the diagnosis, are compared on every so many of the cases."""
 WITHOUT_LATE_START = ("mullins_softening",)
 """Acts on the first sweep only, so it cannot begin late."""
 

@@ -242,9 +242,9 @@ def test_resume_keeps_finished_cases_of_the_same_code(tmp_path: Path) -> None:
     other = json.dumps({**done[0], "version": "older code"})
     failed = json.dumps({**done[1], "error": "crash", "diagnosis": None})
     journal.write_text(f"{other}\n{failed}\n", encoding="utf-8")
-    assert blind.finished(journal, version, peers=False) == {}
+    assert blind.finished(journal, version, set()) == {}
     journal.write_text(lines[0] + "\n", encoding="utf-8")
-    assert blind.finished(journal, version, peers=True) == {}  # peers have not run yet
+    assert blind.finished(journal, version, {cases[0].name}) == {}  # peers have not run yet
 
 
 @pytest.fixture(scope="module")
