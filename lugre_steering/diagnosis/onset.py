@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,25 +64,37 @@ def undetermined(problem: Problem, weight: Array, result: Fit) -> Mask:
 
 
 def _left(
-    problem: Problem, weight: Array, result: Fit, index: int, since: tuple[float, ...] | list[float], bag: int
+    problem: Problem, weight: Array, result: Fit, index: int, since: Sequence[float], bag: int
 ) -> Callable[[float], float]:
-    """Energy left over as a function of the instant in one bag, once all fitted values have followed it to first order."""
-    candidate, values = result.effects[index]
-    norms = np.linalg.norm(result.jacobian, axis=0)
-    basis, _ = np.linalg.qr(result.jacobian[:, norms > 0.0] / norms[norms > 0.0])
+    """Energy left over as a function of the instant in one bag, once the size of the effect and all else fitted have followed it.
 
-    def error(of: int, start: float) -> Array:
+    To first order: errors without the effect, projected off the other columns of the Jacobian and its own trace from the instant.
+    """
+    candidate, values = result.effects[index]
+    others = [effect for i, effect in enumerate(result.effects) if i != index]
+    first = problem.nuisances + sum(len(effect.free) for effect, _ in result.effects[:index])
+    rest = np.delete(result.jacobian, np.s_[first : first + len(candidate.free)], axis=1)
+    norms = np.linalg.norm(rest, axis=0)
+    basis, _ = np.linalg.qr(rest[:, norms > 0.0] / norms[norms > 0.0])
+    without = [problem.predict(i, result.x, others) for i in range(len(problem.runs))]
+    bare = _projected(basis, (problem.measured - np.concatenate(without)) * weight)
+
+    def trace(of: int, start: float) -> Array:
         instants = tuple(start if i == of else instant for i, instant in enumerate(since))
         effects = [*result.effects]
         effects[index] = (replace(candidate, since=instants), values)
         part = slice(problem.edges[of], problem.edges[of + 1])
-        return (problem.measured[part] - problem.predict(of, result.x, effects)) * weight[part]
+        return np.asarray((problem.predict(of, result.x, effects) - without[of]) * weight[part])
 
-    errors = [error(other, since[other]) for other in range(len(problem.runs))]
+    traces = [trace(i, start) for i, start in enumerate(since)]
 
     def left(start: float) -> float:
-        moved = np.concatenate([error(bag, start) if i == bag else same for i, same in enumerate(errors)])
-        along = basis.T @ moved
-        return float(moved @ moved - along @ along)
+        own = _projected(basis, np.concatenate([trace(bag, start) if i == bag else known for i, known in enumerate(traces)]))
+        along = max(float(own @ bare), 0.0) / max(float(np.sqrt(own @ own)), 1e-9)
+        return float(bare @ bare) - along**2
 
     return left
+
+
+def _projected(basis: Array, values: Array) -> Array:
+    return np.asarray(values - basis @ (basis.T @ values))

@@ -7,54 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_problem import effect, small_problem, weight, with_torque
 
-from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis import flexible, foreign, name, noise, split, verify
-from lugre_steering.diagnosis.dataset import prepare
 from lugre_steering.diagnosis.fingerprint import Score
 from lugre_steering.diagnosis.fit import fit
-from lugre_steering.diagnosis.problem import Candidate, Problem
-from lugre_steering.effects.catalogue import CATALOGUE
-from lugre_steering.simulate.command import load_vehicle
-from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
-
-SIGMA = 80.0
-DRIVE = Manoeuvre(
-    "drive",
-    "",
-    tuple(
-        part
-        for _ in range(3)
-        for part in (Hold(1.5), Sweep(18.0, 6.0, 1.0), Sweep(-14.0, 3.0, 1.0), Sweep(3.0, 9.0, 0.5))
-    ),
-)
+from lugre_steering.diagnosis.problem import Problem
 
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
-    """A run of some 70 s, twice, whose torque is exactly the model's plus white noise."""
-    sheet = load_vehicle(None)
-    runs = [prepare(recording, sheet) for recording in coverage.record(sheet, [DRIVE, replace(DRIVE, name="again")], 5)]
-    made = Problem(sheet, runs)
-    return with_torque(made, made.predict_all(made.start()))
-
-
-def with_torque(problem: Problem, torque: np.ndarray) -> Problem:
-    """The same motion with another measured torque, white noise of SIGMA added."""
-    measured = torque + SIGMA * np.random.default_rng(3).standard_normal(torque.size)
-    pieces = np.split(measured, problem.edges[1:-1])
-    return Problem(
-        problem.vehicle, [replace(run, measured=part) for run, part in zip(problem.runs, pieces, strict=True)]
-    )
-
-
-def effect(id_: str, **values: float) -> tuple[Candidate, dict[str, float]]:
-    free = tuple(p.name for p in CATALOGUE[id_].parameters if p.name in values)
-    return Candidate(CATALOGUE[id_], free=free), values
-
-
-def weight(problem: Problem) -> np.ndarray:
-    return np.where(problem.valid, 1.0 / SIGMA, 0.0)
+    return small_problem()
 
 
 @pytest.mark.parametrize("correlation", [[1.0], [1.0, 0.6, 0.3, 0.1], [1.0, 0.99, -0.99, 0.9]])

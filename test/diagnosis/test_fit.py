@@ -1,0 +1,106 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The joint fit against an independent optimiser, what its Jacobian takes out of a residual, and when effects began."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from small_problem import SIGMA, effect, small_problem, weight, with_torque
+
+from lugre_steering.diagnosis import onset
+from lugre_steering.diagnosis.fingerprint import score_columns, screen
+from lugre_steering.diagnosis.fit import fit
+from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.split import split
+
+TRUTH = (0.12, -0.05, 0.08, 0.2, 0.1, -0.1)
+"""Changes of the calibration values from the sheet."""
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return small_problem()
+
+
+@pytest.mark.parametrize("robust", [False, True])
+def test_reaches_the_minimum_that_scipy_reaches(problem: Problem, robust: bool) -> None:
+    x = problem.start()
+    x[: len(TRUTH)] = TRUTH
+    hidden = with_torque(problem, problem.predict_all(x, [effect("line_loss_quadratic", c=2e4)]))
+    if robust:
+        hidden.measured[::50] += 3000.0
+    found = fit(hidden, weight(hidden), [effect("line_loss_quadratic", c=1e4)], robust=robust, priors=False)
+
+    scales = np.append(hidden.scales(), 1e4)
+    wide = np.array([0.0] * len(hidden.calibrations) + [0.3] * len(hidden.runs))
+
+    def residuals(p: np.ndarray) -> np.ndarray:
+        values = p * scales
+        predicted = hidden.predict_all(values[:-1], [effect("line_loss_quadratic", c=float(values[-1]))])
+        error = (predicted - hidden.measured) * weight(hidden)
+        if robust:  # soft L1 beyond three standard deviations, as a root
+            error = np.sqrt(18.0 * (np.sqrt(1.0 + (error / 3.0) ** 2) - 1.0))
+        return np.concatenate([error, wide * p[:-1]])
+
+    start = np.append(found.x, found.effects[0][1]["c"]) / scales
+    best = least_squares(residuals, start + 0.05, x_scale=1.0, diff_step=1e-4, xtol=1e-10, ftol=1e-10)
+    own = float(np.sum(residuals(start) ** 2))
+    assert own < 2.0 * best.cost * (1.0 + 1e-4)
+    assert found.effects[0][1]["c"] == pytest.approx(2e4, rel=0.05)
+    deviations = np.sqrt(np.diag(found.covariance))[: len(TRUTH)]
+    assert np.abs((found.x[: len(TRUTH)] - TRUTH) / deviations).max() < 4.0
+    assert deviations[:3].max() < 0.02
+
+
+def test_what_recalibration_can_do_explains_nothing_under_uneven_noise(problem: Problem) -> None:
+    """A residual that is a calibration column is masked wholly, however the noise varies along the recording."""
+    time = np.concatenate([run.time for run in problem.runs])
+    uneven = weight(problem) * (1.0 + 0.8 * np.sin(0.3 * time))
+    result = fit(problem, uneven)
+    draws = SIGMA * np.random.default_rng(4).standard_normal((4, time.size))
+    column = result.jacobian[:, 0] / np.where(uneven > 0.0, uneven, 1.0)
+    moved = replace(result, prediction=result.prediction - 100.0 * column / np.max(np.abs(column)))
+    still = {s.candidate: s.explained for s in screen(problem, result, uneven, draws)}
+    shifted = {s.candidate: s.explained for s in screen(problem, moved, uneven, draws) if s.candidate in still}
+    shared = [(still[key], value) for key, value in shifted.items() if not key.since]
+    assert len(shared) > 100
+    # Signs allowing, a candidate sees exactly what it saw before.
+    assert np.max([abs(a - b) / (1.0 + a) for a, b in shared]) < 1e-3
+
+
+def test_wrong_signs_are_no_physics() -> None:
+    candidate, _ = effect("viscous_friction", sigma_2=1.0)
+    column = np.ones((10, 1))
+    residual = np.vstack([-np.ones(10), np.ones((2, 10))])
+    basis = np.zeros((10, 0))
+    assert score_columns(candidate, column, basis, residual, 10.0) is None
+    assert score_columns(candidate, column, basis, -residual, 10.0) is not None
+
+
+def test_an_onset_that_the_fitted_data_hardly_see_is_called_undetermined(problem: Problem) -> None:
+    roles = split(problem)
+    candidate, values = effect("slope_bias", torque=400.0)
+    held = [run.time[roles.held[problem.bag == i]] for i, run in enumerate(problem.runs)]
+    blocks = [times[np.flatnonzero(np.diff(times) > 2.0)[0] + 1 :] for times in held]  # from the second held block on
+    within = float(blocks[0][200])
+    plain = 0.5 * float(blocks[0][0] + held[0][0])
+    for start, hardly in ((within, True), (plain, False)):
+        truth = replace(candidate, since=(start, np.inf))
+        hidden = with_torque(problem, problem.predict_all(problem.start(), [(truth, values)]))
+        fitted = np.where(roles.fit, weight(hidden), 0.0)
+        result = fit(hidden, fitted, [(truth, values)])
+        unsure = onset.undetermined(hidden, fitted, result)
+        assert not unsure[problem.bag == 1].any()
+        first = unsure[problem.bag == 0]
+        block = roles.held[problem.bag == 0] & (np.abs(hidden.runs[0].time - start) < 4.0)
+        assert first[block].mean() > 0.9 if hardly else first.sum() * 0.01 < 4.0
+
+
+def test_the_suggested_instant_is_where_errors_begin_to_grow(problem: Problem) -> None:
+    rng = np.random.default_rng(6)
+    time = np.concatenate([run.time for run in problem.runs])
+    begun = time >= np.array([25.0, 50.0])[problem.bag]
+    found = onset.suggested(problem, rng.standard_normal(time.size) * np.where(begun, 3.0, 1.0))
+    assert found == pytest.approx((25.0, 50.0), abs=1.0)
