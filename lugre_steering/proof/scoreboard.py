@@ -316,11 +316,14 @@ def _power(ratio: float, rows: Sequence[Row]) -> Row:
 
 
 def _effect(effect: str, rows: Sequence[Row]) -> Row:
-    """One row of the table of effects: outcomes by ratio and by disguise, and what it was taken for."""
+    """One row of the table of effects: outcomes by ratio and by disguise, and what it was taken for where it was clear enough."""
     right = ("unlisted",) if any(row["kind"] == "unlisted" for row in rows) else RIGHT
     plain = [row for row in rows if row["kind"] in ("single", "unlisted")]
-    misnamed = [row for row in plain if outcome(row) in ("wrong name", "extra name")]
-    taken = Counter(e["id"] for row in misnamed for e in row["diagnosis"]["effects"] if e["id"] != effect)
+    missed = [row for row in rows if row["kind"] != "pair" and row["ratio"] >= CLEAR_RATIO and outcome(row) not in right]
+    taken: Counter[str] = Counter()
+    for row in missed:
+        names = {e["id"] for e in row["diagnosis"]["effects"]} - {effect} if row["diagnosis"] else set()
+        taken.update(names or {outcome(row)})
     cells = {f"{ratio:g}": [row for row in plain if ratio_of(row) == ratio] for ratio in RATIOS}
     cells |= {kind: _of(rows, kind) for kind in ("one-bag", "late", "barely")}
     return {
@@ -397,16 +400,3 @@ def _targets(result: Row) -> list[Row]:
         {"id": key, "what": what, "reached": value, "target": TARGETS[key], "met": None if value is None else met(key, value)}
         for key, (what, value) in reached.items()
     ]
-
-
-def readme_lines(result: Row) -> list[str]:
-    """The table that README shows, so that its numbers come from the kept scoreboard."""
-    sign = {"parameter_error": "at most"}
-    rows = [
-        f"| {t['what']} | {_number(t['reached'])} | {sign.get(t['id'], 'at least')} {_number(t['target'])} |" for t in result["targets"]
-    ]
-    return ["| score | reached | target |", "|---|---|---|", *rows]
-
-
-def _number(value: float | None) -> str:
-    return "not measured" if value is None else f"{value:.2f}"

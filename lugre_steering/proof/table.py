@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The scoreboard as tables on a terminal."""
+"""The scoreboard as tables: on a terminal, and in README."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+
+from lugre_steering.proof.campaign import RATIOS
 
 Row = Mapping[str, Any]
 
@@ -82,3 +84,46 @@ def _show_peers(console: Console, peers: Row) -> None:
     for name, entry in peers.items():
         table.add_row(name, median(entry["removed"]), share(entry["false_alarms"]), share(entry["named"]), median(entry["seconds"]))
     console.print(table)
+
+
+def readme_lines(board: Row) -> list[str]:
+    """What README shows, so that its numbers come from the kept scoreboard: targets, peers, and the cells that fall short."""
+    sign = {"parameter_error": "at most"}
+    behind: dict[str, str] = {
+        "nulls_silent": share(board["nulls"]["silent"]),
+        "named_from_0.3": share(board["naming"]["from_0.3"]),
+        "named_at_0.1": share(next(power["right"] for power in board["power"] if power["ratio"] == RATIOS[0])),
+        "location_iou": median(board["location"]["listed"]),
+        "parameter_error": median(board["parameters"]["all"]),
+        "removed": median(board["removed"]["from_0.3"]),
+        "both_of_two": share(board["pairs"]["both"]),
+        "unlisted": share(board["unlisted"]["called_unlisted"]),
+    }
+    lines = ["| score | reached | target |", "|---|---|---|"]
+    lines += [f"| {t['what']} | {behind[t['id']]} | {sign.get(t['id'], 'at least')} {t['target']:.2f} |" for t in board["targets"]]
+    beside = {
+        "parameters within 10 %": share(board["parameters"]["within_10_percent"]),
+        "95 % interval covers the true parameter": share(board["parameters"]["interval_covers"]),
+        "places of local effects with an IoU above 0.7": share(board["location"]["above_0.7"]),
+        **{f"right name or tie, {kind}": share(score) for kind, score in board["disguises"].items()},
+        "seconds per diagnosis on one thread": median(board["seconds_per_case"]),
+    }
+    lines += [f"| {what} | {value} | |" for what, value in beside.items()]
+    if board["peers"]:
+        lines += ["", "| method | held-out error removed | false alarms on nulls | right name | seconds |", "|---|---|---|---|---|"]
+        lines += [
+            f"| {name} | {median(peer['removed'])} | {share(peer['false_alarms'])} | {share(peer['named'])} | {median(peer['seconds'])} |"
+            for name, peer in board["peers"].items()
+        ]
+    cells = [f"{ratio:g}" for ratio in RATIOS] + ["one-bag", "late", "barely"]
+    short = {
+        effect: entry for effect, entry in board["effects"].items()
+        if any(right < of for cell, (right, of) in entry["right"].items() if cell != cells[0])
+    }  # fmt: skip
+    if short:
+        lines += ["", f"| right of all | {' | '.join(cells)} | taken for |", "|---" * (len(cells) + 2) + "|"]
+    for effect, entry in short.items():
+        counts = [f"{right}/{of}" if of else "" for right, of in (entry["right"][cell] for cell in cells)]
+        taken = ", ".join(f"{name} {count}" for name, count in entry["taken_for"].items())
+        lines.append(f"| {effect} | {' | '.join(counts)} | {taken} |")
+    return lines

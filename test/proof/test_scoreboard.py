@@ -20,6 +20,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.proof import blind, campaign, manoeuvres, scoreboard
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
 from lugre_steering.proof.simulator import load_sheet
+from lugre_steering.proof.table import readme_lines
 from lugre_steering.proof.vehicle_draw import Sheet
 
 Row = dict[str, Any]
@@ -308,6 +309,6 @@ def test_blind_end_to_end() -> None:
 def test_readme_shows_the_kept_scoreboard() -> None:
     board = json.loads(KEPT_BOARD.read_text(encoding="utf-8"))
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    missing = [line for line in scoreboard.readme_lines(board) if line not in readme]
+    missing = [line for line in readme_lines(board) if line not in readme]
     assert not missing, "README's table differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)
     assert board["made"]["command"] in readme
