@@ -291,7 +291,7 @@ def prove(
     quick: Annotated[bool, typer.Option("--quick", help="a stratified few, under five minutes on two cores")] = False,
     cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'single/end_stop/*'")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="repeat or resume the run with this seed [a new one]")] = None,
-    peers: Annotated[bool, typer.Option("--peers", help="also run other methods on the same recordings")] = False,
+    peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,
 ) -> None:
     """Hide physics in recordings of a second simulator, diagnose them blind, and score the answers."""

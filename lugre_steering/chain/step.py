@@ -237,12 +237,13 @@ def torque_in_phases(
     torque, state, scratch = np.empty(time.size), new_state(), np.zeros(1, OUTPUT)
     time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))
     edges = [*np.searchsorted(time, [start for start, _ in phases]), time.size]
-    for k, (_, p) in enumerate(phases):
-        a, b = edges[k], edges[k + 1]
+    before = phases[0][1]
+    for (_, p), a, b in zip(phases, edges, edges[1:], strict=False):
         if a == b:
             continue
         if a > 0:
-            _begin_late(phases[k - 1][1], p, state)
+            _begin_late(before, p, state)
+        before = p
         part = slice(a, b)
         _torque(
             p, state, rubber, scratch, time[part], theta[part], omega[part], alpha[part], torque[part], time[max(a - 1, 0)],

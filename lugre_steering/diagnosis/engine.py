@@ -37,7 +37,7 @@ UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
 LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
 """Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
 TELLING = 0.5
-"""Share of the held-out error that a pattern outside the catalogue must explain for its own places to be told."""
+"""Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 MATERIAL_SHARE = 0.005
@@ -140,8 +140,9 @@ class _Conclusion:
         named = bool(found.found) and judged.gain > -CONTRADICTED
         final = found.final if named else found.baseline
         whole = self._whole(final, weight)
-        late = any(candidate.since for candidate, _ in final.effects)
-        residual = problem.measured - (whole if late else found.final).prediction
+        if any(candidate.since for candidate, _ in final.effects):
+            final = whole  # timed by all data
+        residual = problem.measured - final.prediction
         left, left_text, structured = self._left_over(residual, final)
         if named:
             verdict = "missing_physics"
@@ -191,7 +192,8 @@ class _Conclusion:
             if candidate.since:
                 effects = [*whole.effects]
                 effects[index] = (replace(candidate, since=onset.timed(self.problem, weight, whole, index)), values)
-                whole = fit(self.problem, weight, effects, whole.x)
+                again = fit(self.problem, weight, effects, whole.x)
+                whole = again if again.cost < whole.cost else whole
         return whole
 
     def _effects(self, whole: Fit) -> list[dict[str, Any]]:

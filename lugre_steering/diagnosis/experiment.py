@@ -76,6 +76,8 @@ def separation(
 ) -> dict[str, float]:
     """Energy per manoeuvre by which two explanations would differ there, after recalibration, in noise variances."""
     found = {}
+    # Where and when they began belongs to the recordings, not to what is driven next.
+    first, second = ([(replace(candidate, since=(), bags=None), values) for candidate, values in side] for side in (first, second))
     for manoeuvre in manoeuvres(problem).values():
         trial = Problem(problem.vehicle, [_run(problem, manoeuvre, sigma)], problem.calibrations)
         x = np.append(fit.x[: len(problem.calibrations)], 0.0)

@@ -31,8 +31,9 @@ HYDRAULIC = (
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
 REMEMBERED = ("thermal", "motion")
-"""Stages whose effects, begun late, leave another trace than the end of the same effect always there: heat is remembered for
-minutes, and an angle that shifts turns the contact."""
+COUNTING = ("wear_polishing", "pressure_drift", "soil_shear", "static_ageing")
+"""Stages and further effects that, begun late, leave another trace than the end of the same always there: heat is remembered for
+minutes, an angle that shifts turns the contact, and path, time, berm and age count from the beginning."""
 NEVER_LATE = ("surface_patch", "mullins_softening")
 """Has its own time window; acts on the first sweep."""
 CEILINGS = (0.8, 0.88, 0.92, 0.95, 0.975, 1.0)
@@ -146,7 +147,10 @@ def _ceilings(problem: Problem, effect: Effect) -> list[Candidate]:
     middle, slope, curvature = np.polynomial.polynomial.polyfit(toward, held, 2)
     arms = (("arm_slope", float(slope / middle)), ("arm_curvature", float(curvature / middle)))
     arm = np.where(problem.measured > 0.0, held[: theta.size], held[theta.size :]) / middle
-    top = float(np.percentile(np.abs(problem.measured) / arm, 99.9))  # the largest values hold noise
+    pushed = arm > 0.0
+    if not pushed.any():
+        return []
+    top = float(np.percentile(np.abs(problem.measured[pushed]) / arm[pushed], 99.9))  # the largest values hold noise
     return [Candidate(effect, (("ceiling", top * share), *arms)) for share in CEILINGS]
 
 
@@ -170,7 +174,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
 
     ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
     """
-    basis, _ = np.linalg.qr(_tangent(fit))
+    basis = fit.basis()
     residuals = np.vstack([problem.measured - fit.prediction, draws]) * weight
     residuals = residuals - (residuals @ basis) @ basis.T
     base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
@@ -191,7 +195,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
         if candidate.bags is None and full is not None and candidate.effect.id not in NEVER_LATE:
             for start, after in zip(starts, begun, strict=True):
                 late = replace(candidate, since=start)
-                if candidate.effect.stage in REMEMBERED:
+                if candidate.effect.stage in REMEMBERED or candidate.effect.id in COUNTING:
                     changed = signature(problem, fit, base, late) * weight[:, None]
                 else:
                     changed = columns * after[:, None]
@@ -240,10 +244,3 @@ def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals:
             float(np.sum(visible**2)), tuple(float(v) for v in values), np.sum(along[1:] ** 2, axis=1),
         )  # fmt: skip
     return None
-
-
-def _tangent(fit: Fit) -> Array:
-    """Weighted Jacobian columns (n, q) of everything already free, normalised, without those that do nothing."""
-    norms = np.linalg.norm(fit.jacobian, axis=0)
-    kept: Array = fit.jacobian[:, norms > 0.0] / norms[norms > 0.0]
-    return kept

@@ -9,7 +9,7 @@ the steps themselves (Broyden, Math. Comp. 19 (1965) 577), as long as they do wh
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -38,8 +38,16 @@ class Fit:
     jacobian: Array
     covariance: Array
 
-    def with_effects(self, effects: Sequence[tuple[Candidate, dict[str, float]]]) -> Fit:
-        return replace(self, effects=tuple(effects))
+    def basis(self, without: slice | None = None) -> Array:
+        """Orthonormal columns (n, k) that span what the fitted values can change, but for those ``without``; weighted too."""
+        columns = self.jacobian if without is None else np.delete(self.jacobian, without, axis=1)
+        return np.asarray(np.linalg.qr(normalised(columns))[0])
+
+
+def normalised(columns: Array) -> Array:
+    """Columns (n, k) of unit length; those that do nothing are left out."""
+    norms = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns[:, norms > 0.0] / norms[norms > 0.0])
 
 
 def fit(
@@ -56,7 +64,8 @@ def fit(
     """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
-    ``tolerance``: relative fall of the cost per step below which the fit ends. ``robust`` bounds the influence of samples
+    ``tolerance``: relative fall of the cost per step below which the fit ends; ``linearisations``: how often it may linearise
+    anew before it ends anyhow. ``robust`` bounds the influence of samples
     beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
     x0 = problem.start() if start is None else start
@@ -104,16 +113,16 @@ def fit(
                 if fall > 0.0 or age > 0 or damping > 1e6:
                     break
                 damping *= 8.0
-            if fall <= 0.0:
+            if not fall > 0.0:
                 settled = age == 0
                 break
-            change = trial - p
+            change, secant = trial - p, (moved - base) * weight
             foretold = -(2.0 * gradient @ change + change @ normal @ change)
-            slope += np.outer((moved - base) * weight - slope @ change, change / (change @ change))
             p, base, left, damping = trial, moved, left - fall, max(damping / 6.0, 1e-9)
             settled = age == 0 and fall < tolerance * left
             if fall < max(tolerance * left, FORETOLD * foretold):
                 break
+            slope += np.outer(secant - slope @ change, change / (change @ change))
         if settled:
             break
         slope = jacobian(p, base)

@@ -34,9 +34,8 @@ def explained(problem: Problem, current: Fit, weight: Array, index: int) -> floa
     if knots.size < 3:
         return 0.0
     hats = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
-    tangent = current.jacobian[:, np.linalg.norm(current.jacobian, axis=0) > 0.0]
     # What recalibration alone would still gain is no merit of the shape.
-    basis, _ = np.linalg.qr(tangent / np.linalg.norm(tangent, axis=0))
+    basis = current.basis()
     error = (problem.measured - current.prediction) * weight
     columns = (hats * part).T * weight[:, None]
     error, columns = error - basis @ (basis.T @ error), columns - basis @ (basis.T @ columns)

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from lugre_steering import units
-from lugre_steering.diagnosis.fit import Fit, fit
+from lugre_steering.diagnosis.fit import Fit, fit, normalised
 from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.recording import Array
 
@@ -77,12 +77,10 @@ def strongest(problem: Problem, baseline: Fit, weight: Array) -> Pattern:
 
 def _left(problem: Problem, beside: Fit, weight: Array, columns: Array) -> tuple[float, Array]:
     """Energy left over by a pattern and a linear recalibration together, and the pattern's coefficients (k,)."""
-    tangent = beside.jacobian[:, : problem.nuisances]
-    norms = np.linalg.norm(tangent, axis=0)
-    both = np.column_stack([columns * weight[:, None], tangent[:, norms > 0.0] / norms[norms > 0.0]])
+    both = np.column_stack([columns * weight[:, None], normalised(beside.jacobian[:, : problem.nuisances])])
     error = (problem.measured - beside.prediction) * weight
     solution = np.linalg.lstsq(both, error, rcond=1e-10)[0]
-    return float(np.sum((error - both @ solution) ** 2)), solution[: columns.shape[1]]
+    return float(np.sum((error - both @ solution) ** 2)), np.asarray(solution[: columns.shape[1]], np.float64)
 
 
 def _families(problem: Problem, baseline: Fit) -> tuple[_Family, ...]:

@@ -221,8 +221,10 @@ def _confront(
     names_left = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
     effects = list(chosen.fit.effects)
     effects.insert(index, effects.pop())
-    all_trials = (*item.trials, *trials)
-    return replace(chosen.fit, effects=tuple(effects)), Found(chosen.score, names_left, all_trials, before - chosen.cost)
+    found = Found(chosen.score, names_left, (*item.trials, *trials), before - chosen.cost)
+    if chosen is champion:
+        return final, found
+    return fit(problem, weight, effects, chosen.fit.x, tolerance=TRIAL_TOLERANCE), found
 
 
 def _prune(
@@ -312,8 +314,9 @@ def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> T
 def _fitted(problem: Problem, weight: Array, current: Fit, score: Score, start: Array) -> Trial:
     """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
     candidate = score.candidate
+    shapes = dict(candidate.shapes)
     free = tuple(
-        p.name for p in candidate.effect.parameters if p.name in candidate.free or p.name in dict(candidate.shapes)
+        p.name for p in candidate.effect.parameters if p.name in candidate.free or (p.name in shapes and not p.optional)
     )
     effects = [*current.effects, (replace(candidate, free=free), score.values)]
     result = fit(problem, weight, effects, start, linearisations=8, tolerance=TRIAL_TOLERANCE)
@@ -396,16 +399,17 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
         result = fit(problem, weight, trial.fit.effects, trial.fit.x, linearisations=20, tolerance=1e-5)
         return Trial(trial.score, result, cost(problem, result, weight))
     earlier = trial.fit.effects[:-1]
-    start = {**values, **{name: 0.2 * candidate.parameter(name).scale for name in optional}}
+    start = {**{name: 0.2 * candidate.parameter(name).scale for name in optional}, **values}
     richer = replace(candidate, free=candidate.free + tuple(optional))
     result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=20, tolerance=1e-5)
     # What the model leaves over makes its numbers less sure than noise alone would.
     misfit = max(cost(problem, result, weight) / max(float(np.count_nonzero(weight)), 1.0), 1.0)
     deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]
     fitted = result.effects[-1][1]
-    needed = tuple(name for name, sd in zip(optional, deviation, strict=True) if abs(fitted[name]) > 4.0 * sd)
+    known = {name: values[name] for name in optional if name in values}
+    needed = tuple(n for n, sd in zip(optional, deviation, strict=True) if abs(fitted[n] - known.get(n, 0.0)) > 4.0 * sd)
     if len(needed) < len(optional):
-        fitted = {name: value for name, value in fitted.items() if name not in optional or name in needed}
+        fitted = {**known, **{name: value for name, value in fitted.items() if name not in optional or name in needed}}
         leaner = replace(candidate, free=candidate.free + needed)
         result = fit(problem, weight, [*earlier, (leaner, fitted)], result.x, linearisations=8)
     better = cost(problem, result, weight)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -34,14 +35,18 @@ def suggested(problem: Problem, error: Array) -> tuple[float, ...]:
 
 def timed(problem: Problem, weight: Array, result: Fit, index: int) -> tuple[float, ...]:
     """The instants from which effect ``index`` of a fit explains most, one per bag; infinity where it never does."""
+    left = _left(problem, weight, result, index)
     since = list(result.effects[index][0].since)
     for bag, run in enumerate(problem.runs):
-        left = _left(problem, weight, result, index, since, bag)
+
+        def here(start: float, bag: int = bag) -> float:
+            return left((*since[:bag], start, *since[bag + 1 :]))
+
         grid, step = np.linspace(run.time[0], run.time[-1], INSTANTS, endpoint=False, retstep=True)
-        best = min([*grid, since[bag], np.inf], key=left)
+        best = min([*grid, since[bag], np.inf], key=here)
         if np.isfinite(best):
-            near = minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 0.1})
-            best = min([best, float(near.x)], key=left)
+            near = minimize_scalar(here, bounds=(best - step, best + step), method="bounded", options={"xatol": 0.1})
+            best = min([best, float(near.x)], key=here)
         since[bag] = float(best)
     return tuple(since)
 
@@ -50,46 +55,42 @@ def undetermined(problem: Problem, weight: Array, result: Fit) -> Mask:
     """Samples (n,) between instants at which a late effect could as well have begun, for all that weighted samples tell."""
     unsure = np.zeros(problem.measured.size, bool)
     for index, (candidate, _) in enumerate(result.effects):
+        if not candidate.since:
+            continue
+        left = _left(problem, weight, result, index)
         for bag, start in enumerate(candidate.since):
             run = problem.runs[bag]
-            if not run.time[0] < start <= run.time[-1]:
-                continue
-            left = _left(problem, weight, result, index, candidate.since, bag)
-            instants = np.append(np.arange(run.time[0], run.time[-1], RESOLUTION_S), start)
-            energy = np.array([left(instant) for instant in instants])
-            alike = instants[energy < energy[-1] + ALIKE]
+            # Before the first sample it was always there, after the last one never.
+            instants = np.append(np.arange(run.time[0], run.time[-1] + 2.0 * RESOLUTION_S, RESOLUTION_S), start)
+            energy = np.array([left((*candidate.since[:bag], instant, *candidate.since[bag + 1 :])) for instant in instants])
+            alike = np.clip(instants[energy < energy[-1] + ALIKE], run.time[0] - RESOLUTION_S, run.time[-1] + RESOLUTION_S)
             part = slice(problem.edges[bag], problem.edges[bag + 1])
             unsure[part] |= (run.time > alike.min() - RESOLUTION_S) & (run.time < alike.max() + RESOLUTION_S)
     return unsure
 
 
-def _left(
-    problem: Problem, weight: Array, result: Fit, index: int, since: Sequence[float], bag: int
-) -> Callable[[float], float]:
-    """Energy left over as a function of the instant in one bag, once the size of the effect and all else fitted have followed it.
+def _left(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[[Sequence[float]], float]:
+    """Energy left over as a function of the instants, once the size of the effect and all else fitted have followed them.
 
     To first order: errors without the effect, projected off the other columns of the Jacobian and its own trace from the instant.
     """
     candidate, values = result.effects[index]
     others = [effect for i, effect in enumerate(result.effects) if i != index]
     first = problem.nuisances + sum(len(effect.free) for effect, _ in result.effects[:index])
-    rest = np.delete(result.jacobian, np.s_[first : first + len(candidate.free)], axis=1)
-    norms = np.linalg.norm(rest, axis=0)
-    basis, _ = np.linalg.qr(rest[:, norms > 0.0] / norms[norms > 0.0])
-    without = [problem.predict(i, result.x, others) for i in range(len(problem.runs))]
+    basis = result.basis(without=slice(first, first + len(candidate.free)))
+    without = [problem.predict(bag, result.x, others) for bag in range(len(problem.runs))]
     bare = _projected(basis, (problem.measured - np.concatenate(without)) * weight)
 
-    def trace(of: int, start: float) -> Array:
-        instants = tuple(start if i == of else instant for i, instant in enumerate(since))
+    @lru_cache(maxsize=64)
+    def trace(bag: int, start: float) -> Array:
+        instants = (start,) * len(problem.runs)  # those of other bags do not matter here
         effects = [*result.effects]
         effects[index] = (replace(candidate, since=instants), values)
-        part = slice(problem.edges[of], problem.edges[of + 1])
-        return np.asarray((problem.predict(of, result.x, effects) - without[of]) * weight[part])
+        part = slice(problem.edges[bag], problem.edges[bag + 1])
+        return np.asarray((problem.predict(bag, result.x, effects) - without[bag]) * weight[part])
 
-    traces = [trace(i, start) for i, start in enumerate(since)]
-
-    def left(start: float) -> float:
-        own = _projected(basis, np.concatenate([trace(bag, start) if i == bag else known for i, known in enumerate(traces)]))
+    def left(since: Sequence[float]) -> float:
+        own = _projected(basis, np.concatenate([trace(bag, start) for bag, start in enumerate(since)]))
         along = max(float(own @ bare), 0.0) / max(float(np.sqrt(own @ own)), 1e-9)
         return float(bare @ bare) - along**2
 

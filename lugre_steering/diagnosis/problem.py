@@ -203,7 +203,7 @@ class Problem:
             changed = np.interp(run.time - values["delay"], run.time, torque)
         elif name in ("pressure_offset", "pressure_drift"):
             gain = run.torque_per_line[self._lines.index(candidate.line)]
-            drifting = run.time - max(start, 0.0)
+            drifting = np.maximum(run.time - max(start, 0.0), 0.0)
             changed = torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * drifting)
         elif name == "angle_offset":
             changed = torque + values["offset"] * run.side_slope.sum(axis=0)

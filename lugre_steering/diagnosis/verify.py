@@ -17,6 +17,8 @@ from lugre_steering.recording import Array, IntArray
 
 RESAMPLES = 2000
 STRETCHES = 6
+ENOUGH = 5
+"""Stretches of CLUSTER_S that must be left to judge by."""
 WIDTH = float(stats.t.ppf(0.975, STRETCHES - 1))
 """Half width of a 95 % interval in standard deviations known from STRETCHES estimates."""
 
@@ -47,6 +49,8 @@ def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles
     before, after = (np.where(roles.held, problem.measured - r.prediction, 0.0) ** 2 for r in (baseline, augmented))
     # Where the fitted data cannot tell when an effect began, the held-out data must not be judged by a guess.
     sure = ~onset.undetermined(problem, np.where(roles.fit, weight, 0.0), augmented)
+    if np.unique(roles.cluster[roles.held & sure]).size < ENOUGH:
+        sure[:] = True
     first = _judge(before, after, roles.held & sure, roles.cluster, seed)
     if not augmented.effects or first.interval[0] > 0.0 or not roles.held.any():
         return first

@@ -30,7 +30,7 @@ class Parameter:
     grid: tuple[float, ...] = ()
     relative_to: str = ""
     optional: bool = False
-    """Refinement of the shape: zero in the screen, fitted only once the effect is accepted."""
+    """Refinement of the shape: zero (or as the vehicle sheet has it) in the screen, fitted only once the effect is accepted."""
 
     @property
     def is_shape(self) -> bool:

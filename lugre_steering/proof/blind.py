@@ -227,7 +227,8 @@ def run_all(
     An interruption (Ctrl-C) ends it with the cases finished so far.
     """
     version, begun = source_version(), time.monotonic()
-    compared = {case.name for case in cases[::PEERS_EVERY]} if peers else set()
+    # By the seed of the case, so that a part of a campaign compares the same cases as the whole.
+    compared = {case.name for case in cases if peers and case.seed % PEERS_EVERY == 0}
     known: Mapping[str, Row] = finished(journal, version, compared)
     rows = [known[f"{case.name} {case.seed}"] for case in cases if f"{case.name} {case.seed}" in known]
     waiting = [case for case in cases if f"{case.name} {case.seed}" not in known]

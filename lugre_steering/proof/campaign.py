@@ -23,7 +23,7 @@ DISGUISE_RATIO = 1.0
 PAIR_RATIO = 1.0
 NULLS, REPEATS, PAIRS, UNLISTED_REPEATS = 102, 2, 24, 3
 PEERS_EVERY = 4
-"""The peers, which take about as long as the diagnosis, are compared on every so many of the cases."""
+"""The peers, which take about as long as the diagnosis, are compared on one in so many of the cases."""
 WITHOUT_LATE_START = ("mullins_softening",)
 """Acts on the first sweep only, so it cannot begin late."""
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A small problem whose answer is known: a run of some 70 s, twice, whose torque is the model's plus white noise."""
+"""A small problem whose answer is known: a run of about a minute, twice, whose torque is the model's plus white noise."""
 
 from dataclasses import replace
 

@@ -11,7 +11,7 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.diagnosis import onset
 from lugre_steering.diagnosis.fingerprint import score_columns, screen
-from lugre_steering.diagnosis.fit import fit
+from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.diagnosis.split import split
 
@@ -54,6 +54,57 @@ def test_reaches_the_minimum_that_scipy_reaches(problem: Problem, robust: bool) 
     assert deviations[:3].max() < 0.02
 
 
+def test_the_jacobian_at_the_end_is_that_of_the_end(problem: Problem) -> None:
+    """However small the last step was: intervals, screens and onsets are computed from it."""
+    trial = [effect("end_stop", engage_angle=0.25, stiffness=5e4)]
+    hidden = with_torque(problem, problem.predict_all(problem.start(), trial))
+    found = fit(hidden, weight(hidden), [effect("end_stop", engage_angle=0.24, stiffness=4e4)])
+    for _ in range(2):  # again from where it ended, so that hardly anything is left to step
+        found = fit(hidden, weight(hidden), found.effects, found.x)
+    fresh = fit(hidden, weight(hidden), found.effects, found.x, linearisations=1)
+    sizes = {"engage_angle": 0.1, "stiffness": 1e4}
+    for j, scale in enumerate([*hidden.scales(), *(sizes[key] for key in found.effects[0][0].free)]):
+        up, down = (fit_prediction(hidden, found, j, sign * 0.02 * scale) for sign in (1.0, -1.0))
+        central = (up - down) / (0.04 * scale) * weight(hidden)
+        for result in (found, fresh):
+            error = np.linalg.norm(result.jacobian[:, j] - central)
+            assert error < 0.15 * np.linalg.norm(central), (j, error / np.linalg.norm(central))
+
+
+def fit_prediction(problem: Problem, result: Fit, column: int, change: float) -> np.ndarray:
+    x, (candidate, values) = result.x.copy(), result.effects[0]
+    values = dict(values)
+    if column < x.size:
+        x[column] += change
+    else:
+        values[candidate.free[column - x.size]] += change
+    return problem.predict_all(x, [(candidate, values)])
+
+
+@pytest.mark.parametrize(
+    ("id_", "values"),
+    [
+        ("pressure_drift", {"drift": 2e3}),
+        ("wear_polishing", {"amount": 0.05, "slip_scale": 1.0}),
+        ("heat_partition", {"ground_share": 0.2}),
+    ],
+)
+def test_late_effects_are_screened_by_the_trace_that_they_leave(problem: Problem, id_: str, values: dict[str, float]) -> None:
+    candidate, values = effect(id_, **values)
+    candidate = replace(candidate, line=problem.vehicle.hydraulics.lines[0] if id_ == "pressure_drift" else "")
+    since = tuple(0.45 * max(float(run.time[-1]) for run in problem.runs) for _ in problem.runs)
+    late = replace(candidate, since=since)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [(late, values)]))
+    baseline = fit(hidden, weight(hidden))
+    draws = SIGMA * np.random.default_rng(4).standard_normal((4, hidden.measured.size))
+    scores = [s for s in screen(hidden, baseline, weight(hidden), draws) if s.candidate.effect.id == id_]
+    best = max(scores, key=lambda score: score.explained)
+    assert best.candidate.since == since
+    # The linear guess is as large as what is hidden, so the trace is of the right size and kind.
+    amplitude = best.candidate.free[0]
+    assert best.values[amplitude] == pytest.approx(values[amplitude], rel=0.3)
+
+
 def test_what_recalibration_can_do_explains_nothing_under_uneven_noise(problem: Problem) -> None:
     """A residual that is a calibration column is masked wholly, however the noise varies along the recording."""
     time = np.concatenate([run.time for run in problem.runs])
@@ -92,10 +143,10 @@ def test_an_onset_that_the_fitted_data_hardly_see_is_called_undetermined(problem
         fitted = np.where(roles.fit, weight(hidden), 0.0)
         result = fit(hidden, fitted, [(truth, values)])
         unsure = onset.undetermined(hidden, fitted, result)
-        assert not unsure[problem.bag == 1].any()
+        assert unsure[problem.bag == 1].mean() < 0.1  # it never begins there: at the very end it could
         first = unsure[problem.bag == 0]
         block = roles.held[problem.bag == 0] & (np.abs(hidden.runs[0].time - start) < 4.0)
-        assert first[block].mean() > 0.9 if hardly else first.sum() * 0.01 < 4.0
+        assert first[block].mean() > 0.9 if hardly else first.sum() * 0.02 < 3.0
 
 
 def test_the_suggested_instant_is_where_errors_begin_to_grow(problem: Problem) -> None:
