@@ -67,3 +67,13 @@ def test_elements_take_over_what_the_one_bristle_carries() -> None:
     # After some reversals the elements have forgotten how they began.
     assert np.max(np.abs(found - always)[-500:]) < 0.02 * np.max(np.abs(always))
     assert np.max(np.abs(found - plain)[LATER]) > 10.0 * np.max(np.abs(found - always)[-500:])
+
+
+def test_a_phase_without_samples_hides_nothing_from_the_next() -> None:
+    """Two effects that begin between the same two samples both count from there."""
+    before, drifting, rubber = late(ambient_drift_rate=0.5)
+    both = drifting.copy()
+    both["slope_bias_torque"] = 100.0
+    found = torque_in_phases([(-np.inf, before), (START_S - 0.004, drifting), (START_S - 0.002, both)], rubber, *MOTION)
+    apart = torque_in_phases([(-np.inf, before), (START_S - 0.002, drifting)], rubber, *MOTION)
+    np.testing.assert_allclose(found - apart, np.where(LATER, 100.0, 0.0) / both["sides"], atol=1e-6)

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_problem import effect, small_problem, weight, with_torque
+from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis import flexible, foreign, name, noise, split, verify
+from lugre_steering.diagnosis import experiment, fingerprint, flexible, foreign, name, noise, split, verify
 from lugre_steering.diagnosis.fingerprint import Score
 from lugre_steering.diagnosis.fit import fit
 from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.effects.catalogue import CATALOGUE
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +144,50 @@ def test_the_jackknife_widens_where_the_law_is_wrong(problem: Problem) -> None:
         spreads.append(spread / noise_alone)
     assert 0.2 < spreads[0] < 4.0
     assert spreads[1] > 3.0 * spreads[0]
+
+
+def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(problem: Problem) -> None:
+    """The first of two effects was misnamed; its rival takes its place, and the intervals stay those of their own effect."""
+    linear, quadratic, offset = effect("line_loss_linear", b=2e4), effect("line_loss_quadratic", c=2e5), effect("slope_bias", torque=300.0)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [quadratic, offset]))
+    roles = split.split(hidden)
+    fitted = np.where(roles.fit, weight(hidden), 0.0)
+    draws = SIGMA * np.random.default_rng(4).standard_normal((16, hidden.measured.size))
+    seen = noise.Noise(np.full(hidden.measured.size, SIGMA), draws, 0.0)
+    final = fit(hidden, fitted, [linear, offset])
+    score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    item = name.Found(score, ("line_loss_quadratic",), (), 1.0)
+    result, found = name._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()))
+    assert [candidate.effect.id for candidate, _ in result.effects] == ["line_loss_quadratic", "slope_bias"]
+    assert found.score.candidate.effect.id == "line_loss_quadratic"
+    change = problem.predict_all(result.x, result.effects[:1]) - problem.predict_all(result.x, [(result.effects[0][0], {"c": 0.0})])
+    own = result.jacobian[:, hidden.nuisances]
+    expected = change / result.effects[0][1]["c"] * fitted
+    assert np.linalg.norm(own - expected) < 0.05 * np.linalg.norm(expected)
+
+
+def test_relief_ceilings_follow_the_arms_of_the_sheet(problem: Problem) -> None:
+    relief = CATALOGUE["relief_saturation"]
+    found = fingerprint._ceilings(problem, relief)
+    assert len(found) == len(fingerprint.CEILINGS)
+    shapes = dict(found[-1].shapes)
+    run = problem.runs[0]
+    pushed = np.maximum(run.torque_per_line, 0.0).sum(axis=0)
+    theta = run.theta.mean(axis=0)
+    arm = 1.0 + theta * (shapes["arm_slope"] + theta * shapes["arm_curvature"])
+    assert np.ptp(pushed / arm) < 0.01 * pushed.mean()  # one pressure makes this torque at every angle
+    # One line alone pushes in one direction only, and says nothing about the other.
+    single = [replace(each, gains=np.where(np.arange(each.gains.shape[1])[:, None] == 0, each.gains, 0.0)) for each in problem.runs]
+    for candidate in fingerprint._ceilings(Problem(problem.vehicle, single), relief):
+        assert all(np.isfinite(value) for _, value in candidate.shapes)
+
+
+def test_the_next_experiment_does_not_depend_on_when_an_effect_began(problem: Problem) -> None:
+    result = fit(problem, weight(problem))
+    energies = []
+    for since, bags in (((), None), ((np.inf, 30.0), (1,))):
+        sides = [effect("line_loss_linear", b=2e4), effect("line_loss_quadratic", c=2e5)]
+        first, second = ([(replace(candidate, since=since, bags=bags), values)] for candidate, values in sides)
+        energies.append(experiment.separation(problem, result, first, second, SIGMA))
+    assert energies[0] == energies[1]
+    assert max(energies[0].values()) > 100.0
