@@ -117,7 +117,9 @@ def search(
         progress("fingerprints")
         taken = [candidate.effect.id for candidate, _ in current.effects]
         scores = screen(problem, current, weight, noise.draws, taken)
-        if not steps:
+        if steps:
+            scores = _always(scores)
+        else:
             first_scores = tuple(scores)
         shortlist = choose(scores, samples)
         if not shortlist:
@@ -197,6 +199,7 @@ def _confront(
     rest = [effect for i, effect in enumerate(final.effects) if i != index]
     without = fit(problem, weight, rest, final.x, linearisations=6)
     scores = screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest])
+    scores = _always(scores) if index else scores
     leading = [score.candidate.effect.id for score in scores[:3]]
     names = {*own.effect.rivals, *item.rivals, *leading} - {own.effect.id}
     best: dict[str, Score] = {}
@@ -384,6 +387,11 @@ def _late(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: S
     begun = retime(problem, weight, try_effect(problem, weight, current, late))
     gain = cost(problem, current, weight) - begun.cost
     return begun if begun.cost < trial.cost - PARTIAL * gain else trial
+
+
+def _always(scores: Sequence[Score]) -> list[Score]:
+    """Without late variants, for a second effect: a wrong shape of the first shows at some events, which those fit like a glove."""
+    return [score for score in scores if not score.candidate.since]
 
 
 def _timed(trial: Trial) -> bool:
