@@ -15,6 +15,8 @@ from rosbags.highlevel import AnyReader
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
+from lugre_steering.bench import own_error
+from lugre_steering.diagnosis.name import OWN_ERROR
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.proof import hydraulics, manoeuvres, simulator
 from lugre_steering.proof.conceal import ZONED
@@ -368,3 +370,12 @@ def test_nominal_vehicle_reproduces_the_reference_simulation(sheet: Sheet) -> No
     assert error < 1e-3 * np.abs(expected["torque_Nm"]).max()
     warm = np.interp(expected["t_s"], time, tracks[0].temperature) - expected["left_temperature_degC"]
     assert np.abs(warm).max() < 0.05
+
+
+def test_the_error_that_the_engine_allows_itself_covers_what_the_baseline_cannot_follow() -> None:
+    """With nothing hidden and no noise, recalibration leaves little, and patches are what it cannot follow."""
+    case = own_error.measure(1, SHEET_FILE)
+    assert case["one patch"] < case["patches"] < OWN_ERROR * case["noise"]
+    assert case["cylinders and lines"] < OWN_ERROR * case["noise"]
+    # The motion as the sensors show it adds more than that; the noise model counts it, so it must see it.
+    assert case["measured motion"] > 1.5 * case["cylinders and lines"]
