@@ -34,6 +34,8 @@ MIN_SLIDING = 2.0
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart."""
 UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
 """Energy left over, in noise variances, that makes a verdict: slow and above the doubt about slow noise, or of any kind."""
+FORETELLS = 0.1
+"""Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
 LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
 """Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
 TELLING = 0.5
@@ -295,7 +297,11 @@ class _Conclusion:
         slow, nothing = self._slow_energy(residual * weight), self._slow_energy(self.noise.draws * weight)
         excess = float(np.mean((residual * weight)[used] ** 2)) - 1.0
         # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
-        structured = slow - nothing > max(UNLISTED_EXCESS, name.SLOW_DOUBT * nothing) or excess > FAST_EXCESS
+        held = np.where(self.roles.held, weight, 0.0)
+        pattern, gain = self.found.pattern if not final.effects else None, 0.0
+        if pattern is not None:
+            gain = 1.0 - pattern.cost(problem, held) / max(name.cost(problem, self.found.baseline, held), 1e-9)
+        structured = slow - nothing > max(UNLISTED_EXCESS, self.noise.slow_doubt) or excess > FAST_EXCESS or gain > FORETELLS
         if not structured:
             return (
                 {
@@ -313,17 +319,13 @@ class _Conclusion:
             residual = problem.measured - sound.prediction
             axis, share, _ = locate.telling_coordinate(stacked, residual, weight, self.noise.draws)
         formula = None
-        held = np.where(self.roles.held, weight, 0.0)
         fitted = np.where(self.roles.fit, weight, 0.0)
         proposal = unlisted.propose(stacked, residual, fitted, held, units.is_linear(problem.vehicle))
-        pattern, shape = self.found.pattern if not final.effects else None, None
-        if pattern is not None:
-            before, after = name.cost(problem, self.found.baseline, held), pattern.cost(problem, held)
-            gain = 1.0 - after / max(before, 1e-9)
-            if gain > (proposal.gain if proposal is not None else 0.02):
-                proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
-                # A pattern that explains most of it also says where it acts below the noise.
-                shape = pattern.torque if gain > TELLING else None
+        shape = None
+        if pattern is not None and gain > (proposal.gain if proposal is not None else 0.02):
+            proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
+            # A pattern that explains most of it also says where it acts below the noise.
+            shape = pattern.torque if gain > TELLING else None
         if proposal is not None:
             formula = f"{units.law(problem.vehicle, proposal.text)} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
         where = []

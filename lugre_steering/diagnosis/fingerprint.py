@@ -36,7 +36,7 @@ COUNTING = ("wear_polishing", "pressure_drift", "soil_shear", "static_ageing")
 minutes, an angle that shifts turns the contact, and path, time, berm and age count from the beginning."""
 NEVER_LATE = ("surface_patch", "mullins_softening")
 """Has its own time window; acts on the first sweep."""
-CEILINGS = (0.8, 0.88, 0.92, 0.95, 0.975, 1.0)
+CEILINGS = (0.8, 0.88, 0.92, 0.95, 0.975, 1.0, 1.02, 1.04, 1.07)
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
                 alone = replace(candidate, bags=(bag,))
                 part = score_columns(alone, columns * (problem.bag == bag)[:, None], basis, residuals, energy)
                 found += [part] if part is not None else []
-        if candidate.bags is None and full is not None and candidate.effect.id not in NEVER_LATE:
+        if candidate.bags is None and candidate.effect.id not in NEVER_LATE:
             for start, after in zip(starts, begun, strict=True):
                 late = replace(candidate, since=start)
                 if candidate.effect.stage in REMEMBERED or candidate.effect.id in COUNTING:

@@ -15,17 +15,16 @@ from lugre_steering.diagnosis.fingerprint import Score, screen
 from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.foreign import Pattern, strongest
 from lugre_steering.diagnosis.noise import Noise
-from lugre_steering.diagnosis.problem import Candidate, Problem
+from lugre_steering.diagnosis.problem import Candidate, Problem, Values
 from lugre_steering.diagnosis.split import Split
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MAX_ROUNDS = 3, 8
-SHORTLIST = 7
+SHORTLIST, PROMISING, CLOSE = 7, (3, 5), 0.1
+"""Effects fitted, how many of them with care at least and at most, and the share of the gain within which they deserve it."""
 FALSE_DISCOVERY_RATE = 0.01
 OWN_ERROR = 0.05
 """Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
-SLOW_DOUBT = 0.5
-"""Share by which the slow noise may be more than standstill shows."""
 WHOLE = (0.75, 0.09, 0.93)
 """Share of the excess that named physics must explain together, else it is unlisted: at an excess of one noise variance, per
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
@@ -47,9 +46,13 @@ PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
 MEMORY = 4.0
 """Samples that count as one, roughly: errors have a memory."""
 TRIAL_TOLERANCE = 1e-4
+SURE_SIGMA, EARNED = 4.0, 10.0
+"""Standard deviations, and fall of the cost, that keep an optional part of a law."""
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
 """A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
+LAW = 0.01
+"""Share of what an effect explains that tells of the form of its law only: nature is not truer to any."""
 
 
 @dataclass(frozen=True)
@@ -128,14 +131,17 @@ def search(
         for score in shortlist:
             progress(f"fitting {score.candidate.label}")
             trials.append(_everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
-        trials.sort(key=lambda trial: trial.cost)
-        trials[0] = _late(problem, weight, current, trials[0], scores)
+        before = cost(problem, current, weight)
+        trials = _ranked(trials, before)
+        trials[: PROMISING[0]] = [_late(problem, weight, current, trial, scores) for trial in trials[: PROMISING[0]]]
+        trials = _ranked(trials, before)
         if _timed(trials[0]):
-            trials[1:] = [_late(problem, weight, current, trial, scores) for trial in trials[1:]]
-            trials.sort(key=lambda trial: trial.cost)
-        trials = [deepen(problem, weight, current, trial, scores) for trial in trials[:3]] + trials[3:]
-        trials.sort(key=lambda trial: trial.cost)
-        best, before = trials[0], cost(problem, current, weight)
+            trials = _ranked([_late(problem, weight, current, trial, scores) for trial in trials], before)
+        close = sum(trial.cost < trials[0].cost + CLOSE * (before - trials[0].cost) for trial in trials)
+        promising = int(np.clip(close, *PROMISING))
+        trials[:promising] = [deepen(problem, weight, current, trial, scores) for trial in trials[:promising]]
+        trials = _ranked(trials, before)
+        best = trials[0]
         # A trial may have led the calibration out of a local minimum: then the gain is not the effect's, so look again.
         again = fit(problem, weight, current.effects, best.fit.x, linearisations=12)
         regained = before - cost(problem, again, weight)
@@ -163,7 +169,7 @@ def search(
         steps, current = _prune(steps, problem, weight, samples, start_cost, current)
         if best.cost - samples < OWN_ERROR * samples:
             break
-    kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + SLOW_DOUBT * noise.slow_share)
+    kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + noise.slow_doubt)
     final, found = (steps[kept - 1][0], [item for _, item, _ in steps[:kept]]) if kept else (baseline, [])
     for index in range(kept):
         progress(f"rivals of {found[index].score.candidate.label}")
@@ -394,6 +400,11 @@ def _always(scores: Sequence[Score]) -> list[Score]:
     return [score for score in scores if not score.candidate.since]
 
 
+def _ranked(trials: Sequence[Trial], before: float) -> list[Trial]:
+    """Best first; an onset is a freedom that fits many an event, so a late effect must explain clearly more than any other."""
+    return sorted(trials, key=lambda trial: trial.cost + PARTIAL * max(before - trial.cost, 0.0) * bool(trial.candidate.since))
+
+
 def _timed(trial: Trial) -> bool:
     """Whether what a trial found begins or ends within the recordings."""
     return bool(trial.candidate.since) or any(trial.fit.effects[-1][1].get(edge) for edge in ("time_start", "time_end"))
@@ -401,27 +412,43 @@ def _timed(trial: Trial) -> bool:
 
 def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     """Let the effect have the optional parts of its family; those that do not earn their place go again."""
-    candidate, values = trial.fit.effects[-1]
-    optional = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
-    if not optional:
-        result = fit(problem, weight, trial.fit.effects, trial.fit.x, linearisations=20, tolerance=1e-5)
-        return Trial(trial.score, result, cost(problem, result, weight))
-    earlier = trial.fit.effects[:-1]
-    start = {**{name: 0.2 * candidate.parameter(name).scale for name in optional}, **values}
-    richer = replace(candidate, free=candidate.free + tuple(optional))
+    *earlier, (candidate, values) = trial.fit.effects
+    kept = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
+    start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
+    richer = replace(candidate, free=(*candidate.free, *kept))
     result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=20, tolerance=1e-5)
+    left = cost(problem, result, weight)
     # What the model leaves over makes its numbers less sure than noise alone would.
-    misfit = max(cost(problem, result, weight) / max(float(np.count_nonzero(weight)), 1.0), 1.0)
+    misfit = max(left / max(float(np.count_nonzero(weight)), 1.0), 1.0)
+    while weak := _weak(result, values, kept, misfit):
+        # Two that do the same work are both weak, yet not both superfluous.
+        for dropped in (weak, weak[:1]) if len(weak) > 1 else (weak,):
+            leaner = _without(problem, weight, result, values, dropped)
+            after = cost(problem, leaner, weight)
+            if after < left + EARNED * misfit * len(dropped):
+                break
+        else:
+            break
+        result, left, kept = leaner, after, [name for name in kept if name not in dropped]
+    return Trial(trial.score, result, left) if left < trial.cost - EARNED * misfit * len(kept) else trial
+
+
+def _weak(result: Fit, values: Values, optional: Sequence[str], misfit: float) -> list[str]:
+    """Parameters of the last effect that left their value in ``values`` by less than some standard deviations, weakest first."""
+    if not optional:
+        return []
     deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]
     fitted = result.effects[-1][1]
-    known = {name: values[name] for name in optional if name in values}
-    needed = tuple(n for n, sd in zip(optional, deviation, strict=True) if abs(fitted[n] - known.get(n, 0.0)) > 4.0 * sd)
-    if len(needed) < len(optional):
-        fitted = {**known, **{name: value for name, value in fitted.items() if name not in optional or name in needed}}
-        leaner = replace(candidate, free=candidate.free + needed)
-        result = fit(problem, weight, [*earlier, (leaner, fitted)], result.x, linearisations=8)
-    better = cost(problem, result, weight)
-    return Trial(trial.score, result, better) if better < trial.cost - 10.0 * misfit * max(len(needed), 1) else trial
+    moved = {n: abs(fitted[n] - values.get(n, 0.0)) / max(float(sd), 1e-300) for n, sd in zip(optional, deviation, strict=True)}
+    return sorted((name for name in optional if moved[name] < SURE_SIGMA), key=moved.__getitem__)
+
+
+def _without(problem: Problem, weight: Array, result: Fit, values: Values, dropped: Sequence[str]) -> Fit:
+    """The fit with parameters of its last effect back at their value in ``values``, or gone."""
+    *earlier, (candidate, fitted) = result.effects
+    leaner = replace(candidate, free=tuple(name for name in candidate.free if name not in dropped))
+    start = {**values, **{name: value for name, value in fitted.items() if name not in dropped}}
+    return fit(problem, weight, [*earlier, (leaner, start)], result.x, linearisations=8)
 
 
 def tied(
@@ -440,7 +467,7 @@ def tied(
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
         close = other.cost - best.cost < TIE_MISFIT * misfit + TIE_ENERGY * samples
-        if (close and t < TIE_T) or other.cost - best.cost < 0.1 * misfit + 10.0:
+        if (close and t < TIE_T) or other.cost - best.cost < 0.1 * misfit + LAW * (before - best.cost) + 10.0:
             found.append(other)
     return found
 

@@ -35,6 +35,8 @@ SPLIT_HZ = 2.5
 WINDOW_S = 0.25
 AT_LEAST = 0.5
 """Share of the noise that the sheet gives its sensors, below which none is believed to be."""
+SLOW_MEMORY_S, SURENESS, LEAST_REST_S = 0.4, 3.0, 2.0
+"""Memory of slow noise, standard deviations of its estimate that are allowed for, and the shortest standstill counted."""
 SUDDEN = 3.0
 """Times its expected fast energy beyond which a window holds an event rather than noise."""
 
@@ -119,8 +121,8 @@ class Noise:
 
     sigma: Array
     draws: Array
-    slow_share: float
-    """Share of the noise energy that is slow; short standstills tell it to some half only."""
+    slow_doubt: float
+    """Energy per sample, in noise variances, by which slow noise may exceed what the standstills show: short ones tell little."""
 
     @property
     def floor(self) -> float:
@@ -132,6 +134,12 @@ def slow_part(values: Array, dt: float) -> Array:
     """What varies slower than SPLIT_HZ, along the last axis, without shift in time."""
     corner = min(SPLIT_HZ, 0.1 / dt)
     return np.asarray(sosfiltfilt(butter(2, corner, fs=1.0 / dt, output="sos"), values))
+
+
+def slow_doubt(run: Run) -> float:
+    """Share by which the slow noise energy of a run may exceed the estimate: its own standstill holds few independent samples."""
+    rest = sum(part.stop - part.start for part in standstill(run)) * float(run.time[1] - run.time[0])
+    return SURENESS * float(np.sqrt(2.0 * SLOW_MEMORY_S / max(rest, LEAST_REST_S)))
 
 
 def fast_variance(run: Run, residual: Array, known: Array) -> Array:
@@ -211,7 +219,7 @@ def noise_model(
     errors = in_threads(changes, range(len(parts)))
     # Only oil carries pump ripple; a torque sensor is as noisy in motion as at rest.
     hydraulic = problem.vehicle.hydraulics is not None
-    sigmas, slow_sigmas, residuals = [], [], []
+    sigmas, doubts, residuals = [], [], []
     for bag, (run, part) in enumerate(parts):
         rng, dt = np.random.default_rng([seed, bag, 1]), run.time[1] - run.time[0]
         torque = np.array([quiet.draw(run.time.size, rng) for _ in range(draws)])
@@ -224,8 +232,9 @@ def noise_model(
             if quiet.assumed:  # white noise is as strong below as above
                 slow *= float(np.mean(swift_sigma / (np.std(swift) * run.sigma)))
         variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / dt)))
-        slow_sigmas.append(np.std(slow) * run.sigma)
-        sigmas.append(np.sqrt(slow_sigmas[-1] ** 2 + swift_sigma**2 + variance))
+        slow_variance = np.var(slow) * run.sigma**2
+        sigmas.append(np.sqrt(slow_variance + swift_sigma**2 + variance))
+        doubts.append(slow_doubt(run) * slow_variance / sigmas[-1] ** 2)
         residuals.append(slow * run.sigma + swift / np.std(swift) * swift_sigma - errors[bag])
     sigma = np.concatenate(sigmas)
-    return Noise(sigma, np.concatenate(residuals, axis=1), float(np.mean((np.concatenate(slow_sigmas) / sigma) ** 2)))
+    return Noise(sigma, np.concatenate(residuals, axis=1), float(np.mean(np.concatenate(doubts))))
