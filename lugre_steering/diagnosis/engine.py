@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,11 +14,10 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis import experiment, locate, name, onset, unlisted, verify
+from lugre_steering.diagnosis import experiment, limits, locate, name, onset, unlisted, verify
 from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.bursts import set_aside
 from lugre_steering.diagnosis.dataset import Run, prepare
-from lugre_steering.diagnosis.fingerprint import Score
 from lugre_steering.diagnosis.fit import Fit, fit
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.noise import Noise, slow_part
@@ -26,18 +26,20 @@ from lugre_steering.diagnosis.quality import Quality, inspect
 from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence, finite
 from lugre_steering.diagnosis.split import Split, split
 from lugre_steering.effects.catalogue import CATALOGUE
-from lugre_steering.errors import DataError
+from lugre_steering.errors import BagError, DataError
 from lugre_steering.recording import Array, Finding, Recording
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
-MIN_SLIDING = 2.0
-"""Travel, in presliding lengths, below which friction level and stiffness cannot be told apart."""
+MIN_SLIDING, MIN_SAMPLES = 2.0, 500
+"""Travel, in presliding lengths, below which friction level and stiffness cannot be told apart; samples that a fit needs."""
 UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
 """Energy left over, in noise variances, that makes a verdict: slow and above the doubt about slow noise, or of any kind."""
 FORETELLS = 0.1
 """Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
 LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
 """Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
+BOTH_SIDES = 0.5
+"""Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
 TELLING = 0.5
 """Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
 CONTRADICTED = 0.02
@@ -56,11 +58,16 @@ def diagnose(
     material: float = MATERIAL_SHARE,
     progress: Progress = lambda _: None,
 ) -> Diagnosis:
-    """Read and diagnose bags of one vehicle together."""
-    recordings = []
+    """Read and diagnose bags of one vehicle together; two of one name get numbers."""
+    recordings: list[Recording] = []
     for bag in bags:
+        if sum(bag.resolve() == other.resolve() for other in bags) > 1:
+            raise BagError(f"{bag}: given more than once; a copy of a recording proves nothing, give each bag once")
         progress(f"reading {bag.name}")
-        recordings.append(read_recording(bag, vehicle.channels))
+        read = read_recording(bag, vehicle.channels)
+        taken = {recording.name for recording in recordings}
+        names = itertools.chain([read.name], (f"{read.name}_{number}" for number in itertools.count(2)))
+        recordings.append(replace(read, name=next(name for name in names if name not in taken)))
     return diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
 
 
@@ -88,15 +95,19 @@ def diagnose_recordings(
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
     travel = max(float(np.ptp(run.theta)) for run in problem.runs) / problem.presliding
     roles = split(problem)
-    if travel < MIN_SLIDING or roles.fit.sum() < 500:
+    if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
+        if travel < MIN_SLIDING:
+            lacking = f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
+        else:
+            lacking = f"only {roles.fit.sum()} usable samples are left to fit; at least {MIN_SAMPLES} are needed (see data_quality)"
         advice = {
             "manoeuvre": "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description,
             "separates": ["friction level", "stiffness"],
-            "why": f"the recording turns the contact by only {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed",
+            "why": lacking,
         }
         statement = (
-            f"The recording does not determine the baseline: the contact turned by {travel:.1f} presliding lengths in "
-            f"{sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s. Nothing can be said about missing physics."
+            f"The recording of {sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s does not determine the "
+            f"baseline: {lacking}. Nothing can be said about missing physics."
         )
         return _insufficient(qualities, vehicle, findings, statement, advice)
     progress("recalibrating the baseline")
@@ -279,9 +290,15 @@ class _Conclusion:
                 continue
             axes = locate.coordinates(run, run.measured)
             axis = candidate.effect.coordinate if candidate.effect.coordinate in axes else "time"
+            low, high = locate.active_range(axes[axis], piece)
+            if axis == "steering angle" and low < 0.0 < high:
+                # Beyond some angle to both sides says more than nearly everything between.
+                low_size, high_size = locate.active_range(axes["|steering angle|"], piece)
+                if low_size > BOTH_SIDES * high_size:
+                    axis, low, high = "|steering angle|", low_size, high_size
             entries.append({
                 "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                "range": list(locate.active_range(axes[axis], piece)), "unit": self._unit(locate.UNITS[axis]),
+                "range": [low, high], "unit": self._unit(locate.UNITS[axis]),
             })  # fmt: skip
         return entries
 
@@ -358,24 +375,12 @@ class _Conclusion:
         return float(np.mean(np.concatenate(pieces, axis=-1)[..., problem.valid] ** 2))
 
     def _limits(self, named: Sequence[str]) -> dict[str, Any]:
-        """Smallest amplitude of each effect that this recording could have revealed."""
-        samples = float(self.roles.fit.sum())
-        best: dict[str, tuple[float, Score]] = {}
-        for score in self.found.first_scores:
-            needed = max(name.OWN_ERROR * samples, 2.0 * float(np.max(score.null_explained)))
-            if not score.candidate.free or score.visible <= 0.0 or score.candidate.effect.id in named:
-                continue
-            parameter = score.candidate.parameter(score.candidate.free[0])
-            smallest = parameter.scale * float(np.sqrt(needed / score.visible))
-            if score.candidate.effect.id not in best or smallest < best[score.candidate.effect.id][0]:
-                best[score.candidate.effect.id] = (smallest, score)
+        """Smallest amplitude of each effect that this recording would have revealed."""
+        weight = np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0)
+        found = limits.smallest(self.problem, self.found.baseline, weight, self.found.first_scores, named)
         return {
-            key: {
-                "parameter": score.candidate.free[0],
-                "smallest": smallest,
-                "unit": self._unit(score.candidate.parameter(score.candidate.free[0]).unit),
-            }
-            for key, (smallest, score) in sorted(best.items())
+            effect: {"parameter": parameter.name, "smallest": value, "unit": self._unit(parameter.unit)}
+            for effect, (parameter, value) in found.items()
         }
 
     def _vehicle(self, whole: Fit, effects: Sequence[dict[str, Any]]) -> Vehicle:

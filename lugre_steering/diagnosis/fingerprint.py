@@ -154,11 +154,17 @@ def _ceilings(problem: Problem, effect: Effect) -> list[Candidate]:
     return [Candidate(effect, (("ceiling", top * share), *arms)) for share in CEILINGS]
 
 
-def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate) -> Array:
-    """Change of the prediction (n, k), one column per free parameter at its scale (or the whole effect if none is free)."""
+def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate, first: float | None = None) -> Array:
+    """Change of the prediction (n, k), one column per free parameter at its scale (or the whole effect if none is free).
+
+    ``first``: size of the first free parameter, which then alone is varied.
+    """
     shapes = dict(candidate.shapes)
+    sizes = {name: candidate.parameter(name).scale for name in candidate.free}
+    if first is not None:
+        sizes = {candidate.free[0]: first}
     trials: list[Values] = [
-        {**dict.fromkeys(candidate.free, 0.0), **shapes, name: candidate.parameter(name).scale} for name in candidate.free
+        {**dict.fromkeys(candidate.free, 0.0), **shapes, name: size} for name, size in sizes.items()
     ] or [shapes]
     columns = np.zeros((problem.measured.size, len(trials)))
     for bag in range(len(problem.runs)):
@@ -214,12 +220,14 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
 def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals: Array, energy: float) -> Score | None:
     """Projection of the residual (first row) and the null draws (other rows) on what of a signature is not masked.
 
-    Columns whose parameter would leave its allowed sign are dropped, since no such physics exists.
+    Columns whose parameter would leave its allowed sign explain nothing, since no such physics exists.
     """
     total = float(np.sum(columns**2))
     if total < 1e-12:
         return None
     visible = columns - basis @ (basis.T @ columns)
+    seen = float(np.sum(visible**2))
+    nothing = None
     active = [k for k in range(columns.shape[1]) if np.sum(visible[:, k] ** 2) > 1e-10 * max(total, 1e-30)]
     while active:
         q, r = np.linalg.qr(visible[:, active])
@@ -232,15 +240,16 @@ def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals:
             k for k, c in zip(active, coefficients, strict=True)
             if (candidate.free and c < 0.0 <= candidate.parameter(candidate.free[k]).low) or (not candidate.free and c < 0.3)
         ]  # fmt: skip
-        if wrong:
-            active = [k for k in active if k not in wrong]
-            continue
-        explained = float(along[0] @ along[0])
         values = np.zeros(len(candidate.free))
         if candidate.free:
             values[active] = coefficients
-        return Score(
-            candidate, explained, explained / max(energy, 1e-30), 1.0 - float(np.sum(visible**2)) / total,
-            float(np.sum(visible**2)), tuple(float(v) for v in values), np.sum(along[1:] ** 2, axis=1),
+        explained = float(along[0] @ along[0])
+        found = Score(
+            candidate, explained, explained / max(energy, 1e-30), 1.0 - seen / total, seen,
+            tuple(float(v) for v in values), np.sum(along[1:] ** 2, axis=1),
         )  # fmt: skip
-    return None
+        if not wrong:
+            return found
+        nothing = replace(found, explained=0.0, share=0.0, coefficients=(0.0,) * len(candidate.free))
+        active = [k for k in active if k not in wrong]
+    return nothing

@@ -337,7 +337,7 @@ def _everywhere(problem: Problem, weight: Array, current: Fit, trial: Trial, sco
     if not _partial(trial.score):
         return trial
     whole = next((s for s in scores if s.candidate.label == trial.score.candidate.label and not _partial(s)), None)
-    if whole is None:
+    if whole is None or whole.explained <= 0.0:
         return trial
     simpler = try_effect(problem, weight, current, whole)
     gain = cost(problem, current, weight) - trial.cost
@@ -388,7 +388,7 @@ def _late(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: S
     """A trial of an effect that is always there against the same from an instant on, which must explain clearly more."""
     tried = trial.score.candidate
     late = next((s for s in scores if (c := s.candidate).label == tried.label and c.bags is None and c.since), None)
-    if late is None or _partial(trial.score):
+    if late is None or late.explained <= 0.0 or _partial(trial.score):
         return trial
     begun = retime(problem, weight, try_effect(problem, weight, current, late))
     gain = cost(problem, current, weight) - begun.cost

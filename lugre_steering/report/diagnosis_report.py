@@ -458,7 +458,7 @@ def _limits(diagnosis: Diagnosis) -> str:
         unit = units.label(diagnosis.vehicle, limit["unit"])
         title = units.title(diagnosis.vehicle, CATALOGUE[name]) if name in CATALOGUE else ""
         rows.append([f"<code>{_text(name)}</code>", _text(title), f"<code>{_text(limit['parameter'])}</code>",
-                     shown.number(limit["smallest"], 3), _text(unit)])  # fmt: skip
+                     "hidden at any size" if limit["smallest"] is None else shown.number(limit["smallest"], 3), _text(unit)])  # fmt: skip
     table = _table(["effect", "", "parameter", "smallest that would have shown", "unit"], rows, numeric=(3,))
     if len(rows) > EVIDENCE_SHOWN:
         opened = " open" if diagnosis.json["verdict"] == "consistent" else ""
