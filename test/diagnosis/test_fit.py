@@ -126,8 +126,11 @@ def test_wrong_signs_are_no_physics() -> None:
     column = np.ones((10, 1))
     residual = np.vstack([-np.ones(10), np.ones((2, 10))])
     basis = np.zeros((10, 0))
-    assert score_columns(candidate, column, basis, residual, 10.0) is None
-    assert score_columns(candidate, column, basis, -residual, 10.0) is not None
+    wrong, right = (score_columns(candidate, column, basis, sign * residual, 10.0) for sign in (1.0, -1.0))
+    assert wrong is not None and right is not None
+    assert (wrong.explained, wrong.coefficients, wrong.p_value) == (0.0, (0.0,), 1.0)
+    assert right.explained == pytest.approx(10.0)
+    assert wrong.visible == right.visible == pytest.approx(10.0)  # its detection limit is the same
 
 
 def test_an_onset_that_the_fitted_data_hardly_see_is_called_undetermined(problem: Problem) -> None:

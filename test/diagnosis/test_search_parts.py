@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis import experiment, fingerprint, flexible, foreign, name, noise, split, verify
+from lugre_steering.diagnosis import experiment, fingerprint, flexible, foreign, limits, name, noise, split, verify
 from lugre_steering.diagnosis.fingerprint import Score
 from lugre_steering.diagnosis.fit import fit
 from lugre_steering.diagnosis.problem import Problem
@@ -191,3 +191,49 @@ def test_the_next_experiment_does_not_depend_on_when_an_effect_began(problem: Pr
         energies.append(experiment.separation(problem, result, first, second, SIGMA))
     assert energies[0] == energies[1]
     assert max(energies[0].values()) > 100.0
+
+
+def test_detection_limits_are_sizes_at_which_so_much_can_be_seen(problem: Problem) -> None:
+    """The trace at the limit keeps its energy after the best recalibration; some laws are linear in their size, some are not."""
+    result, draws = fit(problem, weight(problem)), SIGMA * np.random.default_rng(4).standard_normal((8, problem.measured.size))
+    scores = fingerprint.screen(problem, result, weight(problem), draws)
+    found = limits.smallest(problem, result, weight(problem), scores, ["slope_bias"])
+    assert "slope_bias" not in found
+    assert {"viscous_friction", "distributed_contact", "yaw_inertia", "end_stop"} <= set(found)
+    base = problem.predict_all(result.x)
+    columns = result.jacobian[:, np.linalg.norm(result.jacobian, axis=0) > 0.0]
+    for id_ in ("viscous_friction", "distributed_contact", "yaw_inertia"):
+        parameter, size = found[id_]
+        trace = (problem.predict_all(result.x, [effect(id_, **{parameter.name: size})]) - base) * weight(problem)
+        left = trace - columns @ np.linalg.lstsq(columns, trace, rcond=1e-10)[0]
+        assert np.sum(left**2) == pytest.approx(limits.REVEALED * problem.valid.sum(), rel=0.15)
+
+
+def test_what_no_size_could_show_has_no_limit(problem: Problem) -> None:
+    blunt = weight(problem) / 1e3
+    result, draws = fit(problem, blunt), 1e3 * SIGMA * np.random.default_rng(4).standard_normal((8, problem.measured.size))
+    found = limits.smallest(problem, result, blunt, fingerprint.screen(problem, result, blunt, draws), [])
+    assert found["heat_partition"][1] is None
+
+
+def test_two_parts_of_a_law_that_do_the_same_work_are_not_both_dropped(problem: Problem) -> None:
+    """Growth with the flow and a softer change of sign are each uncertain beside the other, but needed together."""
+    truth = effect("back_pressure", torque=600.0, flow=5.0, rate_scale=0.03)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [truth]))
+    plain = effect("back_pressure", torque=600.0)
+    score = Score(plain[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    result = fit(hidden, weight(hidden), [plain])
+    refined = name.refine(hidden, weight(hidden), name.Trial(score, result, name.cost(hidden, result, weight(hidden))))
+    assert refined.cost < 1.05 * hidden.valid.sum()
+    # Where the law is plain, nothing is added to it.
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [plain]))
+    result = fit(hidden, weight(hidden), [plain])
+    lean = name.refine(hidden, weight(hidden), name.Trial(score, result, name.cost(hidden, result, weight(hidden))))
+    assert lean.candidate.free == ("torque",)
+
+
+def test_short_standstills_leave_more_doubt_about_slow_noise(problem: Problem) -> None:
+    run = problem.runs[0]
+    rest = [part for part in noise.standstill(run)]
+    shorter = replace(run, valid=np.where(np.arange(run.time.size) < rest[-1].start, False, run.valid))
+    assert noise.slow_doubt(shorter) > 1.3 * noise.slow_doubt(run) > 0.0
