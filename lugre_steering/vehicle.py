@@ -11,19 +11,20 @@ from __future__ import annotations
 import dataclasses
 import math
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.errors import LugreSteeringError, VehicleFileError
 from lugre_steering.recording import Channel, Kind
 from lugre_steering.resources import config_folder
-from lugre_steering.schema import Reader, positive, quantity
+from lugre_steering.schema import Reader, positive, quantity, suggestion
 
 SCHEMA = "lugre_steering/vehicle/1"
 SIDES = ("left", "right")
@@ -294,7 +295,7 @@ def from_mapping(data: object, file: Path) -> Vehicle:
         raise reader.fail("schema", data.get("schema"), f"'{SCHEMA}'")
     vehicle = reader.build(Vehicle, _embed_tables(data, reader), "")
     _check(vehicle, reader)
-    return _with_pavement(vehicle, reader)
+    return _with_pavement(_with_effects(vehicle, reader), reader)
 
 
 def save(vehicle: Vehicle, path: str | Path) -> None:
@@ -306,10 +307,18 @@ def save(vehicle: Vehicle, path: str | Path) -> None:
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:
     """Plain data of a vehicle, ready for YAML or JSON."""
-    plain = _plain(vehicle)
+    plain = _plain(vehicle.replace(effects=_each_once(vehicle.effects)))
     assert isinstance(plain, dict)
     plain.setdefault("effects", [])
     return plain
+
+
+def _each_once(effects: tuple[EffectEntry, ...]) -> tuple[EffectEntry, ...]:
+    """Effects found again stand once, as a file must have them: later values replace earlier ones, other lines join."""
+    joined: dict[str, dict[str, float]] = {}
+    for entry in effects:
+        joined.setdefault(entry.id, {}).update(entry.parameters)
+    return tuple(EffectEntry(name, values) for name, values in joined.items())
 
 
 def _plain(value: Any) -> Any:
@@ -486,6 +495,56 @@ def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: Reader) 
                 raise fail(f"{key}.{pivot}", list(getattr(cylinder, pivot)), "two coordinates [x, y]")
         if math.hypot(*cylinder.knuckle_m) == 0.0 or cylinder.knuckle_m == cylinder.chassis_m:
             raise fail(f"{key}.knuckle_m", list(cylinder.knuckle_m), "a pivot away from the hinge and from chassis_m")
+
+
+def add_effect(
+    vehicle: Vehicle, added: EffectEntry, fail: Callable[[str, object, str], LugreSteeringError]
+) -> Vehicle:
+    """The vehicle with one more effect, checked against the catalogue; ``fail`` makes errors of key, value, expectation.
+
+    An effect stands once; one that acts per line may be given line by line.
+    """
+    effect = CATALOGUE.get(added.id)
+    if effect is None:
+        raise fail("id", added.id, f"an effect of the catalogue; {suggestion(added.id, list(CATALOGUE))}")
+    if effect.needs:
+        raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.needs}")
+    if effect.stage == "thermal" and vehicle.rubber is None:
+        raise fail("id", added.id, "a vehicle with the section 'rubber' for a thermal effect")
+    before = next((entry for entry in vehicle.effects if entry.id == added.id), None)
+    ranges = {p.name: (p.low, p.high) for p in effect.parameters}
+    if effect.per_line:
+        ranges = dict.fromkeys(vehicle.hydraulics.lines if vehicle.hydraulics else (), next(iter(ranges.values())))
+    if before is not None and (not effect.per_line or before.parameters.keys() & added.parameters.keys()):
+        raise fail("id", added.id, f"each effect{' and line' if effect.per_line else ''} once")
+    for name, value in added.parameters.items():
+        if name not in ranges:
+            what = "line" if effect.per_line else "parameter"
+            raise fail(f"parameters.{name}", value, f"no such {what}; {suggestion(name, list(ranges))}")
+        low, high = ranges[name]
+        # Fits work on scaled numbers, so a value at its bound comes back with a rounding error.
+        if not math.isclose(value, min(max(value, low), high), rel_tol=1e-9):
+            raise fail(f"parameters.{name}", value, f"a number from {low:g} to {high:g}")
+    # What may not be zero has no neutral value, so it cannot be left out.
+    missing = [key for key, (low, high) in ranges.items() if key not in added.parameters and not low <= 0.0 <= high]
+    if missing or not added.parameters:
+        raise fail("parameters", added.parameters, f"values of {', '.join(missing or ranges) or 'a pressure line'}")
+    if before is None:
+        return vehicle.replace(effects=(*vehicle.effects, added))
+    joined = EffectEntry(added.id, {**before.parameters, **added.parameters})
+    return vehicle.replace(effects=tuple(joined if entry is before else entry for entry in vehicle.effects))
+
+
+def _with_effects(vehicle: Vehicle, reader: Reader) -> Vehicle:
+    """The vehicle with its effects checked, each standing once."""
+    checked = vehicle.replace(effects=())
+    for i, entry in enumerate(vehicle.effects):
+        checked = add_effect(checked, entry, partial(_fail_in, reader, f"effects[{i}]"))
+    return checked
+
+
+def _fail_in(reader: Reader, section: str, key: str, value: object, expected: str) -> LugreSteeringError:
+    return reader.fail(f"{section}.{key}", value, expected)
 
 
 def pavements() -> dict[str, dict[str, Any]]:

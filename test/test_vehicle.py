@@ -15,8 +15,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
-from lugre_steering.vehicle import Vehicle, from_mapping, load, pavements, save
+from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FILE = CONFIG / "test_vehicle.yaml"
@@ -68,12 +69,85 @@ def test_round_trip_stands_alone(sheet: dict[str, Any], tmp_path: Path) -> None:
 
 
 def test_effects_and_provenance_survive(tmp_path: Path) -> None:
-    sheet = changed(SHEET, "effects", [{"id": "end_stop", "parameters": {"stiffness": 5e4}}])
+    sheet = changed(SHEET, "effects", [{"id": "end_stop", "parameters": {"stiffness": 5e4, "engage_angle": 0.3}}])
     sheet["provenance"] = {"bag": "a", "when": 3}
     vehicle = from_mapping(sheet, FILE)
     save(vehicle, tmp_path / "copy.yaml")
     assert load(tmp_path / "copy.yaml") == vehicle
-    assert vehicle.effects[0].parameters == {"stiffness": 5e4}
+    assert vehicle.effects[0].parameters == {"stiffness": 5e4, "engage_angle": 0.3}
+
+
+def with_effects(*entries: tuple[str, dict[str, float]]) -> dict[str, Any]:
+    return changed(SHEET, "effects", [{"id": name, "parameters": values} for name, values in entries])
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "key", "expectation"),
+    [
+        ("end_stp", {"stiffness": 1e5}, "id", "did you mean 'end_stop'"),
+        ("end_stop", {}, "parameters", "values of engage_angle"),
+        ("end_stop", {"stifness": 1e5}, "parameters.stifness", "did you mean 'stiffness'"),
+        ("end_stop", {"stiffness": -1e5, "engage_angle": 0.3}, "parameters.stiffness", "from 0 to"),
+        ("end_stop", {"stiffness": 1e5}, "parameters", "values of engage_angle"),
+        ("slope_bias", {}, "parameters", "values of torque"),
+        ("pressure_offset", {"main_x": 1e5}, "parameters.main_x", "no such line; did you mean 'main_"),
+        ("pressure_offset", {}, "parameters", "values of main_a"),
+        ("pressure_lag", {"tau": -1.0}, "parameters.tau", "from 0 to 2"),
+        ("heat_partition", {"ground_share": 5.0}, "parameters.ground_share", "from 0 to 0.95"),
+        ("angle_scale", {"scale": -1.0}, "parameters.scale", "from -0.2 to 0.2"),
+        ("carcass_heat_sink", {"conductance": 10.0}, "parameters", "values of capacity"),
+        ("static_ageing", {"rate": 0.1}, "parameters", "values of dwell, slip_scale"),
+        ("load_transfer", {}, "id", "needs an attitude sensor"),
+    ],
+)
+def test_wrong_effects_are_refused(name: str, values: dict[str, float], key: str, expectation: str) -> None:
+    with pytest.raises(VehicleFileError) as caught:
+        from_mapping(with_effects(("yaw_inertia", {"inertia": 1.0}), (name, values)), FILE)
+    assert f"{FILE}: key 'effects[1].{key}': got " in str(caught.value)
+    assert expectation in str(caught.value)
+
+
+def test_an_effect_stands_once() -> None:
+    bias = ("slope_bias", {"torque": 1.0})
+    with pytest.raises(VehicleFileError, match=r"effects\[1\].id': got 'slope_bias', expected each effect once"):
+        from_mapping(with_effects(bias, bias), FILE)
+    offsets = [("pressure_offset", {line: 1e5}) for line in ("main_a", "main_b", "main_b")]
+    vehicle = from_mapping(with_effects(offsets[0], bias, offsets[1]), FILE)
+    assert [entry.id for entry in vehicle.effects] == ["pressure_offset", "slope_bias"]
+    assert vehicle.effects[0].parameters == {"main_a": 1e5, "main_b": 1e5}
+    with pytest.raises(VehicleFileError, match="each effect and line once"):
+        from_mapping(with_effects(*offsets), FILE)
+
+
+def test_effects_found_again_are_saved_once(tmp_path: Path) -> None:
+    entries = [
+        EffectEntry("end_stop", {"stiffness": 1e5, "engage_angle": 0.3}),
+        EffectEntry("pressure_offset", {"main_a": 1e5}),
+        EffectEntry("pressure_offset", {"main_b": 2e5}),
+        EffectEntry("end_stop", {"stiffness": 2e5, "engage_angle": 0.4}),
+    ]
+    save(from_mapping(SHEET, FILE).replace(effects=tuple(entries)), tmp_path / "copy.yaml")
+    saved = {entry.id: entry.parameters for entry in load(tmp_path / "copy.yaml").effects}
+    assert saved == {
+        "end_stop": {"stiffness": 2e5, "engage_angle": 0.4},
+        "pressure_offset": {"main_a": 1e5, "main_b": 2e5},
+    }
+
+
+def test_thermal_effects_need_rubber() -> None:
+    sheet = changed(JOINT, "effects", [{"id": "ambient_drift", "parameters": {"rate": 0.1}}])
+    with pytest.raises(VehicleFileError, match="section 'rubber'"):
+        from_mapping(sheet, FILE)
+
+
+def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
+    for effect in CATALOGUE.values():
+        for bound in ("low", "high"):
+            values = {p.name: p.unscaled(p.scaled(getattr(p, bound))) for p in effect.parameters}
+            if effect.per_line:
+                values = {"main_a": next(iter(values.values()))}
+            if effect.observable:
+                from_mapping(with_effects((effect.id, values)), FILE)
 
 
 def test_exponent_without_point_is_a_number(tmp_path: Path) -> None:
