@@ -23,7 +23,17 @@ T = TypeVar("T")
 
 
 class Loader(yaml.SafeLoader):
-    """SafeLoader that also reads 25.0e6 and 1e4 as numbers (YAML 1.2), as every engineer means them."""
+    """SafeLoader that also reads 25.0e6 and 1e4 as numbers (YAML 1.2), as every engineer means them, and refuses a key
+    that stands twice, of which only the last would count."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen = set()
+        for key, _ in node.value:
+            if (key.tag, str(key.value)) in seen and key.tag != "tag:yaml.org,2002:merge":
+                raise yaml.composer.ComposerError(None, None, f"the key '{key.value}' stands twice", key.start_mark)
+            seen.add((key.tag, str(key.value)))
+        return node
 
 
 Loader.add_implicit_resolver(

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
+from lugre_steering.schema import Reader
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -216,6 +217,15 @@ MISTAKES = [
     ("hydraulics.cylinders.left_main.knuckle_m", [0.0, 0.0], "away from the hinge"),
     ("hydraulics.cylinders.left_main.chassis_m", [1.0], "two coordinates"),
     ("sensors.pressure_reference", "vacuum", "gauge or absolute"),
+    ("coordinate", {"unit": "deg", "force_unit": "N m"}, "rad or m"),
+    ("coordinate", {"unit": "m"}, "'N', as the coordinate is in m"),
+    ("hydraulics.lines", ["main_a", "main_b", "aux_a", "aux_b", "tank"], "no line called tank"),
+    ("hydraulics.lines", ["main_a", "main_b", "aux_a", "aux_b", "main-a"], "the name of a ROS topic"),
+    ("topics", {"left": "steering left"}, "the name of a ROS topic"),
+    ("topics", {"pressure_prefix": "steering//"}, "the name of a ROS topic"),
+    ("topics", {"ambient_temperature": "/air/"}, "the name of a ROS topic"),
+    ("topics", {"left": "/joint_states", "right": "/joint_states", "left_joint": "a", "right_joint": "a"}, "another joint"),
+    ("track", {**SHEET["track"], "rollers": {"x_m": [0.0], "load_share": [1.0]}, "hinge_offset_m": 0.0}, "no arm"),
     ("sides", ["left", "left"], "left, right"),
     ("sides", "left", "a list"),
     ("contact", JOINT["contact"], "beside 'contact'"),
@@ -236,6 +246,35 @@ def test_mistakes_are_refused_with_file_key_value_and_expectation(key: str, valu
     shown = "nothing" if value in (REMOVE, None) else repr(value)[:30]
     if named == key and not isinstance(value, (list, dict)):
         assert shown in message
+
+
+def test_a_joint_is_told_of_its_own_section() -> None:
+    sheet = {**JOINT, "rubber": SHEET["rubber"], "initial": SHEET["initial"]}
+    with pytest.raises(VehicleFileError, match=r"'contact\.reference_temperature_degC': got 140"):
+        from_mapping(changed(sheet, "contact.reference_temperature_degC", 140.0), FILE)
+
+
+def test_names_that_ros_accepts_load() -> None:
+    topics = {"left": "/joint_states", "right": "/joint_states", "pressure_prefix": "~/p_", "ambient_temperature": "Air2"}
+    vehicle = from_mapping(changed(SHEET, "topics", topics), FILE)
+    assert [channel.topic for channel in vehicle.channels][1:3] == ["/joint_states", "~/p_main_a"]
+
+
+def test_a_key_that_stands_twice_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "v.yaml"
+    file.write_text(FILE.read_text().replace("  load_N:", "  load_N: 1.0\n  load_N:", 1))
+    with pytest.raises(VehicleFileError, match=r"v\.yaml: .*'load_N' stands twice.*line \d+"):
+        load(file)
+    file.write_text("a: &a {x: 1}\nb: {<<: *a, x: 2}\n")
+    assert Reader(file, VehicleFileError).load() == {"a": {"x": 1}, "b": {"x": 2}}
+
+
+def test_a_table_saved_by_a_spreadsheet_loads(tmp_path: Path) -> None:
+    rows = (CONFIG / "rubber_dma_10hz.csv").read_text().splitlines()
+    text = "\n".join(row for row in rows if not row.startswith("#"))
+    (tmp_path / "table.csv").write_text(text, encoding="utf-8-sig")
+    vehicle = from_mapping(changed(SHEET, "rubber.dma_csv", "table.csv"), tmp_path / "v.yaml")
+    assert vehicle.rubber == load(FILE).rubber
 
 
 def test_unreadable_files(tmp_path: Path) -> None:
