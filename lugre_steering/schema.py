@@ -23,7 +23,17 @@ T = TypeVar("T")
 
 
 class Loader(yaml.SafeLoader):
-    """SafeLoader that also reads 25.0e6 and 1e4 as numbers (YAML 1.2), as every engineer means them."""
+    """SafeLoader that also reads 25.0e6 and 1e4 as numbers (YAML 1.2), as every engineer means them, and refuses a key
+    that stands twice, of which only the last would count."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen = set()
+        for key, _ in node.value:
+            if (key.tag, str(key.value)) in seen and key.tag != "tag:yaml.org,2002:merge":
+                raise yaml.composer.ComposerError(None, None, f"the key '{key.value}' stands twice", key.start_mark)
+            seen.add((key.tag, str(key.value)))
+        return node
 
 
 Loader.add_implicit_resolver(
@@ -70,9 +80,7 @@ class Reader:
         fields = {item.name: item for item in dataclasses.fields(cls)}  # type: ignore[arg-type]
         for name in data:
             if name not in fields:
-                near = difflib.get_close_matches(str(name), fields, n=1, cutoff=0.5)
-                hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(sorted(fields))}"
-                raise self.fail(_join(key, name), data[name], f"no such key; {hint}")
+                raise self.fail(_join(key, name), data[name], f"no such key; {suggestion(str(name), sorted(fields))}")
         values: dict[str, Any] = {}
         for name, item in fields.items():
             path = _join(key, name)
@@ -112,6 +120,12 @@ class Reader:
         if not math.isfinite(number) or number < low or number > high or (open_low and number == low):
             raise self.fail(key, value, f"a finite number {'above' if open_low else 'from'} {low:g} to {high:g}")
         return number
+
+
+def suggestion(name: str, known: Sequence[str]) -> str:
+    """What was probably meant by an unknown name, or else all that it could have been."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known) or 'none'}"
 
 
 def _join(key: str, name: object) -> str:

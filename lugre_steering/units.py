@@ -108,8 +108,3 @@ _JOINT_TITLES = {
 def title(vehicle: Vehicle, effect: Effect) -> str:
     """The title of a catalogue entry in words that fit this vehicle: a single joint has no tracks and no kingpin."""
     return effect.title if vehicle.contact is None else _JOINT_TITLES.get(effect.id, effect.title)
-
-
-def coordinate_label(vehicle: Vehicle) -> str:
-    """'steering angle [rad]', 'position [m]'."""
-    return f"{vehicle.coordinate.name} [{vehicle.coordinate.unit}]"

@@ -10,23 +10,29 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.errors import LugreSteeringError, VehicleFileError
 from lugre_steering.recording import Channel, Kind
 from lugre_steering.resources import config_folder
-from lugre_steering.schema import Reader, positive, quantity
+from lugre_steering.schema import Reader, positive, quantity, suggestion
 
 SCHEMA = "lugre_steering/vehicle/1"
 SIDES = ("left", "right")
+UNITS = {"rad": "N m", "m": "N"}
+"""Units of the coordinate, each with that of its force: the program counts in these, so others would only mislabel."""
+_TOPIC = re.compile(r"(~?/)?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+"""Topic names that ROS accepts."""
 
 
 @dataclass(frozen=True)
@@ -294,7 +300,7 @@ def from_mapping(data: object, file: Path) -> Vehicle:
         raise reader.fail("schema", data.get("schema"), f"'{SCHEMA}'")
     vehicle = reader.build(Vehicle, _embed_tables(data, reader), "")
     _check(vehicle, reader)
-    return _with_pavement(vehicle, reader)
+    return _with_pavement(_with_effects(vehicle, reader), reader)
 
 
 def save(vehicle: Vehicle, path: str | Path) -> None:
@@ -306,10 +312,18 @@ def save(vehicle: Vehicle, path: str | Path) -> None:
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:
     """Plain data of a vehicle, ready for YAML or JSON."""
-    plain = _plain(vehicle)
+    plain = _plain(vehicle.replace(effects=_each_once(vehicle.effects)))
     assert isinstance(plain, dict)
     plain.setdefault("effects", [])
     return plain
+
+
+def _each_once(effects: tuple[EffectEntry, ...]) -> tuple[EffectEntry, ...]:
+    """Effects found again stand once, as a file must have them: later values replace earlier ones, other lines join."""
+    joined: dict[str, dict[str, float]] = {}
+    for entry in effects:
+        joined.setdefault(entry.id, {}).update(entry.parameters)
+    return tuple(EffectEntry(name, values) for name, values in joined.items())
 
 
 def _plain(value: Any) -> Any:
@@ -350,7 +364,7 @@ def _read_table(reader: Reader, key: str, name: object, columns: tuple[str, ...]
         raise reader.fail(key, name, "the path of a CSV file")
     path = reader.file.parent / name
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()  # spreadsheets begin with a byte order mark
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
         raise reader.fail(key, name, f"a readable CSV file ({path}: {error})") from error
     rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
@@ -407,11 +421,39 @@ def _check(vehicle: Vehicle, reader: Reader) -> None:
         raise fail("sensors.angle_from", vehicle.sensors.angle_from, expected)
     if vehicle.sensors.pressure_reference not in ("gauge", "absolute"):
         raise fail("sensors.pressure_reference", vehicle.sensors.pressure_reference, "gauge or absolute")
+    force_unit = UNITS.get(vehicle.coordinate.unit)
+    if force_unit is None:
+        raise fail("coordinate.unit", vehicle.coordinate.unit, " or ".join(UNITS))
+    if vehicle.coordinate.force_unit != force_unit:
+        expected = f"'{force_unit}', as the coordinate is in {vehicle.coordinate.unit}"
+        raise fail("coordinate.force_unit", vehicle.coordinate.force_unit, expected)
     if vehicle.hydraulics is not None:
         _check_hydraulics(vehicle, vehicle.hydraulics, reader)
+    _check_topics(vehicle, reader)
+
+
+def _check_topics(vehicle: Vehicle, reader: Reader) -> None:
+    topics = vehicle.topics
+    names = {f"topics.{key}": getattr(topics, key) for key in ("left", "right", "ambient_temperature")}
+    names["topics.pressure_prefix"] = topics.pressure_prefix + "line"
+    if vehicle.torque_sensor is not None:
+        names["torque_sensor.topic"] = vehicle.torque_sensor.topic
+    for i, line in enumerate(vehicle.hydraulics.lines if vehicle.hydraulics else ()):
+        names[f"hydraulics.lines[{i}]"] = topics.pressure_prefix + line
+    for key, name in names.items():
+        if not _TOPIC.fullmatch(name):
+            expected = "the name of a ROS topic: letters, digits, _ and /, no digit first in any part"
+            raise reader.fail(key, name.removesuffix("line") if key.endswith("prefix") else name, expected)
+    if (
+        set(vehicle.sides) == set(SIDES)
+        and vehicle.sensors.angle_from is None
+        and (topics.left, topics.left_joint) == (topics.right, topics.right_joint)
+    ):
+        raise reader.fail("topics.right_joint", topics.right_joint, "another joint than the left one on the same topic")
 
 
 def _check_track(vehicle: Vehicle, reader: Reader) -> None:
+    assert vehicle.axle is not None
     assert vehicle.track is not None
     assert vehicle.friction is not None
     rollers, fail = vehicle.track.rollers, reader.fail
@@ -433,6 +475,12 @@ def _check_track(vehicle: Vehicle, reader: Reader) -> None:
             pair = getattr(rollers.levers, item.name)
             if len(pair) != 2 or sum(pair) <= 0.0:
                 raise fail(f"track.rollers.levers.{item.name}", list(pair), "two distances that are not both zero")
+    # Imported late because the loads are those of a vehicle.
+    from lugre_steering.chain.loads import load_moment
+
+    if load_moment(vehicle.axle, vehicle.track) <= 0.0:
+        expected = "a loaded roller away from the hinge (or track.hinge_offset_m other than 0), else friction has no arm"
+        raise fail("track.rollers.x_m", list(rollers.x_m), expected)
     static, coulomb = vehicle.friction.static, vehicle.friction.coulomb
     if static is not None and coulomb is not None and static < coulomb:
         raise fail("friction.static", static, f"at least friction.coulomb ({coulomb:g})")
@@ -455,9 +503,10 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: Reader) -> None:
     if vehicle.initial is None:
         raise fail("initial", None, "this section (rubber needs its temperature at the start)")
     law = vehicle.friction or vehicle.contact
+    law_section = "friction" if vehicle.friction else "contact"
     for key, value in (
         ("initial.rubber_temperature_degC", vehicle.initial.rubber_temperature_degC),
-        ("friction.reference_temperature_degC", law.reference_temperature_degC if law else math.nan),
+        (f"{law_section}.reference_temperature_degC", law.reference_temperature_degC if law else math.nan),
     ):
         if rubber.dma is not None and not columns[0][0] <= value <= columns[0][-1]:
             raise fail(
@@ -469,6 +518,8 @@ def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: Reader) 
     fail = reader.fail
     if not hydraulics.lines or len(set(hydraulics.lines)) != len(hydraulics.lines):
         raise fail("hydraulics.lines", list(hydraulics.lines), "a list of distinct line names")
+    if "tank" in hydraulics.lines:
+        raise fail("hydraulics.lines", list(hydraulics.lines), "no line called tank: that is the chamber without pressure")
     if not hydraulics.cylinders:
         raise fail("hydraulics.cylinders", {}, "at least one cylinder")
     for name, cylinder in hydraulics.cylinders.items():
@@ -486,6 +537,56 @@ def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: Reader) 
                 raise fail(f"{key}.{pivot}", list(getattr(cylinder, pivot)), "two coordinates [x, y]")
         if math.hypot(*cylinder.knuckle_m) == 0.0 or cylinder.knuckle_m == cylinder.chassis_m:
             raise fail(f"{key}.knuckle_m", list(cylinder.knuckle_m), "a pivot away from the hinge and from chassis_m")
+
+
+def add_effect(
+    vehicle: Vehicle, added: EffectEntry, fail: Callable[[str, object, str], LugreSteeringError]
+) -> Vehicle:
+    """The vehicle with one more effect, checked against the catalogue; ``fail`` makes errors of key, value, expectation.
+
+    An effect stands once; one that acts per line may be given line by line.
+    """
+    effect = CATALOGUE.get(added.id)
+    if effect is None:
+        raise fail("id", added.id, f"an effect of the catalogue; {suggestion(added.id, list(CATALOGUE))}")
+    if effect.needs:
+        raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.needs}")
+    if effect.stage == "thermal" and vehicle.rubber is None:
+        raise fail("id", added.id, "a vehicle with the section 'rubber' for a thermal effect")
+    before = next((entry for entry in vehicle.effects if entry.id == added.id), None)
+    ranges = {p.name: (p.low, p.high) for p in effect.parameters}
+    if effect.per_line:
+        ranges = dict.fromkeys(vehicle.hydraulics.lines if vehicle.hydraulics else (), next(iter(ranges.values())))
+    if before is not None and (not effect.per_line or before.parameters.keys() & added.parameters.keys()):
+        raise fail("id", added.id, f"each effect{' and line' if effect.per_line else ''} once")
+    for name, value in added.parameters.items():
+        if name not in ranges:
+            what = "line" if effect.per_line else "parameter"
+            raise fail(f"parameters.{name}", value, f"no such {what}; {suggestion(name, list(ranges))}")
+        low, high = ranges[name]
+        # Fits work on scaled numbers, so a value at its bound comes back with a rounding error.
+        if not math.isclose(value, min(max(value, low), high), rel_tol=1e-9):
+            raise fail(f"parameters.{name}", value, f"a number from {low:g} to {high:g}")
+    # What may not be zero has no neutral value, so it cannot be left out.
+    missing = [key for key, (low, high) in ranges.items() if key not in added.parameters and not low <= 0.0 <= high]
+    if missing or not added.parameters:
+        raise fail("parameters", added.parameters, f"values of {', '.join(missing or ranges) or 'a pressure line'}")
+    if before is None:
+        return vehicle.replace(effects=(*vehicle.effects, added))
+    joined = EffectEntry(added.id, {**before.parameters, **added.parameters})
+    return vehicle.replace(effects=tuple(joined if entry is before else entry for entry in vehicle.effects))
+
+
+def _with_effects(vehicle: Vehicle, reader: Reader) -> Vehicle:
+    """The vehicle with its effects checked, each standing once."""
+    checked = vehicle.replace(effects=())
+    for i, entry in enumerate(vehicle.effects):
+        checked = add_effect(checked, entry, partial(_fail_in, reader, f"effects[{i}]"))
+    return checked
+
+
+def _fail_in(reader: Reader, section: str, key: str, value: object, expected: str) -> LugreSteeringError:
+    return reader.fail(f"{section}.{key}", value, expected)
 
 
 def pavements() -> dict[str, dict[str, Any]]:

@@ -15,8 +15,10 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
-from lugre_steering.vehicle import Vehicle, from_mapping, load, pavements, save
+from lugre_steering.schema import Reader
+from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FILE = CONFIG / "test_vehicle.yaml"
@@ -68,12 +70,85 @@ def test_round_trip_stands_alone(sheet: dict[str, Any], tmp_path: Path) -> None:
 
 
 def test_effects_and_provenance_survive(tmp_path: Path) -> None:
-    sheet = changed(SHEET, "effects", [{"id": "end_stop", "parameters": {"stiffness": 5e4}}])
+    sheet = changed(SHEET, "effects", [{"id": "end_stop", "parameters": {"stiffness": 5e4, "engage_angle": 0.3}}])
     sheet["provenance"] = {"bag": "a", "when": 3}
     vehicle = from_mapping(sheet, FILE)
     save(vehicle, tmp_path / "copy.yaml")
     assert load(tmp_path / "copy.yaml") == vehicle
-    assert vehicle.effects[0].parameters == {"stiffness": 5e4}
+    assert vehicle.effects[0].parameters == {"stiffness": 5e4, "engage_angle": 0.3}
+
+
+def with_effects(*entries: tuple[str, dict[str, float]]) -> dict[str, Any]:
+    return changed(SHEET, "effects", [{"id": name, "parameters": values} for name, values in entries])
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "key", "expectation"),
+    [
+        ("end_stp", {"stiffness": 1e5}, "id", "did you mean 'end_stop'"),
+        ("end_stop", {}, "parameters", "values of engage_angle"),
+        ("end_stop", {"stifness": 1e5}, "parameters.stifness", "did you mean 'stiffness'"),
+        ("end_stop", {"stiffness": -1e5, "engage_angle": 0.3}, "parameters.stiffness", "from 0 to"),
+        ("end_stop", {"stiffness": 1e5}, "parameters", "values of engage_angle"),
+        ("slope_bias", {}, "parameters", "values of torque"),
+        ("pressure_offset", {"main_x": 1e5}, "parameters.main_x", "no such line; did you mean 'main_"),
+        ("pressure_offset", {}, "parameters", "values of main_a"),
+        ("pressure_lag", {"tau": -1.0}, "parameters.tau", "from 0 to 2"),
+        ("heat_partition", {"ground_share": 5.0}, "parameters.ground_share", "from 0 to 0.95"),
+        ("angle_scale", {"scale": -1.0}, "parameters.scale", "from -0.2 to 0.2"),
+        ("carcass_heat_sink", {"conductance": 10.0}, "parameters", "values of capacity"),
+        ("static_ageing", {"rate": 0.1}, "parameters", "values of dwell, slip_scale"),
+        ("load_transfer", {}, "id", "needs an attitude sensor"),
+    ],
+)
+def test_wrong_effects_are_refused(name: str, values: dict[str, float], key: str, expectation: str) -> None:
+    with pytest.raises(VehicleFileError) as caught:
+        from_mapping(with_effects(("yaw_inertia", {"inertia": 1.0}), (name, values)), FILE)
+    assert f"{FILE}: key 'effects[1].{key}': got " in str(caught.value)
+    assert expectation in str(caught.value)
+
+
+def test_an_effect_stands_once() -> None:
+    bias = ("slope_bias", {"torque": 1.0})
+    with pytest.raises(VehicleFileError, match=r"effects\[1\].id': got 'slope_bias', expected each effect once"):
+        from_mapping(with_effects(bias, bias), FILE)
+    offsets = [("pressure_offset", {line: 1e5}) for line in ("main_a", "main_b", "main_b")]
+    vehicle = from_mapping(with_effects(offsets[0], bias, offsets[1]), FILE)
+    assert [entry.id for entry in vehicle.effects] == ["pressure_offset", "slope_bias"]
+    assert vehicle.effects[0].parameters == {"main_a": 1e5, "main_b": 1e5}
+    with pytest.raises(VehicleFileError, match="each effect and line once"):
+        from_mapping(with_effects(*offsets), FILE)
+
+
+def test_effects_found_again_are_saved_once(tmp_path: Path) -> None:
+    entries = [
+        EffectEntry("end_stop", {"stiffness": 1e5, "engage_angle": 0.3}),
+        EffectEntry("pressure_offset", {"main_a": 1e5}),
+        EffectEntry("pressure_offset", {"main_b": 2e5}),
+        EffectEntry("end_stop", {"stiffness": 2e5, "engage_angle": 0.4}),
+    ]
+    save(from_mapping(SHEET, FILE).replace(effects=tuple(entries)), tmp_path / "copy.yaml")
+    saved = {entry.id: entry.parameters for entry in load(tmp_path / "copy.yaml").effects}
+    assert saved == {
+        "end_stop": {"stiffness": 2e5, "engage_angle": 0.4},
+        "pressure_offset": {"main_a": 1e5, "main_b": 2e5},
+    }
+
+
+def test_thermal_effects_need_rubber() -> None:
+    sheet = changed(JOINT, "effects", [{"id": "ambient_drift", "parameters": {"rate": 0.1}}])
+    with pytest.raises(VehicleFileError, match="section 'rubber'"):
+        from_mapping(sheet, FILE)
+
+
+def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
+    for effect in CATALOGUE.values():
+        for bound in ("low", "high"):
+            values = {p.name: p.unscaled(p.scaled(getattr(p, bound))) for p in effect.parameters}
+            if effect.per_line:
+                values = {"main_a": next(iter(values.values()))}
+            if effect.observable:
+                from_mapping(with_effects((effect.id, values)), FILE)
 
 
 def test_exponent_without_point_is_a_number(tmp_path: Path) -> None:
@@ -142,6 +217,15 @@ MISTAKES = [
     ("hydraulics.cylinders.left_main.knuckle_m", [0.0, 0.0], "away from the hinge"),
     ("hydraulics.cylinders.left_main.chassis_m", [1.0], "two coordinates"),
     ("sensors.pressure_reference", "vacuum", "gauge or absolute"),
+    ("coordinate", {"unit": "deg", "force_unit": "N m"}, "rad or m"),
+    ("coordinate", {"unit": "m"}, "'N', as the coordinate is in m"),
+    ("hydraulics.lines", ["main_a", "main_b", "aux_a", "aux_b", "tank"], "no line called tank"),
+    ("hydraulics.lines", ["main_a", "main_b", "aux_a", "aux_b", "main-a"], "the name of a ROS topic"),
+    ("topics", {"left": "steering left"}, "the name of a ROS topic"),
+    ("topics", {"pressure_prefix": "steering//"}, "the name of a ROS topic"),
+    ("topics", {"ambient_temperature": "/air/"}, "the name of a ROS topic"),
+    ("topics", {"left": "/joint_states", "right": "/joint_states", "left_joint": "a", "right_joint": "a"}, "another joint"),
+    ("track", {**SHEET["track"], "rollers": {"x_m": [0.0], "load_share": [1.0]}, "hinge_offset_m": 0.0}, "no arm"),
     ("sides", ["left", "left"], "left, right"),
     ("sides", "left", "a list"),
     ("contact", JOINT["contact"], "beside 'contact'"),
@@ -162,6 +246,35 @@ def test_mistakes_are_refused_with_file_key_value_and_expectation(key: str, valu
     shown = "nothing" if value in (REMOVE, None) else repr(value)[:30]
     if named == key and not isinstance(value, (list, dict)):
         assert shown in message
+
+
+def test_a_joint_is_told_of_its_own_section() -> None:
+    sheet = {**JOINT, "rubber": SHEET["rubber"], "initial": SHEET["initial"]}
+    with pytest.raises(VehicleFileError, match=r"'contact\.reference_temperature_degC': got 140"):
+        from_mapping(changed(sheet, "contact.reference_temperature_degC", 140.0), FILE)
+
+
+def test_names_that_ros_accepts_load() -> None:
+    topics = {"left": "/joint_states", "right": "/joint_states", "pressure_prefix": "~/p_", "ambient_temperature": "Air2"}
+    vehicle = from_mapping(changed(SHEET, "topics", topics), FILE)
+    assert [channel.topic for channel in vehicle.channels][1:3] == ["/joint_states", "~/p_main_a"]
+
+
+def test_a_key_that_stands_twice_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "v.yaml"
+    file.write_text(FILE.read_text().replace("  load_N:", "  load_N: 1.0\n  load_N:", 1))
+    with pytest.raises(VehicleFileError, match=r"v\.yaml: .*'load_N' stands twice.*line \d+"):
+        load(file)
+    file.write_text("a: &a {x: 1}\nb: {<<: *a, x: 2}\n")
+    assert Reader(file, VehicleFileError).load() == {"a": {"x": 1}, "b": {"x": 2}}
+
+
+def test_a_table_saved_by_a_spreadsheet_loads(tmp_path: Path) -> None:
+    rows = (CONFIG / "rubber_dma_10hz.csv").read_text().splitlines()
+    text = "\n".join(row for row in rows if not row.startswith("#"))
+    (tmp_path / "table.csv").write_text(text, encoding="utf-8-sig")
+    vehicle = from_mapping(changed(SHEET, "rubber.dma_csv", "table.csv"), tmp_path / "v.yaml")
+    assert vehicle.rubber == load(FILE).rubber
 
 
 def test_unreadable_files(tmp_path: Path) -> None:

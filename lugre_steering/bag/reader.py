@@ -228,8 +228,8 @@ class Bag:
     def match(self, channels: Sequence[Channel]) -> dict[Channel, str]:
         """The recorded topic of each wanted channel; channels that the bag lacks are left out.
 
-        A relative name also matches with one namespace before it. A joint whose own topic is missing is looked for in
-        the other JointState topics (a shared ``/joint_states``).
+        A relative name also matches with one namespace before it. A joint whose own topic is missing or empty is looked
+        for in the other JointState topics (a shared ``/joint_states``).
         """
         result: dict[Channel, str] = {}
         for channel in channels:
@@ -237,9 +237,12 @@ class Bag:
             if topic is not None:
                 self._check_type(topic, MESSAGE_TYPE[channel.kind])
                 result[channel] = topic
-        missing = [c for c in channels if c.kind is Kind.ANGLE and c.joint and c not in result]
+        joints = [c for c in channels if c.kind is Kind.ANGLE and c.joint]
+        empty = self._empty_topics({result[c] for c in joints if c in result})
+        missing = [c for c in joints if result.get(c) is None or result[c] in empty]
         for channel, topic in self._shared_topics(missing).items():
-            statement = f"topic {channel.topic!r} is missing; joint {channel.joint!r} is read from {topic!r} instead"
+            state = "empty" if channel in result else "missing"
+            statement = f"topic {channel.topic!r} is {state}; joint {channel.joint!r} is read from {topic!r} instead"
             self._say("shared_topic", statement, topic)
             result[channel] = topic
         return result
@@ -264,13 +267,30 @@ class Bag:
             if connection.encoding != "cdr":
                 raise BagError(f"{self.path}: topic {topic!r} is encoded as {connection.encoding!r}, expected 'cdr'")
 
-    def _shared_topics(self, missing: Sequence[Channel]) -> dict[Channel, str]:
-        """Topics that carry joints whose own topic is missing, found by looking into the messages."""
-        states = {
+    def _joint_states(self) -> dict[int, str]:
+        """Connections that carry joint states, and their topics."""
+        return {
             k: c.topic
             for k, c in enumerate(self.connections)
             if _full_name(c.msgtype) == cdr.JOINT_STATE and c.encoding == "cdr"
         }
+
+    def _empty_topics(self, topics: set[str]) -> set[str]:
+        """Those of some JointState topics without a message; looked for only if another topic could replace them."""
+        states = self._joint_states()
+        own = {k for k, topic in states.items() if topic in topics}
+        empty = set(topics)
+        if not own or len(own) == len(states):
+            return set()
+        for messages in self.messages(own):
+            empty -= {states[int(k)] for k in np.unique(messages.connection)}
+            if not empty:
+                break
+        return empty
+
+    def _shared_topics(self, missing: Sequence[Channel]) -> dict[Channel, str]:
+        """Topics that carry joints whose own topic is missing or empty, found by looking into the messages."""
+        states = self._joint_states()
         if not missing or not states:
             return {}
         carriers: dict[str, set[str]] = {}
@@ -291,7 +311,7 @@ class Bag:
             topics = sorted(carriers.get(channel.joint, ()))
             if len(topics) > 1:
                 raise BagError(
-                    f"{self.path}: topic {channel.topic!r} is missing and joint {channel.joint!r} is in "
+                    f"{self.path}: topic {channel.topic!r} is missing or empty and joint {channel.joint!r} is in "
                     f"{', '.join(topics)}; expected exactly one topic with it"
                 )
             if topics:

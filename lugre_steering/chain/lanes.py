@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from lugre_steering.chain.contact import bristle, bristle_work, stribeck
-from lugre_steering.chain.heat import heat
+from lugre_steering.chain.heat import LONG, short_heat
 from lugre_steering.chain.step import Records, has_effects, torque_side
 from lugre_steering.recording import Array
 
@@ -63,7 +63,7 @@ def _block(b, rubber, time, theta, omega, torque, first, count):
             damping = sigma_1 * (omega[i] - abs(omega[i]) * z_next * stiffness / g)
             work = bristle_work(z, z_next, d_theta, g) + sigma_1 * omega[i] * (z_next - z)
             dissipated = max(work - 0.5 * stiffness * (z_next * z_next - z * z), 0.0)
-            b[_TEMPERATURE + j] = heat(
+            b[_TEMPERATURE + j] = short_heat(
                 b[_TEMPERATURE + j], dissipated, dt, b[_CAPACITY + j], b[_COOLING + j], b[_AIR + j]
             )
             b[_Z + j] = z_next
@@ -76,13 +76,16 @@ def torque_sets(parameters: Records, rubber: Array, time: Array, theta: Array, o
     """Torque [N m] (n, sets) of one track for each parameter record of ``parameters`` (sets,).
 
     ``rubber`` (rows, 2) for all sets or (sets, rows, 2). Same laws and numbers as ``torque_side`` to rounding.
-    Records with an effect or another Stribeck exponent than 2 go through ``torque_side``.
+    Records with an effect, another Stribeck exponent than 2 or a gap too long for ``short_heat`` go through
+    ``torque_side``.
     """
     sets = parameters.size
     tables = rubber[np.newaxis] if rubber.ndim == 2 else rubber
     torque = np.empty((time.size, sets))
     with_effects = np.array([has_effects(parameters[k : k + 1]) for k in range(sets)])
-    plain = (parameters["stribeck_exponent"] == 2.0) & ~with_effects
+    gap = float(np.diff(time).max(initial=0.0))
+    ordinary = 0.5 * parameters["cooling"] * gap / parameters["heat_capacity"] <= LONG
+    plain = (parameters["stribeck_exponent"] == 2.0) & ~with_effects & ordinary
 
     def block(first: int) -> None:
         count = min(LANES, sets - first)

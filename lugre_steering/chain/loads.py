@@ -1,13 +1,11 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Loads and geometry of one track: rollers, radii, ground pressure."""
+"""Loads and geometry of one track: rollers and radii."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import gamma
 
-from lugre_steering.errors import VehicleFileError
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Axle, Track
 
@@ -46,22 +44,3 @@ def roller_radii(track: Track) -> Array:
 def load_moment(axle: Axle, track: Track) -> float:
     """sum F_i r_i [N m]: friction torque per unit of friction coefficient."""
     return float(roller_loads(axle, track) @ roller_radii(track))
-
-
-def ground_pressure(x_m: Array, y_m: Array, peak_Pa: float, length_m: float, width_m: float, exponent: float) -> Array:
-    """Pressure under one roller [Pa]: p_max cos**n(pi x / L) (1 - 2 |y| / W) inside the footprint, 0 outside.
-
-    x, y [m] from the roller centre, broadcast together. Exponent n = 2 (soft) ... 4 (hard) (R; Keller and Arvidsson
-    2016 in words).
-    """
-    inside = (np.abs(x_m) <= 0.5 * length_m) & (np.abs(y_m) <= 0.5 * width_m)
-    along = np.cos(np.pi * np.clip(x_m / length_m, -0.5, 0.5)) ** exponent
-    return np.where(inside, peak_Pa * along * (1.0 - 2.0 * np.abs(y_m) / width_m), 0.0)
-
-
-def contact_length(load_N: float, peak_Pa: float, width_m: float, exponent: float) -> float:
-    """Length [m] of the footprint under one roller from load balance: load = p_max (W / 2) L mean(cos**n)."""
-    if peak_Pa <= 0.0:
-        raise VehicleFileError(f"peak ground pressure: got {peak_Pa:g} Pa, expected a positive value")
-    mean_cosine = float(gamma(0.5 * (exponent + 1.0)) / (np.sqrt(np.pi) * gamma(0.5 * exponent + 1.0)))
-    return load_N / (0.5 * peak_Pa * width_m * mean_cosine)

@@ -10,11 +10,10 @@ import numpy as np
 
 from lugre_steering.chain.model import build_model
 from lugre_steering.chain.step import Records, run_side
-from lugre_steering.effects import catalogue
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Motion
-from lugre_steering.vehicle import EffectEntry, Vehicle
+from lugre_steering.vehicle import EffectEntry, Vehicle, add_effect
 
 
 @dataclass(frozen=True)
@@ -47,31 +46,23 @@ def run(vehicle: Vehicle, motion: Motion) -> Truth:
 
 def with_effects(vehicle: Vehicle, texts: list[str]) -> Vehicle:
     """The vehicle with effects added, each written ``id:parameter=value,parameter=value`` (SI)."""
-    return vehicle.replace(effects=(*vehicle.effects, *(_effect(vehicle, text) for text in texts)))
+    for text in texts:
+        vehicle = _with_effect(vehicle, text)
+    return vehicle
 
 
-def _effect(vehicle: Vehicle, text: str) -> EffectEntry:
+def _with_effect(vehicle: Vehicle, text: str) -> Vehicle:
+    def fail(key: str, value: object, expected: str) -> DataError:
+        return DataError(f"effect '{text}': '{key.removeprefix('parameters.')}': got {value!r}, expected {expected}")
+
     name, _, rest = text.partition(":")
-    entry = catalogue.effect(name)
-    if entry.needs:
-        raise DataError(f"effect '{text}': cannot be simulated; it needs {entry.needs}")
-    ranges = {p.name: (p.low, p.high) for p in entry.parameters}
-    if entry.per_line:
-        ranges = dict.fromkeys(vehicle.hydraulics.lines if vehicle.hydraulics else (), next(iter(ranges.values())))
     values: dict[str, float] = {}
     for item in filter(None, rest.split(",")):
         key, _, number = item.partition("=")
-        if key not in ranges:
-            raise DataError(f"effect '{text}': no parameter '{key}'; {name} has {', '.join(ranges)}")
-        low, high = ranges[key]
+        if key in values:
+            raise fail(key, number, "each parameter once")
         try:
             values[key] = float(number)
-        except ValueError:
-            values[key] = np.nan
-        if not low <= values[key] <= high:
-            raise DataError(f"effect '{text}': '{key}': got '{number}', expected a number from {low:g} to {high:g}")
-    # What may not be zero has no neutral value, so it cannot be left out.
-    missing = [key for key, (low, high) in ranges.items() if key not in values and not low <= 0.0 <= high]
-    if missing or not values:
-        raise DataError(f"effect '{text}': lacks {', '.join(missing or ranges)}")
-    return EffectEntry(name, values)
+        except ValueError as error:
+            raise fail(key, number, "a number") from error
+    return add_effect(vehicle, EffectEntry(name, values), fail)

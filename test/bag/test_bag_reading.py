@@ -196,6 +196,19 @@ def test_namespace_and_shared_joint_states(tmp_path: Path) -> None:
         bag.match(CHANNELS)
 
 
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_an_empty_topic_does_not_hide_the_shared_one(tmp_path: Path, storage: str) -> None:
+    raw = make.joint_state(T0, [LEFT.joint, RIGHT.joint], [0.1, 0.2])
+    own = make.joint_state(T0, [RIGHT.joint], [0.3])
+    messages = [("/joint_states", make.JOINT_STATE, T0, raw), ("/" + RIGHT.topic, make.JOINT_STATE, T0, own)]
+    folder = make.write(tmp_path / "run", messages, storage, topics=[("/" + LEFT.topic, make.JOINT_STATE)])
+    with Bag(folder) as bag:
+        assert bag.match(CHANNELS) == {LEFT: "/joint_states", RIGHT: "/" + RIGHT.topic}
+        assert [f.statement.split(";")[0] for f in bag.findings] == [f"topic {LEFT.topic!r} is empty"]
+    recording = read_recording(folder, CHANNELS)
+    assert (recording.angle["left"].value, recording.angle["right"].value) == (0.1, 0.3)
+
+
 def test_ambiguous_namespace_is_refused(tmp_path: Path) -> None:
     messages = [(f"/{v}/{MAIN_A.topic}", make.FLUID_PRESSURE, T0 + 5, make.pressure(T0 + 5, 3e5)) for v in "ab"]
     with (
@@ -249,7 +262,7 @@ def test_late_messages_are_sorted_and_bad_ones_counted(tmp_path: Path) -> None:
         "duplicate_stamp": [make.joint_state(t[3], [LEFT.joint], [0.5])] * 2,
         "backward_stamp": [make.joint_state(T0 - 5 * 10**9, [LEFT.joint], [0.5])],
         "absurd_stamp": [make.joint_state(t[3] + 10**15, [LEFT.joint], [0.5])],
-        "zero_stamp": [make.joint_state(0, [LEFT.joint], [0.5])] * 3,
+        "zero_stamp": [make.joint_state(stamp, [LEFT.joint], [0.5]) for stamp in (0, 0, -(10**9))],
         "not_finite": [make.joint_state(t[3] + 1, [LEFT.joint], [v]) for v in (np.nan, np.inf, -np.inf)]
         + [make.joint_state(t[3] + 2, [LEFT.joint], [])],
         "absurd_value": [make.joint_state(t[3] + 3, [LEFT.joint], [v]) for v in (3.2, -1e300)],
@@ -282,6 +295,16 @@ def test_a_clock_set_back_is_not_interleaved(tmp_path: Path) -> None:
     assert len(inside) + rejected == 200
     assert (inside[:88] == 1e5).all()
     assert rejected >= 99
+
+
+def test_of_two_clocks_alike_in_number_one_is_kept(tmp_path: Path) -> None:
+    messages = []
+    for i in range(20):
+        stamp = T0 + i * 10**8 + (0 if i < 10 else 10**16)
+        messages.append(("/" + MAIN_A.topic, make.FLUID_PRESSURE, T0 + i * 10**8, make.pressure(stamp, 1e5)))
+    recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
+    assert len(recording.pressure["main_a"].value) == 10
+    assert recording.rejected == {"/" + MAIN_A.topic: {"absurd_stamp": 10}}
 
 
 def test_one_wild_stamp_does_not_outdate_the_rest(tmp_path: Path) -> None:

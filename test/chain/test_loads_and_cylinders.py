@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Roller loads, ground pressure and cylinder geometry against hand computation and numerical differentiation."""
+"""Roller loads and cylinder geometry against hand computation and numerical differentiation."""
 
 from __future__ import annotations
 
@@ -10,18 +10,9 @@ import math
 import numpy as np
 import pytest
 from chain_support import vehicle
-from scipy.integrate import dblquad
 
 from lugre_steering.chain.hydraulics import cylinder_length, gauge_offset, line_gains, moment_arm
-from lugre_steering.chain.loads import (
-    contact_length,
-    ground_pressure,
-    load_moment,
-    roller_loads,
-    roller_radii,
-    vertical_load,
-)
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.chain.loads import load_moment, roller_loads, roller_radii, vertical_load
 from lugre_steering.vehicle import Axle, Levers, Rollers, Track
 
 AXLE = Axle(80_000.0, 6.0, 0.09, 3.6, 2.1)
@@ -51,26 +42,6 @@ def test_shares_radii_and_moment() -> None:
     np.testing.assert_allclose(roller_loads(AXLE, t), [11_500.0, 34_500.0])
     np.testing.assert_allclose(roller_radii(t), [0.5, 0.5])
     assert load_moment(AXLE, t) == pytest.approx(23_000.0)
-
-
-@pytest.mark.parametrize("exponent", [2.0, 3.0, 4.0])
-def test_ground_pressure_integrates_to_the_load(exponent: float) -> None:
-    load, peak, width = 11_000.0, 9e5, 0.45
-    length = contact_length(load, peak, width, exponent)
-
-    def pressure(y: float, x: float) -> float:
-        return float(ground_pressure(np.array(x), np.array(y), peak, length, width, exponent))
-
-    quarter, _ = dblquad(pressure, 0.0, length / 2, 0.0, width / 2)
-    assert 4.0 * quarter == pytest.approx(load, rel=1e-6)
-    assert pressure(0.0, 0.0) == peak
-    assert pressure(0.0, 0.51 * length) == 0.0
-    assert pressure(0.51 * width, 0.0) == 0.0
-
-
-def test_no_pressure_is_refused() -> None:
-    with pytest.raises(VehicleFileError, match="got 0 Pa"):
-        contact_length(1e4, 0.0, 0.4, 3.0)
 
 
 def test_moment_arm_is_the_derivative_of_the_length() -> None:

@@ -15,6 +15,7 @@ from reference_model import ReferenceTrack, reference_torque
 from scipy.integrate import solve_ivp, trapezoid
 
 from lugre_steering.bench.kernel_c import CLoop
+from lugre_steering.chain.heat import heat
 from lugre_steering.chain.lanes import LANES, torque_sets
 from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.step import new_state, run_side, torque_side
@@ -150,6 +151,18 @@ def test_cooling_is_the_exponential() -> None:
     np.testing.assert_allclose(out["temperature"], expected, rtol=1e-7)
 
 
+@pytest.mark.parametrize("gap", [60.0, 600.0, 3600.0, 12 * 3600.0])
+def test_a_long_gap_is_the_exponential_too(gap: float) -> None:
+    p, rubber = baseline()
+    p["rubber_temperature"] = 60.0
+    time, still = np.array([0.0, gap]), np.zeros(2)
+    rate = p["cooling"][0] / p["heat_capacity"][0]
+    expected = 15.0 + 45.0 * np.exp(-rate * gap)
+    assert run_side(p, rubber, time, still, still, still)["temperature"][-1] == pytest.approx(expected, abs=0.02)
+    warmed = heat(60.0, 1e6, gap, p["heat_capacity"][0], p["cooling"][0], 15.0)
+    assert warmed - expected == pytest.approx(1e6 / gap / p["cooling"][0] * (1.0 - np.exp(-rate * gap)), rel=1e-3)
+
+
 steps = st.lists(
     st.tuples(st.floats(-0.6, 0.6), st.floats(0.002, 0.2)), min_size=2, max_size=40
 )  # rate [rad/s] and duration [s] of each sample
@@ -222,7 +235,8 @@ def test_original_lugre_is_the_frozen_temperature() -> None:
     assert np.all(out["temperature"] == p["rubber_temperature"][0])
 
 
-def test_lanes_equal_the_scalar_path() -> None:
+@pytest.mark.parametrize("gap", [0.0, 7200.0])
+def test_lanes_equal_the_scalar_path(gap: float) -> None:
     p, rubber = baseline()
     sets = LANES + 7
     many = np.repeat(p, sets)
@@ -233,6 +247,7 @@ def test_lanes_equal_the_scalar_path() -> None:
     many["initial_bristle"] = rng.uniform(-0.05, 0.05, sets)
     many["heat_capacity"][5] = np.inf
     time, theta, omega, alpha = swing(20.0, 0.01)
+    time[1500:] += gap
     for tables in (rubber, np.stack([rubber * (1.0 + 0.01 * k) for k in range(sets)])):
         together = torque_sets(many, tables, time, theta, omega)
         for k in range(sets):

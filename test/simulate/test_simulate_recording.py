@@ -155,6 +155,7 @@ def test_an_effect_of_the_vehicle_acts_on_the_torque() -> None:
         "wear_polishing:amount=0.1",
         "load_transfer:x=1",
         "pressure_offset:no_line=1",
+        "slope_bias:torque=1,torque=2",
         ":",
     ],
 )
