@@ -394,7 +394,8 @@ class _Conclusion:
             keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
             if candidate.effect.per_line:
                 keep = {candidate.line: float(values[candidate.free[0]])}
-            entries.append(EffectEntry(candidate.effect.id, keep))
+            if keep:
+                entries.append(EffectEntry(candidate.effect.id, keep))
         provenance = {
             "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
             "heldout_rmse_Nm": round(verify.rmse(problem, whole, self.roles.held), 3),

@@ -124,24 +124,10 @@ def search(
             scores = _always(scores)
         else:
             first_scores = tuple(scores)
-        shortlist = choose(scores, samples)
-        if not shortlist:
+        trials = _tried(problem, weight, current, scores, samples, progress)
+        if not trials:
             break
-        trials = []
-        for score in shortlist:
-            progress(f"fitting {score.candidate.label}")
-            trials.append(_everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
-        before = cost(problem, current, weight)
-        trials = _ranked(trials, before)
-        trials[: PROMISING[0]] = [_late(problem, weight, current, trial, scores) for trial in trials[: PROMISING[0]]]
-        trials = _ranked(trials, before)
-        if _timed(trials[0]):
-            trials = _ranked([_late(problem, weight, current, trial, scores) for trial in trials], before)
-        close = sum(trial.cost < trials[0].cost + CLOSE * (before - trials[0].cost) for trial in trials)
-        promising = int(np.clip(close, *PROMISING))
-        trials[:promising] = [deepen(problem, weight, current, trial, scores) for trial in trials[:promising]]
-        trials = _ranked(trials, before)
-        best = trials[0]
+        best, before = trials[0], cost(problem, current, weight)
         # A trial may have led the calibration out of a local minimum: then the gain is not the effect's, so look again.
         again = fit(problem, weight, current.effects, best.fit.x, linearisations=12)
         regained = before - cost(problem, again, weight)
@@ -170,10 +156,7 @@ def search(
         if best.cost - samples < OWN_ERROR * samples:
             break
     kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + noise.slow_doubt)
-    final, found = (steps[kept - 1][0], [item for _, item, _ in steps[:kept]]) if kept else (baseline, [])
-    for index in range(kept):
-        progress(f"rivals of {found[index].score.candidate.label}")
-        final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples)
+    final, found = _confirmed(problem, noise, weight, split, baseline, steps[:kept], samples, progress)
     pattern = strongest(problem, baseline, weight) if excess > PATTERN_EXCESS * samples else None
     if pattern is not None and found:
         named = [cost(problem, steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
@@ -184,6 +167,38 @@ def search(
         baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), bool(found) or not steps,
         first_scores, tuple(all_trials), pattern,
     )  # fmt: skip
+
+
+def _tried(
+    problem: Problem, weight: Array, current: Fit, scores: Sequence[Score], samples: float, progress: Callable[[str], None]
+) -> list[Trial]:
+    """One round: the shortlist fitted, what leads it also from an instant on and then with care; best first."""
+    before = cost(problem, current, weight)
+    trials = []
+    for score in choose(scores, samples):
+        progress(f"fitting {score.candidate.label}")
+        trials.append(_everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
+    trials = _ranked(trials, before)
+    trials[: PROMISING[0]] = [_late(problem, weight, current, trial, scores) for trial in trials[: PROMISING[0]]]
+    trials = _ranked(trials, before)
+    if trials and _timed(trials[0]):
+        trials = _ranked([_late(problem, weight, current, trial, scores) for trial in trials], before)
+    close = sum(trial.cost < trials[0].cost + CLOSE * (before - trials[0].cost) for trial in trials)
+    promising = int(np.clip(close, *PROMISING))
+    trials[:promising] = [deepen(problem, weight, current, trial, scores) for trial in trials[:promising]]
+    return _ranked(trials, before)
+
+
+def _confirmed(
+    problem: Problem, noise: Noise, weight: Array, split: Split, baseline: Fit, steps: Sequence[tuple[Fit, Found, float]],
+    samples: float, progress: Callable[[str], None],
+) -> tuple[Fit, list[Found]]:
+    """The steps that stand, each effect held against its rivals in the final model."""
+    final, found = steps[-1][0] if steps else baseline, [item for _, item, _ in steps]
+    for index in range(len(found)):
+        progress(f"rivals of {found[index].score.candidate.label}")
+        final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples)
+    return final, found
 
 
 def _foreign(with_pattern: float, named: Sequence[float], start: float) -> bool:

@@ -63,12 +63,13 @@ class Job:
 
 
 def source_version() -> str:
-    """Hash of the code that decides the outcome of a case: everything but reports, scores and shells."""
-    aside = {PACKAGE / "report", PACKAGE / "live", PACKAGE / "bench"}
-    scoring = {PACKAGE / "cli.py", *(PACKAGE / "proof" / f"{n}.py" for n in ("scoreboard", "table", "command", "peers"))}
+    """Hash of the code that decides the outcome of a case: what a diagnosis and its recordings need, not reports, scores and shells."""
+    aside = {PACKAGE / folder for folder in ("report", "live", "bench", "calibration", "importing")}
+    beside = {PACKAGE / f"{name}.py" for name in ("cli", "estimator", "online", "replay")}
+    scoring = {PACKAGE / "proof" / f"{name}.py" for name in ("scoreboard", "table", "command", "peers")}
     digest = hashlib.sha256()
     for file in sorted(PACKAGE.rglob("*.py")):
-        if file not in scoring and not aside.intersection(file.parents):
+        if file not in beside | scoring and not aside.intersection(file.parents):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 
