@@ -46,8 +46,8 @@ PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
 MEMORY = 4.0
 """Samples that count as one, roughly: errors have a memory."""
 TRIAL_TOLERANCE = 1e-4
-SURE_SIGMA, EARNED = 4.0, 10.0
-"""Standard deviations, and fall of the cost, that keep an optional part of a law."""
+SURE_SIGMA = 4.0
+"""Standard deviations that keep an optional part of a law, or as much for each of several that only matter together."""
 TIE_T = 2.5
 TIE_MISFIT, TIE_ENERGY = 0.5, 0.02
 """A tied rival may leave more than the best by so much of what the best itself leaves, and of the noise energy."""
@@ -440,12 +440,12 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
         for dropped in (weak, weak[:1]) if len(weak) > 1 else (weak,):
             leaner = _without(problem, weight, result, values, dropped)
             after = cost(problem, leaner, weight)
-            if after < left + EARNED * misfit * len(dropped):
+            if after < left + SURE_SIGMA**2 * MEMORY * misfit * len(dropped):
                 break
         else:
             break
         result, left, kept = leaner, after, [name for name in kept if name not in dropped]
-    return Trial(trial.score, result, left) if left < trial.cost - EARNED * misfit * len(kept) else trial
+    return Trial(trial.score, result, left) if left < trial.cost else trial
 
 
 def _weak(result: Fit, values: Values, optional: Sequence[str], misfit: float) -> list[str]:

@@ -224,7 +224,7 @@ def test_two_parts_of_a_law_that_do_the_same_work_are_not_both_dropped(problem: 
     score = Score(plain[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     result = fit(hidden, weight(hidden), [plain])
     refined = name.refine(hidden, weight(hidden), name.Trial(score, result, name.cost(hidden, result, weight(hidden))))
-    assert refined.cost < 1.01 * hidden.valid.sum()
+    assert refined.cost < 1.02 * hidden.valid.sum()  # without either 1.07
     # Where the law is plain, nothing is added to it.
     hidden = with_torque(problem, problem.predict_all(problem.start(), [plain]))
     result = fit(hidden, weight(hidden), [plain])
