@@ -150,7 +150,8 @@ class Problem:
                 else:
                     values[field] = old * float(np.exp(change))
         if "static_torque" in values:
-            values["static_torque"] = max(values["static_torque"], 0.3 * values["coulomb_torque"])
+            coulomb = values.get("coulomb_torque", float(record["coulomb_torque"]))
+            values["static_torque"] = max(values["static_torque"], 0.3 * coulomb)
         return values
 
     def gain(self, x: Array) -> float:
