@@ -359,11 +359,12 @@ def test_the_size_of_a_skew(skew_s: float, sound: Recording) -> None:
     assert seconds == pytest.approx(abs(skew_s), abs=0.04)
 
 
-def test_one_angle_in_degrees_that_reading_refused(sound: Recording) -> None:
+@pytest.mark.parametrize("prefix", ["", "/", "/robot/"])
+def test_one_angle_in_degrees_that_reading_refused(prefix: str, sound: Recording) -> None:
     """Reading leaves out angles beyond half a turn; what is left looks small, the count does not."""
     degrees = scaled(180.0 / math.pi)(sound.angle["left"])
     keep = np.abs(degrees.value) <= math.pi
-    rejected = {LEFT: {"absurd_value": int((~keep).sum())}}
+    rejected = {prefix + LEFT: {"absurd_value": int((~keep).sum())}}
     bad = replace(angle("left", lambda s: Signal(s.time_s[keep], degrees.value[keep]))(sound), rejected=rejected)
     quality = inspect(bad, VEHICLE)
     assert ("unit_suspect", LEFT) in names(quality.blocking)
@@ -391,6 +392,28 @@ def test_what_reading_found_is_kept(sound: Recording) -> None:
     assert names(found) == [("damaged_bag", ""), ("rejected_samples", LEFT)]
     assert "5 messages" in found[1].statement
     assert "3 not finite" in found[1].statement
+
+
+def test_time_without_memory_of_friction_is_counted_once(sound: Recording) -> None:
+    """A logger that drops 0.4 s of every 2 s: the next gap comes before friction has forgotten the last one."""
+    holes: Edit = lambda s: Signal(s.time_s[s.time_s % 2.0 > 0.4], s.value[s.time_s % 2.0 > 0.4])  # noqa: E731
+    findings = inspect(angle("left", holes)(angle("right", holes)(sound)), VEHICLE).findings
+    lost = [f for f in findings if f.finding == "friction_memory_lost"]
+    assert lost
+    for finding in lost:
+        ends = np.array(finding.intervals_s)
+        assert (ends[1:, 0] > ends[:-1, 1]).all()
+        said = float(finding.statement.split("not used for ")[1].split(" s")[0])
+        assert said <= sound.angle["left"].time_s[-1]
+
+
+def test_a_slow_logger_has_no_gaps(sound: Recording) -> None:
+    slow: Edit = lambda s: Signal(s.time_s[::100], s.value[::100])  # noqa: E731
+    every = pressure(slow, *LINES)(angle("left", slow)(angle("right", slow)(sound)))
+    assert np.median(np.diff(every.angle["left"].time_s)) > 0.5
+    quality = inspect(every, VEHICLE)
+    assert not [f for f in quality.findings if f.finding in ("friction_memory_lost", "dropout")]
+    assert quality.recording.pressure["main_a"].time_s.size == every.pressure["main_a"].time_s.size
 
 
 def test_rates_go_with_their_angles(sound: Recording) -> None:
