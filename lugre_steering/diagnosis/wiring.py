@@ -33,6 +33,8 @@ GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
 """A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
+WEAK_BETTER = 0.8
+"""The same for the unit of a line that hardly works, whose magnitude speaks too."""
 TIE = 1.15
 OPPOSED = -0.5
 """Correlation of measured and nominal torque, with negative work, that is a flipped sign however poor the model."""
@@ -168,25 +170,24 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     mirrored = _mirrored(vehicle, run)
     if mirrored and as_is <= GOOD:
         return _noted(vehicle, _exchanged_angles(vehicle), ".")
-    single = list(_hypotheses(vehicle, run, model, 1))
-    if as_is > GOOD:
-        single += _angle_units(recording, vehicle, model)
+    undone = list(_hypotheses(vehicle, run, model, 1))
+    single = [*undone, *(_angle_units(recording, vehicle, run, model) if as_is > GOOD else ())]
     convincing = [h for h in single if h.error < min(GOOD, h.better * as_is)]
     if as_is > GOOD:
         needed = BETTER * min([as_is, *(h.error for h in single)])
         convincing = [h for h in _hypotheses(vehicle, run, model, 2) if h.error < min(GOOD, needed)] or convincing
     if not convincing and mirrored and correlation > 0.0:
         return _noted(vehicle, _exchanged_angles(vehicle), ".")
+    tiny = float(np.std(run.measured)) < TINY * float(np.std(total))
     if not convincing:
         work = float(np.sum((run.measured * run.omega.mean(axis=0))[run.valid]))
         opposed = correlation < OPPOSED and work < 0.0
-        tiny = float(np.std(run.measured)) < TINY * float(np.std(total))
         poor = "sign_flipped" if opposed else "unit_suspect" if tiny else ""
-        convincing = [h for h in single if h.faults[0].finding == poor and h.error < as_is]
+        convincing = [h for h in undone if h.faults[0].finding == poor and h.error < as_is]
         if abs(correlation) < UNLIKE:  # which channel it is, an error that stays poor does not tell
             convincing = [h for h in convincing if h.topics == max(other.topics for other in convincing)]
     if not convincing:
-        return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE else ()
+        return _unlike(vehicle, correlation) if tiny or abs(correlation) < UNLIKE else ()
     best = min(h.error for h in convincing)
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
@@ -305,18 +306,27 @@ def _units_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Array, f
     for unit, factor in PRESSURE_UNITS.items():
         statement = f"probably in {unit} (multiply by {factor:g})"
         every = _Fault("unit_suspect", tuple(topics), f"{', '.join(topics)}: {statement}")
-        yield (every,), factor * run.pressure, BETTER
+        if _plausible(vehicle, factor * float(highest.max())):
+            yield (every,), factor * run.pressure, BETTER
         for i, (topic, high) in enumerate(zip(topics, highest, strict=True)):
-            if 0.01 < factor * high / vehicle.sensors.pressure_range_Pa < 1.1:
+            if _plausible(vehicle, factor * float(high)):
                 pressure = run.pressure.copy()
                 pressure[i] *= factor
-                # A line that hardly works in this recording changes little, but its magnitude already speaks.
-                better = 1.0 if high < TINY * np.median(highest) else BETTER
+                # A line that hardly works in this recording changes less, but its magnitude speaks too.
+                better = WEAK_BETTER if high < TINY * np.median(highest) else BETTER
                 yield (_Fault("unit_suspect", (topic,), f"{topic}: {statement}"),), pressure, better
 
 
-def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterator[_Hypothesis]:
-    """Angles in another unit, too small to see it by magnitude: smoothed again, since their noise scales with them."""
+def _plausible(vehicle: Vehicle, highest_Pa: float) -> bool:
+    """Whether this may be the highest pressure of a recording: one that the sensor can show, and not next to nothing."""
+    return 0.01 < highest_Pa / vehicle.sensors.pressure_range_Pa < 1.1
+
+
+def _angle_units(recording: Recording, vehicle: Vehicle, as_is: Run, model: Model) -> Iterator[_Hypothesis]:
+    """Angles in another unit, too small to see it by magnitude: smoothed again, since their noise scales with them.
+
+    None that would break a steering geometry which the angles obey as they are.
+    """
     unit, factor = _foreign_unit(vehicle)
     topics = _topics(vehicle, Kind.ANGLE)
     sensors = tuple(dict.fromkeys(topics.values()))
@@ -326,6 +336,8 @@ def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterat
             for side, s in recording.angle.items()
         }
         run = prepare(replace(recording, angle=scaled), vehicle)
+        if _off_geometry(vehicle, as_is) < GEOMETRY_RAD < _off_geometry(vehicle, run):
+            continue
         statement = f"{' and '.join(named)}: probably in {unit} (multiply by {factor:.6g})"
         error = _error(run, run.measured, _torques(model, run).sum(axis=0))
         yield _Hypothesis((_Fault("unit_suspect", named, statement),), error)
@@ -344,13 +356,20 @@ def _mirrored(vehicle: Vehicle, run: Run) -> bool | None:
     """
     if vehicle.axle is None or not _both_tracks(vehicle):
         return None
-    left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
-    t, ratio = np.tan(left), vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
-    own = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
-    other = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 - ratio * t)) ** 2)))
+    own, other = _off_geometry(vehicle, run), _off_geometry(vehicle, run, -1.0)
     if max(own, other) < GEOMETRY_RAD or GEOMETRY_RATIO * min(own, other) > max(own, other):
         return None
     return other < own
+
+
+def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:
+    """Root mean square [rad] by which the angles miss the steering geometry (``sense`` -1: of the mirrored vehicle); zero
+    where there is none to obey."""
+    if vehicle.axle is None or not _both_tracks(vehicle):
+        return 0.0
+    left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
+    t, ratio = np.tan(left), sense * vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
+    return float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
 
 
 def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:

@@ -28,6 +28,7 @@ from lugre_steering.diagnosis.quality import inspect
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder
+from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.vehicle import Contact, TorqueSensor, Vehicle
@@ -383,6 +384,37 @@ def test_small_angles_in_degrees() -> None:
     degrees = scaled(180.0 / math.pi)
     quality = inspect(angle("left", degrees)(angle("right", degrees)(recording)), VEHICLE)
     assert names(quality.findings) == [("unit_suspect", f"{LEFT}, {RIGHT}")]
+
+
+@pytest.mark.parametrize("level_Pa", [0.0, 7e5])
+def test_a_torque_that_never_comes_names_no_unit(level_Pa: float, sound: Recording) -> None:
+    """A pump that is off: noise of the sensors about zero or a level, and steering by hand."""
+    random = np.random.default_rng(4)
+    idle: Edit = lambda s: Signal(s.time_s, level_Pa + 1.5e4 * random.standard_normal(s.time_s.size))  # noqa: E731
+    quality = inspect(pressure(idle, *LINES)(sound), VEHICLE)
+    assert [f.finding for f in quality.findings] == ["wiring_suspect"]
+    assert not quality.blocking
+
+
+def turned_once(*effects: str) -> Recording:
+    """Made by a turn to one side against hidden effects, with lines that idle at no pressure."""
+    turn = Manoeuvre("turn", "", (Hold(2.0), Sweep(28.0, 6.0, 3.0)))
+    made = simulate(plant.with_effects(VEHICLE, effects), motion_of(turn, VEHICLE), sensing_of(VEHICLE))
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    lines = {line: Signal(signals[line].time_s, signals[line].value - 7e5) for line in LINES}
+    return Recording("turn", 0, {side: signals[side] for side in VEHICLE.sides}, lines)
+
+
+def test_an_idle_line_is_in_no_other_unit_for_a_little_less_error() -> None:
+    recording = turned_once("end_stop:stiffness=1.7e5,engage_angle=0.4")
+    little = pressure(lambda s: Signal(s.time_s, 2e-4 * recording.pressure["main_b"].value), "aux_a")(recording)
+    assert inspect(little, VEHICLE).findings == ()
+
+
+def test_angles_that_obey_the_geometry_are_in_no_other_unit(sound: Recording) -> None:
+    """All pressures too low by the same factor look like the torque of one track."""
+    for finding in inspect(pressure(scaled(0.3), *LINES)(sound), VEHICLE).blocking:
+        assert "joint_state" not in finding.topic
 
 
 def test_what_reading_found_is_kept(sound: Recording) -> None:
