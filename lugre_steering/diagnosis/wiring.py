@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -22,6 +22,7 @@ from lugre_steering.chain.hydraulics import line_gains
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_side
 from lugre_steering.diagnosis.dataset import Run, angle_noise, prepare
+from lugre_steering.diagnosis.problem import lagged
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
@@ -52,14 +53,17 @@ MIRROR = (
     "More than one wiring fault is possible: of exchanged angle sensors, all angle signs flipped and the lines of every circuit "
     "exchanged, any one looks like the other two together."
 )
-SKEW_S = 0.1
-"""Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted."""
+SKEW_S = 0.12
+"""Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted; friction may look like 0.1 s."""
 SKEW_RANGE_S = 5.0
 SKEW_ENERGY = 0.5
+SKEW_HELD = 0.8
+"""Share of the nominal torque's slope energy that must stay in the stretch that is shifted."""
 SKEW_RATE_HZ = 50.0
 SOFTER = (0.5, 0.7, 1.0, 1.4)
 PLAY = (0.0, 0.1, 0.3, 0.6)
-"""Stiffness factors and backlash (in presliding lengths) that may explain a late torque in place of a clock."""
+LAG_S = (0.1, 0.2, 0.3, 0.5)
+"""Stiffness factors, backlash (in presliding lengths) and lags that may explain a late torque in place of a clock."""
 DRIFT_SHARE = 0.02
 """Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
 TINY = 1e-2
@@ -373,44 +377,51 @@ def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:
 
 
 def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
-    """Torque stamped late or early against the angles, by more than softer springs or play could imitate.
+    """Torque stamped late or early against the angles, by more than softer springs, play or a slow sensor could imitate.
 
-    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness and play in SOFTER and PLAY. A
-    clock shifts starts and stops alike at any rate; play and compliance do not, so one of the variants fits better there.
+    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness, play and lag in SOFTER, PLAY and
+    LAG_S. A clock shifts starts and stops alike at any rate; the others do not, so one of the variants fits better there.
     """
     model = build_model(vehicle)
-    stride = max(1, round(1.0 / SKEW_RATE_HZ / (run.time[1] - run.time[0])))
-    dt = stride * (run.time[1] - run.time[0])
-    reach = int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt)
-    if reach * dt < 2.0 * SKEW_S:
-        return
+    step = float(run.time[1] - run.time[0])
+    stride = max(1, round(1.0 / SKEW_RATE_HZ / step))
+    dt = stride * step
 
     def slope(torque: Array) -> Array:
         return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
 
+    nominal = np.concatenate([[0.0], np.cumsum(slope(_torques(model, run).sum(axis=0)) ** 2)])
+    ends = np.arange(int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt) + 1)
+    # Without the strongest slopes in what is shifted, weak ones that hidden physics changes would decide.
+    reach = int(np.flatnonzero(nominal[nominal.size - 1 - ends] - nominal[ends] >= SKEW_HELD * nominal[-1])[-1])
+    if reach * dt < 2.0 * SKEW_S:
+        return
     measured = slope(run.measured)
     window = measured.size - 2 * reach
     energy = np.convolve(measured**2, np.ones(window), mode="valid")
     presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
 
-    def match(softer: float, play: float) -> tuple[float, float, float]:
-        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the model."""
-        trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
-        for record in trial.parameters:
-            record["sigma_0"] *= softer
-            record["backlash_width"] += play * presliding
-        expected = slope(_torques(trial, run).sum(axis=0))[reach : reach + window]
+    def match(torque: Array) -> tuple[float, float, float]:
+        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the torque."""
+        expected = slope(torque)[reach : reach + window]
         power = max(float(np.sum(expected**2)), 1e-30)
         overlap = correlate(measured, expected, mode="valid")
         gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
         left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(energy, 1e-30)
-        return float(left.min()), float((left.argmin() - reach) * dt), float(left[reach])
+        return float(left.min()), (_lowest(left) - reach) * dt, float(left[reach])
 
-    if abs(match(1.0, 0.0)[1]) <= SKEW_S:
+    if abs(match(_torques(model, run).sum(axis=0))[1]) <= SKEW_S:
         return
-    matches = [match(softer, play) for softer in SOFTER for play in PLAY]
+    matches, unshifted = [], np.inf
+    for softer, play in product(SOFTER, PLAY):
+        trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
+        for record in trial.parameters:
+            record["sigma_0"] *= softer
+            record["backlash_width"] += play * presliding
+        torque = _torques(trial, run).sum(axis=0)
+        matches.append(match(torque))
+        unshifted = min(unshifted, matches[-1][2], *(match(lagged(torque, step, lag))[2] for lag in LAG_S))
     best, shift, _ = min(matches)
-    unshifted = min(left for _, _, left in matches)
     if abs(shift) > SKEW_S and best < min(SKEW_ENERGY * unshifted, GOOD**2):
         kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
         topics = ", ".join(_topics(vehicle, kind).values())
@@ -420,6 +431,15 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
             f"{topics}: stamped {abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
             f"{unshifted:.2f} as recorded, {best:.2f} shifted); synchronise the clocks of the devices",
         )  # fmt: skip
+
+
+def _lowest(values: Array) -> float:
+    """Place of the lowest of ``values`` (n,), between samples by a parabola through it and its neighbours."""
+    at = int(values.argmin())
+    if not 0 < at < values.size - 1:
+        return float(at)
+    before, here, after = (float(value) for value in values[at - 1 : at + 2])
+    return at + 0.5 * (before - after) / max(before - 2.0 * here + after, 1e-30)
 
 
 def _drifts(vehicle: Vehicle, run: Run) -> Iterator[Finding]:

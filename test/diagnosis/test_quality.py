@@ -29,7 +29,7 @@ from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet,
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep, motion_of
+from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.vehicle import Contact, TorqueSensor, Vehicle
 
@@ -396,17 +396,22 @@ def test_a_torque_that_never_comes_names_no_unit(level_Pa: float, sound: Recordi
     assert not quality.blocking
 
 
-def turned_once(*effects: str) -> Recording:
-    """Made by a turn to one side against hidden effects, with lines that idle at no pressure."""
-    turn = Manoeuvre("turn", "", (Hold(2.0), Sweep(28.0, 6.0, 3.0)))
-    made = simulate(plant.with_effects(VEHICLE, effects), motion_of(turn, VEHICLE), sensing_of(VEHICLE))
+ONE_WAY = Manoeuvre("one-way", "", (Hold(2.0), Sweep(10.0, 4.0, 2.0), Sweep(20.0, 2.0, 2.0), Sweep(28.0, 6.0, 5.0)))
+TURN = Manoeuvre("turn", "", (Hold(2.0), Sweep(28.0, 6.0, 3.0)))
+
+
+def made_by(manoeuvre: Manoeuvre, *effects: str) -> Recording:
+    """A sound recording of a vehicle with hidden effects."""
+    motion, sensing = motion_of(manoeuvre, VEHICLE), replace(sensing_of(VEHICLE), pressure_rate_Hz=50.0)
+    made = simulate(plant.with_effects(VEHICLE, effects), motion, sensing)
     signals = {channel.name: signal for channel, signal in made.signals.items()}
-    lines = {line: Signal(signals[line].time_s, signals[line].value - 7e5) for line in LINES}
-    return Recording("turn", 0, {side: signals[side] for side in VEHICLE.sides}, lines)
+    angles, lines = ({name: signals[name] for name in named} for named in (VEHICLE.sides, LINES))
+    return Recording(manoeuvre.name, 0, angles, lines)
 
 
 def test_an_idle_line_is_in_no_other_unit_for_a_little_less_error() -> None:
-    recording = turned_once("end_stop:stiffness=1.7e5,engage_angle=0.4")
+    idle: Edit = lambda s: Signal(s.time_s, s.value - 7e5)  # noqa: E731
+    recording = pressure(idle, *LINES)(made_by(TURN, "end_stop:stiffness=1.7e5,engage_angle=0.4"))
     little = pressure(lambda s: Signal(s.time_s, 2e-4 * recording.pressure["main_b"].value), "aux_a")(recording)
     assert inspect(little, VEHICLE).findings == ()
 
@@ -415,6 +420,29 @@ def test_angles_that_obey_the_geometry_are_in_no_other_unit(sound: Recording) ->
     """All pressures too low by the same factor look like the torque of one track."""
     for finding in inspect(pressure(scaled(0.3), *LINES)(sound), VEHICLE).blocking:
         assert "joint_state" not in finding.topic
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "effect"),
+    [
+        (BUILT_IN["double-cycle"], "pressure_lag:tau=0.15"),
+        (BUILT_IN["double-cycle"], "pressure_lag:tau=0.4"),
+        (BUILT_IN["double-cycle"], "time_delay:delay=0.09"),
+        (BUILT_IN["slow-sweeps"], "cylinder_friction:coulomb=3000,load_share=0.05,holding=0.5"),
+        (ONE_WAY, "surface_patch:change=-0.2,angle_low=0.1,angle_high=0.3"),
+    ],
+)
+def test_physics_is_no_clock(manoeuvre: Manoeuvre, effect: str) -> None:
+    """Effects of the catalogue that shift the torque, or its weak slopes, are left for the diagnosis to name."""
+    assert inspect(made_by(manoeuvre, effect), VEHICLE).findings == ()
+
+
+@pytest.mark.parametrize("skew_s", [-0.3, 0.3])
+@pytest.mark.parametrize("manoeuvre", [BUILT_IN["double-cycle"], BUILT_IN["slow-sweeps"], TURN])
+def test_a_skew_in_other_manoeuvres(manoeuvre: Manoeuvre, skew_s: float) -> None:
+    (found,) = inspect(pressure(later(skew_s), *LINES)(made_by(manoeuvre)), VEHICLE).blocking
+    assert found.finding == "clock_skew"
+    assert float(found.statement.split("stamped ")[1].split(" s")[0]) == pytest.approx(0.3, abs=0.04)
 
 
 def test_what_reading_found_is_kept(sound: Recording) -> None:
