@@ -15,6 +15,7 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration import calibrate_recordings, coverage
 from lugre_steering.calibration.calibrate import KEYS, chosen
+from lugre_steering.calibration.estimate import _larger
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.apply import apply_calibration
@@ -22,6 +23,7 @@ from lugre_steering.diagnosis.dataset import prepare
 from lugre_steering.diagnosis.fit import fit
 from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.errors import DataError
+from lugre_steering.recording import Signal
 from lugre_steering.replay import replay
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep
 
@@ -222,6 +224,60 @@ def test_a_missing_line_is_named():
     pressure = {line: signal for line, signal in recording.pressure.items() if line != "aux_b"}
     with pytest.raises(DataError, match="pressure/aux_b"):
         calibrate_recordings([dataclasses.replace(recording, pressure=pressure)], SHEET)
+
+
+def with_pressures(change):
+    """The shipped recording with every pressure changed by line name and value."""
+    recording = read_recording(BAG, SHEET.channels)
+    pressure = {line: Signal(s.time_s, change(line, s.value)) for line, s in recording.pressure.items()}
+    return dataclasses.replace(recording, pressure=pressure)
+
+
+def with_angles(factor):
+    recording = read_recording(BAG, SHEET.channels)
+    angle = {side: Signal(s.time_s, factor * s.value) for side, s in recording.angle.items()}
+    return dataclasses.replace(recording, angle=angle)
+
+
+@pytest.mark.parametrize(
+    ("recording", "said"),
+    [
+        (lambda: with_angles(-1.0), "sign is flipped"),
+        (lambda: with_angles(180.0 / math.pi), "probably in degrees"),
+        (lambda: with_pressures(lambda _, value: 1e-5 * value), "probably in bar"),
+        (lambda: with_pressures(lambda _, value: 0.0 * value), "expected one that varies"),
+    ],
+)
+def test_wrong_wiring_is_refused(recording, said):
+    with pytest.raises(DataError, match=said) as error:
+        calibrate_recordings([recording()], SHEET)
+    assert str(error.value).startswith("synthetic_double_cycle")
+
+
+def test_the_larger_of_two_variances_when_one_is_singular():
+    a, b = np.diag([4.0, 0.0, 0.0]), np.diag([1.0, 9.0, 0.0])
+    np.testing.assert_allclose(_larger(a, b), np.diag([4.0, 9.0, 0.0]), atol=1e-6)
+
+
+def test_a_stuck_sensor_is_left_out_and_said():
+    def stuck(line, value):
+        value = value.copy()
+        if line == "main_a":
+            value[750:1750] = value[750]
+        return value
+
+    sound = calibrate_recordings([read_recording(BAG, SHEET.channels)], SHEET).result
+    result = calibrate_recordings([with_pressures(stuck)], SHEET).result
+    assert "stuck_sensor" in {entry["finding"] for entry in result["data_quality"]}
+    assert "physics beyond" not in result["statement"]
+    for row, right in zip(result["parameters"][:3], sound["parameters"], strict=False):
+        assert row["value"] == pytest.approx(right["value"], rel=0.05), row
+
+
+def test_the_static_ratio_without_the_level():
+    recordings = coverage.record(SHEET, coverage.QUICK[:1], 1)
+    done = calibrate_recordings(recordings, SHEET, chosen(SHEET, fix=["friction_level"]))
+    assert done.vehicle.friction.static == pytest.approx(SHEET.friction.static, rel=0.02)
 
 
 @pytest.mark.parametrize(

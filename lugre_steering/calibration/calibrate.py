@@ -17,7 +17,7 @@ rmse_Nm             of ``sheet`` and ``calibrated`` vehicle on all samples, and 
 heldout_rmse_Nm     of ``sheet`` and ``calibrated`` on stretches that this extra fit did not see
 undetermined        combinations that the data leave open: ``parts``, ``data_over_sheet``, ``statement``
 assumed             sheet values taken as exact: relative change of each parameter per relative error of it
-data_quality        findings of the reader and of the preparation, per bag
+data_quality        findings of the reader and of the checks of the sensors, per bag
 statement           one paragraph
 ==================  ===============================================================================================
 """
@@ -43,6 +43,7 @@ from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.dataset import prepare
 from lugre_steering.diagnosis.fit import fit
 from lugre_steering.diagnosis.problem import GAIN, KINGPIN, STATIC, Calibration, Candidate, Problem, calibrations_for
+from lugre_steering.diagnosis.quality import inspect
 from lugre_steering.diagnosis.split import split
 from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.errors import DataError
@@ -199,9 +200,17 @@ def calibrate_recordings(
     priors: bool = True,
     progress: Progress = lambda _: None,
 ) -> Calibrated:
-    """Fit ``vehicle`` to recordings in memory. Raises ``DataError`` when they cannot determine anything."""
+    """Fit ``vehicle`` to the sound samples of recordings in memory.
+
+    Raises ``DataError`` when they cannot determine anything, or are wired so wrongly that a fit would mean nothing.
+    """
+    progress("checking the data")
+    qualities = [inspect(recording, vehicle) for recording in recordings]
+    for quality in qualities:
+        for finding in quality.blocking:
+            raise DataError(f"{quality.recording.name}: {finding.statement}; expected sound wiring, nothing is fitted to this")
     progress("preparing")
-    runs = [prepare(recording, vehicle) for recording in recordings]
+    runs = [prepare(quality.recording, vehicle) for quality in qualities]
     problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)
     check_motion(problem)
     effects = standing_effects(vehicle)
@@ -220,7 +229,7 @@ def calibrate_recordings(
         "noise_floor": result.noise_floor,
     }
     names = [calibration.name for calibration in problem.calibrations]
-    found = [{"bag": recording.name, **asdict(finding)} for recording in recordings for finding in recording.findings]
+    found = [{"bag": quality.recording.name, **asdict(finding)} for quality in qualities for finding in quality.findings]
     return Calibrated(problem, result, fitted, {
         "priors": priors,
         "duration_s": sum(float(run.time[-1] - run.time[0]) for run in runs),

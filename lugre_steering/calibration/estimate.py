@@ -135,7 +135,8 @@ def _every_second(run: Run) -> Run:
 
 def _larger(a: Array, b: Array) -> Array:
     """``a`` (positive definite) raised to ``b`` in those of their common eigen-directions in which ``b`` is larger."""
-    root = np.linalg.cholesky(a)
+    # Residuals far out in the soft loss leave no curvature in some directions; rounding then makes it negative.
+    root = np.linalg.cholesky(a + (1e-12 * float(np.trace(a)) + 1e-300) * np.eye(len(a)))
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ b @ inverse.T)
     half = root @ vectors * np.sqrt(np.maximum(values, 1.0))

@@ -94,10 +94,16 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         sigma = np.full(time.size, vehicle.torque_sensor.noise_Nm)
     side_torque = np.einsum("slt,lt->st", gains, pressure)
     side_slope = np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure)
-    floor = 1e-3 * float(np.std(side_torque.sum(axis=0))) + 1e-12
+    measured = side_torque.sum(axis=0)
+    if float(np.ptp(measured)) <= 1e-9 * float(np.abs(measured).max()):
+        raise DataError(
+            f"{recording.name}: the measured torque is {measured[0]:g} {vehicle.coordinate.force_unit} all the time, expected one that "
+            "varies; look at the sensors and their drivers"
+        )
+    floor = 1e-3 * float(np.std(measured)) + 1e-12
     return Run(
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
-        side_torque=side_torque, side_slope=side_slope, measured=side_torque.sum(axis=0), sigma=np.maximum(sigma, floor), valid=valid,
+        side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
     )  # fmt: skip
 
 

@@ -150,7 +150,8 @@ class Problem:
                 else:
                     values[field] = old * float(np.exp(change))
         if "static_torque" in values:
-            values["static_torque"] = max(values["static_torque"], 0.3 * values["coulomb_torque"])
+            coulomb = values.get("coulomb_torque", float(record["coulomb_torque"]))
+            values["static_torque"] = max(values["static_torque"], 0.3 * coulomb)
         return values
 
     def gain(self, x: Array) -> float:
@@ -198,7 +199,7 @@ class Problem:
         """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
         name = candidate.effect.id
         if name == "pressure_lag":
-            changed = _lagged(torque, run.time[1] - run.time[0], values["tau"])
+            changed = lagged(torque, run.time[1] - run.time[0], values["tau"])
         elif name == "time_delay":
             changed = np.interp(run.time - values["delay"], run.time, torque)
         elif name in ("pressure_offset", "pressure_drift"):
@@ -220,7 +221,7 @@ class Problem:
         return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects), range(len(self.runs))))
 
 
-def _lagged(torque: Array, dt: float, tau: float) -> Array:
+def lagged(torque: Array, dt: float, tau: float) -> Array:
     """First-order lag of a uniformly sampled signal, exact for piecewise linear input between samples."""
     if tau < 0.02 * dt:
         return torque

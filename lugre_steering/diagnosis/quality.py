@@ -63,6 +63,7 @@ class Quality:
 
 def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
     """All findings about one recording of ``vehicle``, and what diagnosis may use of it."""
+    recording = _with_known_topics(recording, vehicle)
     findings = list(recording.findings) + _rejected(recording)
     signals = {c: s for c in vehicle.channels if (s := _signal(recording, c)) is not None and s.time_s.size >= 20}
     looks = {c: _Look.of(s, _sheet_noise(vehicle, c)) for c, s in signals.items() if c.kind is not Kind.AIR_TEMPERATURE}
@@ -99,6 +100,18 @@ def _with_signals(recording: Recording, clean: Mapping[Channel, Signal]) -> Reco
     return replace(
         recording, rate=rate, angle={**recording.angle, **of[Kind.ANGLE]}, pressure={**recording.pressure, **of[Kind.PRESSURE]},
         measured_torque=next(iter(of[Kind.TORQUE].values()), recording.measured_torque),
+    )  # fmt: skip
+
+
+def _with_known_topics(recording: Recording, vehicle: Vehicle) -> Recording:
+    """What reading says about topics, by their names in the vehicle file: a bag has them with a slash, or a namespace."""
+
+    def known(topic: str) -> str:
+        return next((c.topic for c in vehicle.channels if f"/{topic}".endswith(f"/{c.topic.lstrip('/')}")), topic)
+
+    return replace(
+        recording, rejected={known(topic): reasons for topic, reasons in recording.rejected.items()},
+        findings=tuple(replace(finding, topic=known(finding.topic)) for finding in recording.findings),
     )  # fmt: skip
 
 
@@ -221,14 +234,20 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
     presliding = float(record["coulomb_torque"][0] / record["sigma_0"][0])
     angles = {channel: signal for channel, signal in clean.items() if channel.kind is Kind.ANGLE}
     for channel, signal in angles.items():
-        time, lost = signal.time_s, []
-        for i in np.flatnonzero(np.diff(time) > GAP_S):
+        time = signal.time_s
+        period = float(np.median(np.diff(time)))
+        lost: list[tuple[float, float]] = []
+        for i in np.flatnonzero(np.diff(time) > _gap_limit(period)):
             if any(_parked(other, time[i], time[i + 1], presliding) for c, other in angles.items() if c is not channel):
                 continue
-            after = slice(i + 1, None, _samples(0.2, float(np.median(np.diff(time)))))
+            after = slice(i + 1, None, _samples(0.2, period))
             turned = np.cumsum(np.abs(np.diff(signal.value[after], prepend=signal.value[i + 1])))
             forgotten = np.searchsorted(turned, FORGOTTEN * presliding)
-            lost.append((float(time[i]), float(time[after][min(int(forgotten), turned.size - 1)])))
+            start, end = float(time[i]), float(time[after][min(int(forgotten), turned.size - 1)])
+            if lost and start <= lost[-1][1]:  # the next gap came before friction had forgotten the last one
+                before, last = lost.pop()
+                start, end = before, max(end, last)
+            lost.append((start, end))
         if lost:
             far = units.distance(vehicle, FORGOTTEN * presliding, degrees=".0f")
             statement = (
@@ -242,7 +261,8 @@ def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool
     """This track was seen all the time between ``start`` and ``end`` [s] and hardly moved."""
     inside = (signal.time_s >= start) & (signal.time_s <= end)
     near = np.concatenate([[start], signal.time_s[inside], [end]])
-    return float(np.diff(near).max()) <= GAP_S and float(np.ptp(signal.value[inside])) < PARKED * presliding
+    limit = _gap_limit(float(np.median(np.diff(signal.time_s))))
+    return float(np.diff(near).max()) <= limit and float(np.ptp(signal.value[inside])) < PARKED * presliding
 
 
 def _examine(
@@ -293,12 +313,17 @@ def _total(intervals: Intervals) -> float:
     return sum(end - start for start, end in intervals)
 
 
+def _gap_limit(period: float) -> float:
+    """The longest step [s] of a channel that diagnosis bridges."""
+    return max(GAP_S, 3.0 * period)
+
+
 def _gaps(look: _Look, others: list[_Look]) -> Intervals:
     """Stretches without samples: those that diagnosis cannot bridge, and where it starts late or ends early.
 
     Late against channels of its kind: a whole device that starts late, or has another clock, has no dropout.
     """
-    time, limit = look.time, max(GAP_S, 3.0 * look.period)
+    time, limit = look.time, _gap_limit(look.period)
     span = min([time[0], *(o.time[0] for o in others)]), max([time[-1], *(o.time[-1] for o in others)])
     at = np.flatnonzero(np.diff(time) > limit)
     gaps = [(float(time[i]), float(time[i + 1])) for i in at]
@@ -317,7 +342,7 @@ def _held(
     if low == high:
         alive = any(other.noisy or _moved(other, look.time[0], look.time[-1]) for other in others)
         return ([(0, value.size - 1)] if alive else []), []
-    changes = (np.diff(value) != 0.0) | (np.diff(look.time) > max(GAP_S, 3.0 * look.period))
+    changes = (np.diff(value) != 0.0) | (np.diff(look.time) > _gap_limit(look.period))
     stuck, pinned = [], np.zeros(value.size, bool)
     if upper is not None:
         pinned |= value >= 0.999 * upper

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -22,6 +22,7 @@ from lugre_steering.chain.hydraulics import line_gains
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_side
 from lugre_steering.diagnosis.dataset import Run, angle_noise, prepare
+from lugre_steering.diagnosis.problem import lagged
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
@@ -33,6 +34,8 @@ GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
 """A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
+WEAK_BETTER = 0.8
+"""The same for the unit of a line that hardly works, whose magnitude speaks too."""
 TIE = 1.15
 OPPOSED = -0.5
 """Correlation of measured and nominal torque, with negative work, that is a flipped sign however poor the model."""
@@ -50,14 +53,17 @@ MIRROR = (
     "More than one wiring fault is possible: of exchanged angle sensors, all angle signs flipped and the lines of every circuit "
     "exchanged, any one looks like the other two together."
 )
-SKEW_S = 0.1
-"""Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted."""
+SKEW_S = 0.12
+"""Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted; friction may look like 0.1 s."""
 SKEW_RANGE_S = 5.0
 SKEW_ENERGY = 0.5
+SKEW_HELD = 0.8
+"""Share of the nominal torque's slope energy that must stay in the stretch that is shifted."""
 SKEW_RATE_HZ = 50.0
 SOFTER = (0.5, 0.7, 1.0, 1.4)
 PLAY = (0.0, 0.1, 0.3, 0.6)
-"""Stiffness factors and backlash (in presliding lengths) that may explain a late torque in place of a clock."""
+LAG_S = (0.1, 0.2, 0.3, 0.5)
+"""Stiffness factors, backlash (in presliding lengths) and lags that may explain a late torque in place of a clock."""
 DRIFT_SHARE = 0.02
 """Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
 TINY = 1e-2
@@ -168,25 +174,24 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     mirrored = _mirrored(vehicle, run)
     if mirrored and as_is <= GOOD:
         return _noted(vehicle, _exchanged_angles(vehicle), ".")
-    single = list(_hypotheses(vehicle, run, model, 1))
-    if as_is > GOOD:
-        single += _angle_units(recording, vehicle, model)
+    undone = list(_hypotheses(vehicle, run, model, 1))
+    single = [*undone, *(_angle_units(recording, vehicle, run, model) if as_is > GOOD else ())]
     convincing = [h for h in single if h.error < min(GOOD, h.better * as_is)]
     if as_is > GOOD:
         needed = BETTER * min([as_is, *(h.error for h in single)])
         convincing = [h for h in _hypotheses(vehicle, run, model, 2) if h.error < min(GOOD, needed)] or convincing
     if not convincing and mirrored and correlation > 0.0:
         return _noted(vehicle, _exchanged_angles(vehicle), ".")
+    tiny = float(np.std(run.measured)) < TINY * float(np.std(total))
     if not convincing:
         work = float(np.sum((run.measured * run.omega.mean(axis=0))[run.valid]))
         opposed = correlation < OPPOSED and work < 0.0
-        tiny = float(np.std(run.measured)) < TINY * float(np.std(total))
         poor = "sign_flipped" if opposed else "unit_suspect" if tiny else ""
-        convincing = [h for h in single if h.faults[0].finding == poor and h.error < as_is]
+        convincing = [h for h in undone if h.faults[0].finding == poor and h.error < as_is]
         if abs(correlation) < UNLIKE:  # which channel it is, an error that stays poor does not tell
             convincing = [h for h in convincing if h.topics == max(other.topics for other in convincing)]
     if not convincing:
-        return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE else ()
+        return _unlike(vehicle, correlation) if tiny or abs(correlation) < UNLIKE else ()
     best = min(h.error for h in convincing)
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
@@ -305,18 +310,27 @@ def _units_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Array, f
     for unit, factor in PRESSURE_UNITS.items():
         statement = f"probably in {unit} (multiply by {factor:g})"
         every = _Fault("unit_suspect", tuple(topics), f"{', '.join(topics)}: {statement}")
-        yield (every,), factor * run.pressure, BETTER
+        if _plausible(vehicle, factor * float(highest.max())):
+            yield (every,), factor * run.pressure, BETTER
         for i, (topic, high) in enumerate(zip(topics, highest, strict=True)):
-            if 0.01 < factor * high / vehicle.sensors.pressure_range_Pa < 1.1:
+            if _plausible(vehicle, factor * float(high)):
                 pressure = run.pressure.copy()
                 pressure[i] *= factor
-                # A line that hardly works in this recording changes little, but its magnitude already speaks.
-                better = 1.0 if high < TINY * np.median(highest) else BETTER
+                # A line that hardly works in this recording changes less, but its magnitude speaks too.
+                better = WEAK_BETTER if high < TINY * np.median(highest) else BETTER
                 yield (_Fault("unit_suspect", (topic,), f"{topic}: {statement}"),), pressure, better
 
 
-def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterator[_Hypothesis]:
-    """Angles in another unit, too small to see it by magnitude: smoothed again, since their noise scales with them."""
+def _plausible(vehicle: Vehicle, highest_Pa: float) -> bool:
+    """Whether this may be the highest pressure of a recording: one that the sensor can show, and not next to nothing."""
+    return 0.01 < highest_Pa / vehicle.sensors.pressure_range_Pa < 1.1
+
+
+def _angle_units(recording: Recording, vehicle: Vehicle, as_is: Run, model: Model) -> Iterator[_Hypothesis]:
+    """Angles in another unit, too small to see it by magnitude: smoothed again, since their noise scales with them.
+
+    None that would break a steering geometry which the angles obey as they are.
+    """
     unit, factor = _foreign_unit(vehicle)
     topics = _topics(vehicle, Kind.ANGLE)
     sensors = tuple(dict.fromkeys(topics.values()))
@@ -326,6 +340,8 @@ def _angle_units(recording: Recording, vehicle: Vehicle, model: Model) -> Iterat
             for side, s in recording.angle.items()
         }
         run = prepare(replace(recording, angle=scaled), vehicle)
+        if _off_geometry(vehicle, as_is) < GEOMETRY_RAD < _off_geometry(vehicle, run):
+            continue
         statement = f"{' and '.join(named)}: probably in {unit} (multiply by {factor:.6g})"
         error = _error(run, run.measured, _torques(model, run).sum(axis=0))
         yield _Hypothesis((_Fault("unit_suspect", named, statement),), error)
@@ -344,54 +360,68 @@ def _mirrored(vehicle: Vehicle, run: Run) -> bool | None:
     """
     if vehicle.axle is None or not _both_tracks(vehicle):
         return None
-    left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
-    t, ratio = np.tan(left), vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
-    own = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
-    other = float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 - ratio * t)) ** 2)))
+    own, other = _off_geometry(vehicle, run), _off_geometry(vehicle, run, -1.0)
     if max(own, other) < GEOMETRY_RAD or GEOMETRY_RATIO * min(own, other) > max(own, other):
         return None
     return other < own
 
 
-def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
-    """Torque stamped late or early against the angles, by more than softer springs or play could imitate.
+def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:
+    """Root mean square [rad] by which the angles miss the steering geometry (``sense`` -1: of the mirrored vehicle); zero
+    where there is none to obey."""
+    if vehicle.axle is None or not _both_tracks(vehicle):
+        return 0.0
+    left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
+    t, ratio = np.tan(left), sense * vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
+    return float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
 
-    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness and play in SOFTER and PLAY. A
-    clock shifts starts and stops alike at any rate; play and compliance do not, so one of the variants fits better there.
+
+def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
+    """Torque stamped late or early against the angles, by more than softer springs, play or a slow sensor could imitate.
+
+    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness, play and lag in SOFTER, PLAY and
+    LAG_S. A clock shifts starts and stops alike at any rate; the others do not, so one of the variants fits better there.
     """
     model = build_model(vehicle)
-    stride = max(1, round(1.0 / SKEW_RATE_HZ / (run.time[1] - run.time[0])))
-    dt = stride * (run.time[1] - run.time[0])
-    reach = int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt)
-    if reach * dt < 2.0 * SKEW_S:
-        return
+    step = float(run.time[1] - run.time[0])
+    stride = max(1, round(1.0 / SKEW_RATE_HZ / step))
+    dt = stride * step
 
     def slope(torque: Array) -> Array:
         return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
 
+    nominal = np.concatenate([[0.0], np.cumsum(slope(_torques(model, run).sum(axis=0)) ** 2)])
+    ends = np.arange(int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt) + 1)
+    # Without the strongest slopes in what is shifted, weak ones that hidden physics changes would decide.
+    reach = int(np.flatnonzero(nominal[nominal.size - 1 - ends] - nominal[ends] >= SKEW_HELD * nominal[-1])[-1])
+    if reach * dt < 2.0 * SKEW_S:
+        return
     measured = slope(run.measured)
     window = measured.size - 2 * reach
     energy = np.convolve(measured**2, np.ones(window), mode="valid")
     presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
 
-    def match(softer: float, play: float) -> tuple[float, float, float]:
-        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the model."""
-        trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
-        for record in trial.parameters:
-            record["sigma_0"] *= softer
-            record["backlash_width"] += play * presliding
-        expected = slope(_torques(trial, run).sum(axis=0))[reach : reach + window]
+    def match(torque: Array) -> tuple[float, float, float]:
+        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the torque."""
+        expected = slope(torque)[reach : reach + window]
         power = max(float(np.sum(expected**2)), 1e-30)
         overlap = correlate(measured, expected, mode="valid")
         gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
         left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(energy, 1e-30)
-        return float(left.min()), float((left.argmin() - reach) * dt), float(left[reach])
+        return float(left.min()), (_lowest(left) - reach) * dt, float(left[reach])
 
-    if abs(match(1.0, 0.0)[1]) <= SKEW_S:
+    if abs(match(_torques(model, run).sum(axis=0))[1]) <= SKEW_S:
         return
-    matches = [match(softer, play) for softer in SOFTER for play in PLAY]
+    matches, unshifted = [], np.inf
+    for softer, play in product(SOFTER, PLAY):
+        trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
+        for record in trial.parameters:
+            record["sigma_0"] *= softer
+            record["backlash_width"] += play * presliding
+        torque = _torques(trial, run).sum(axis=0)
+        matches.append(match(torque))
+        unshifted = min(unshifted, matches[-1][2], *(match(lagged(torque, step, lag))[2] for lag in LAG_S))
     best, shift, _ = min(matches)
-    unshifted = min(left for _, _, left in matches)
     if abs(shift) > SKEW_S and best < min(SKEW_ENERGY * unshifted, GOOD**2):
         kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
         topics = ", ".join(_topics(vehicle, kind).values())
@@ -401,6 +431,15 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
             f"{topics}: stamped {abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
             f"{unshifted:.2f} as recorded, {best:.2f} shifted); synchronise the clocks of the devices",
         )  # fmt: skip
+
+
+def _lowest(values: Array) -> float:
+    """Place of the lowest of ``values`` (n,), between samples by a parabola through it and its neighbours."""
+    at = int(values.argmin())
+    if not 0 < at < values.size - 1:
+        return float(at)
+    before, here, after = (float(value) for value in values[at - 1 : at + 2])
+    return at + 0.5 * (before - after) / max(before - 2.0 * here + after, 1e-30)
 
 
 def _drifts(vehicle: Vehicle, run: Run) -> Iterator[Finding]:

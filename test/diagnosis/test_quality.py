@@ -28,7 +28,8 @@ from lugre_steering.diagnosis.quality import inspect
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder
-from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep, motion_of
+from lugre_steering.simulate import plant
+from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.vehicle import Contact, TorqueSensor, Vehicle
 
@@ -359,11 +360,12 @@ def test_the_size_of_a_skew(skew_s: float, sound: Recording) -> None:
     assert seconds == pytest.approx(abs(skew_s), abs=0.04)
 
 
-def test_one_angle_in_degrees_that_reading_refused(sound: Recording) -> None:
+@pytest.mark.parametrize("prefix", ["", "/", "/robot/"])
+def test_one_angle_in_degrees_that_reading_refused(prefix: str, sound: Recording) -> None:
     """Reading leaves out angles beyond half a turn; what is left looks small, the count does not."""
     degrees = scaled(180.0 / math.pi)(sound.angle["left"])
     keep = np.abs(degrees.value) <= math.pi
-    rejected = {LEFT: {"absurd_value": int((~keep).sum())}}
+    rejected = {prefix + LEFT: {"absurd_value": int((~keep).sum())}}
     bad = replace(angle("left", lambda s: Signal(s.time_s[keep], degrees.value[keep]))(sound), rejected=rejected)
     quality = inspect(bad, VEHICLE)
     assert ("unit_suspect", LEFT) in names(quality.blocking)
@@ -384,6 +386,65 @@ def test_small_angles_in_degrees() -> None:
     assert names(quality.findings) == [("unit_suspect", f"{LEFT}, {RIGHT}")]
 
 
+@pytest.mark.parametrize("level_Pa", [0.0, 7e5])
+def test_a_torque_that_never_comes_names_no_unit(level_Pa: float, sound: Recording) -> None:
+    """A pump that is off: noise of the sensors about zero or a level, and steering by hand."""
+    random = np.random.default_rng(4)
+    idle: Edit = lambda s: Signal(s.time_s, level_Pa + 1.5e4 * random.standard_normal(s.time_s.size))  # noqa: E731
+    quality = inspect(pressure(idle, *LINES)(sound), VEHICLE)
+    assert [f.finding for f in quality.findings] == ["wiring_suspect"]
+    assert not quality.blocking
+
+
+ONE_WAY = Manoeuvre("one-way", "", (Hold(2.0), Sweep(10.0, 4.0, 2.0), Sweep(20.0, 2.0, 2.0), Sweep(28.0, 6.0, 5.0)))
+TURN = Manoeuvre("turn", "", (Hold(2.0), Sweep(28.0, 6.0, 3.0)))
+
+
+def made_by(manoeuvre: Manoeuvre, *effects: str) -> Recording:
+    """A sound recording of a vehicle with hidden effects."""
+    motion, sensing = motion_of(manoeuvre, VEHICLE), replace(sensing_of(VEHICLE), pressure_rate_Hz=50.0)
+    made = simulate(plant.with_effects(VEHICLE, effects), motion, sensing)
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    angles, lines = ({name: signals[name] for name in named} for named in (VEHICLE.sides, LINES))
+    return Recording(manoeuvre.name, 0, angles, lines)
+
+
+def test_an_idle_line_is_in_no_other_unit_for_a_little_less_error() -> None:
+    idle: Edit = lambda s: Signal(s.time_s, s.value - 7e5)  # noqa: E731
+    recording = pressure(idle, *LINES)(made_by(TURN, "end_stop:stiffness=1.7e5,engage_angle=0.4"))
+    little = pressure(lambda s: Signal(s.time_s, 2e-4 * recording.pressure["main_b"].value), "aux_a")(recording)
+    assert inspect(little, VEHICLE).findings == ()
+
+
+def test_angles_that_obey_the_geometry_are_in_no_other_unit(sound: Recording) -> None:
+    """All pressures too low by the same factor look like the torque of one track."""
+    for finding in inspect(pressure(scaled(0.3), *LINES)(sound), VEHICLE).blocking:
+        assert "joint_state" not in finding.topic
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "effect"),
+    [
+        (BUILT_IN["double-cycle"], "pressure_lag:tau=0.15"),
+        (BUILT_IN["double-cycle"], "pressure_lag:tau=0.4"),
+        (BUILT_IN["double-cycle"], "time_delay:delay=0.09"),
+        (BUILT_IN["slow-sweeps"], "cylinder_friction:coulomb=3000,load_share=0.05,holding=0.5"),
+        (ONE_WAY, "surface_patch:change=-0.2,angle_low=0.1,angle_high=0.3"),
+    ],
+)
+def test_physics_is_no_clock(manoeuvre: Manoeuvre, effect: str) -> None:
+    """Effects of the catalogue that shift the torque, or its weak slopes, are left for the diagnosis to name."""
+    assert inspect(made_by(manoeuvre, effect), VEHICLE).findings == ()
+
+
+@pytest.mark.parametrize("skew_s", [-0.3, 0.3])
+@pytest.mark.parametrize("manoeuvre", [BUILT_IN["double-cycle"], BUILT_IN["slow-sweeps"], TURN])
+def test_a_skew_in_other_manoeuvres(manoeuvre: Manoeuvre, skew_s: float) -> None:
+    (found,) = inspect(pressure(later(skew_s), *LINES)(made_by(manoeuvre)), VEHICLE).blocking
+    assert found.finding == "clock_skew"
+    assert float(found.statement.split("stamped ")[1].split(" s")[0]) == pytest.approx(0.3, abs=0.04)
+
+
 def test_what_reading_found_is_kept(sound: Recording) -> None:
     damaged = Finding("damaged_bag", "", "a chunk is damaged")
     bad = replace(sound, findings=(damaged,), rejected={LEFT: {"not_finite": 3, "zero_stamp": 2}})
@@ -391,6 +452,28 @@ def test_what_reading_found_is_kept(sound: Recording) -> None:
     assert names(found) == [("damaged_bag", ""), ("rejected_samples", LEFT)]
     assert "5 messages" in found[1].statement
     assert "3 not finite" in found[1].statement
+
+
+def test_time_without_memory_of_friction_is_counted_once(sound: Recording) -> None:
+    """A logger that drops 0.4 s of every 2 s: the next gap comes before friction has forgotten the last one."""
+    holes: Edit = lambda s: Signal(s.time_s[s.time_s % 2.0 > 0.4], s.value[s.time_s % 2.0 > 0.4])  # noqa: E731
+    findings = inspect(angle("left", holes)(angle("right", holes)(sound)), VEHICLE).findings
+    lost = [f for f in findings if f.finding == "friction_memory_lost"]
+    assert lost
+    for finding in lost:
+        ends = np.array(finding.intervals_s)
+        assert (ends[1:, 0] > ends[:-1, 1]).all()
+        said = float(finding.statement.split("not used for ")[1].split(" s")[0])
+        assert said <= sound.angle["left"].time_s[-1]
+
+
+def test_a_slow_logger_has_no_gaps(sound: Recording) -> None:
+    slow: Edit = lambda s: Signal(s.time_s[::100], s.value[::100])  # noqa: E731
+    every = pressure(slow, *LINES)(angle("left", slow)(angle("right", slow)(sound)))
+    assert np.median(np.diff(every.angle["left"].time_s)) > 0.5
+    quality = inspect(every, VEHICLE)
+    assert not [f for f in quality.findings if f.finding in ("friction_memory_lost", "dropout")]
+    assert quality.recording.pressure["main_a"].time_s.size == every.pressure["main_a"].time_s.size
 
 
 def test_rates_go_with_their_angles(sound: Recording) -> None:

@@ -1,0 +1,62 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The folder that ``diagnose`` writes: nothing of an earlier diagnosis stays, nothing of anybody else is lost."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from lugre_steering.bag import BagWriter, Part, cdr
+from lugre_steering.calibration import coverage
+from lugre_steering.diagnosis.command import run
+from lugre_steering.errors import LugreSteeringError
+from lugre_steering.recording import Kind
+from lugre_steering.resources import config_folder
+from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre
+from lugre_steering.vehicle import load
+
+SHEET = config_folder() / "test_vehicle.yaml"
+
+
+@pytest.fixture(scope="module")
+def parked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag without motion: diagnosed at once, as data that do not decide."""
+    vehicle = load(SHEET)
+    recording = coverage.record(vehicle, [Manoeuvre("parked", "", (Hold(12.0),))], 1)[0]
+    folder = tmp_path_factory.mktemp("bags") / "parked"
+    with BagWriter(folder) as writer:
+        parts = []
+        for channel in vehicle.channels:
+            if channel.kind is Kind.AIR_TEMPERATURE:
+                continue
+            signal = (recording.angle if channel.kind is Kind.ANGLE else recording.pressure)[channel.name]
+            stamps = 1_780_000_000 * 10**9 + (1e9 * signal.time_s).round().astype("int64")
+            if channel.kind is Kind.ANGLE:
+                kind, rows = cdr.JOINT_STATE, cdr.encode_joint_state(stamps, "f", [channel.joint], signal.value[:, None])
+            else:
+                kind, rows = cdr.FLUID_PRESSURE, cdr.encode_fluid_pressure(stamps, "f", signal.value)
+            parts.append(Part(writer.add_topic("/" + channel.topic, kind), stamps, rows))
+        writer.write(parts)
+    return folder
+
+
+def test_a_file_that_cannot_be_written_is_named(parked: Path, tmp_path: Path) -> None:
+    (tmp_path / "diagnosis.json").mkdir()
+    with pytest.raises(LugreSteeringError, match=r"diagnosis\.json: cannot be written"):
+        run([parked], SHEET, tmp_path, report=False)
+
+
+def test_the_report_of_an_earlier_diagnosis_is_taken_away(parked: Path, tmp_path: Path) -> None:
+    old = ["report.html", "before_after_other.png", "residual_end_stop.png", "evidence.png", "heldout.png"]
+    others = ["my_report.html", "notes.txt", "before_after.png", "residual_end_stop.csv"]
+    for name in (*old, *others):
+        (tmp_path / name).write_text("old", encoding="utf-8")
+    run([parked], SHEET, tmp_path, report=False)
+    assert all((tmp_path / name).is_file() for name in (*old, *others)), "without a diagnosis they are not ours"
+    run([parked], SHEET, tmp_path, report=False)
+    assert not any((tmp_path / name).exists() for name in old)
+    assert all((tmp_path / name).is_file() for name in others)
+    assert json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))["verdict"] == "insufficient_data"
