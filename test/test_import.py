@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from lugre_steering.cli import app
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import import_table, load_map, read_table
-from lugre_steering.importing.map import UNITS, to_si
+from lugre_steering.importing.map import UNITS, Csv, to_si
 from lugre_steering.importing.write import outliers
 
 HEAD = "schema: lugre_steering/import/1\n"
@@ -100,6 +100,19 @@ def test_semicolons_decimal_commas_and_rows_above_the_header(tmp_path: Path) -> 
     assert [m.temperature for m in found] == pytest.approx([20.0, 30.0])
 
 
+def test_a_point_is_no_decimal_comma(tmp_path: Path) -> None:
+    table = read_table(write(tmp_path, "log.csv", "t;a\n0;1.234\n"), Csv(delimiter=";", decimal=","))
+    with pytest.raises(MapFileError, match=r"line 2, column 'a': got '1\.234', expected a number"):
+        table.column("a")
+
+
+def test_numbers_as_loggers_write_them(tmp_path: Path) -> None:
+    cells = ["1", "+1.", "-.5", "1e3", "2.5E-04", "NaN", "-nan", "", "N/A", "-inf"]
+    table = read_table(write(tmp_path, "log.csv", "t,a\n" + "".join(f"0,{cell}\n" for cell in cells)))
+    wanted = [1.0, 1.0, -0.5, 1e3, 2.5e-4, np.nan, np.nan, np.nan, np.nan, -np.inf]
+    np.testing.assert_array_equal(table.column("a"), wanted)
+
+
 def test_polynomial_of_a_stroke_and_force_of_a_cylinder(tmp_path: Path) -> None:
     stroke, cap, rod = np.array([0.0, 10.0, 20.0]), np.array([50.0, 60.0, 70.0]), np.array([5.0, 6.0, 7.0])
     savemat(tmp_path / "d.mat", {"log": {"t": np.arange(3.0), "stroke": stroke, "p": np.column_stack([cap, rod])}})
@@ -174,6 +187,8 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         (GOOD + "start_s: 2\nstop_s: 1\n", "key 'stop_s': got 1.0, expected more than start_s"),
         (GOOD + "epoch_s: -1\n", "key 'epoch_s': got -1"),
         (GOOD + "csv: {delimiter: ';;'}\n", "key 'csv.delimiter'"),
+        (GOOD + "csv: {decimal: ','}\n", "key 'csv.delimiter': got ',', expected another character than csv.decimal"),
+        (GOOD.replace("}}", "}, rate/left: {column: b, unit: m/s}}"), "rate/left.unit': got 'm/s', expected one of rad/s"),
         (GOOD.replace("angle/left: {column: a, unit: deg}", "rate/left: {column: a, unit: deg/s}"), "expected angle/left beside"),
         (GOOD.replace("column: a, unit: deg", "cylinder: {cap: {column: a, unit: bar, area_m2: 1}}"), "for measured_torque only"),
         ("[1, 2", "is not valid YAML"),
@@ -192,6 +207,7 @@ def test_mistakes_in_the_map_are_named(tmp_path: Path, text: str, message: str) 
         ("t,b\n0,1\n", "no column 'a'; there are: t, b"),
         ("t,A\n0,1\n", "no column 'a'"),
         ("t,a\n0,1\n1,x\n", "line 3, column 'a': got 'x', expected a number"),
+        ("t,a\n0,1\n1,1_0\n", "line 3, column 'a': got '1_0', expected a number"),
         ("t,a\n0,1\n1\n", "line 3: has 1 cells, expected 2"),
         ("t,a,a\n0,1,1\n", "column 'a' occurs twice"),
         ("t,a\n", "has 1 rows"),

@@ -145,6 +145,8 @@ def load_map(path: str | Path) -> ImportMap:
     for key in ("delimiter", "decimal", "comment"):
         if len(getattr(found.csv, key)) != 1:
             raise reader.fail(f"csv.{key}", getattr(found.csv, key), "one character")
+    if found.csv.delimiter == found.csv.decimal:
+        raise reader.fail("csv.delimiter", found.csv.delimiter, "another character than csv.decimal")
     return found
 
 
@@ -182,6 +184,8 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
         angle = f"angle/{rest}"
         if angle not in found.channels or found.clock(angle) != found.clock(name):
             raise reader.fail(key, name, f"{angle} beside it, on the same time column (both go into one message)")
+        dimension = UNITS.get(found.channels[angle].unit or "", ("angle",))[0]
+        _check_unit(reader, f"{key}.unit", source.unit, ("speed",) if dimension == "length" else ("angular speed",))
 
 
 def _check_unit(reader: Reader, key: str, unit: str | None, dimensions: tuple[str, ...]) -> None:

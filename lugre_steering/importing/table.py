@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 import difflib
 import importlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,9 @@ from lugre_steering.recording import Array
 
 N = TypeVar("N", Array, float)
 
-_MISSING = ("", "nan", "na", "n/a", "null", "none")
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE | re.ASCII)
+"""A number as loggers write it; float() would take the underscores of Python too."""
+_MISSING = ("", "nan", "-nan", "na", "n/a", "null", "none")
 
 
 @dataclass(frozen=True)
@@ -105,13 +108,15 @@ class _LazyColumns(Mapping[str, Array]):
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             text = cell.strip()
-            try:
-                values[i] = float(text.replace(self._decimal, ".") if self._decimal != "." else text)
-            except ValueError:
-                if text.lower() not in _MISSING:
-                    where = f"{self._file}: line {self._lines[i]}, column '{name}'"
-                    raise MapFileError(f"{where}: got '{cell}', expected a number or an empty cell") from None
+            # With another decimal character a point groups thousands, or the map is wrong: no number either way.
+            number = text if self._decimal == "." else text.replace(".", "?").replace(self._decimal, ".")
+            if _NUMBER.fullmatch(number):
+                values[i] = float(number)
+            elif text.lower() in _MISSING:
                 values[i] = np.nan
+            else:
+                where, decimal = f"{self._file}: line {self._lines[i]}, column '{name}'", f"decimal '{self._decimal}'"
+                raise MapFileError(f"{where}: got '{cell}', expected a number ({decimal}) or an empty cell")
         return values
 
 

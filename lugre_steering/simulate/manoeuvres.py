@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from scipy.ndimage import uniform_filter1d
 
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording
+from lugre_steering.schema import Reader
 from lugre_steering.vehicle import Axle, Vehicle
 
 STEP_S = 0.002
@@ -237,14 +237,18 @@ _BOUNDS = {
 
 
 def from_yaml(file: Path) -> Manoeuvre:
-    """A manoeuvre from a YAML file: ``segments:`` with a list of ``sweep:``, ``hold:`` and ``chirp:`` mappings."""
-    try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise DataError(f"{file}: cannot be read as YAML: {' '.join(str(error).split())}") from error
-    segments = data.get("segments") if isinstance(data, Mapping) else None
+    """A manoeuvre from a YAML file: ``segments:`` with a list of ``sweep:``, ``hold:`` and ``chirp:`` mappings, and maybe a
+    ``description:``."""
+    reader = Reader(file, DataError)
+    data = reader.load()
+    if not isinstance(data, Mapping):
+        raise reader.fail("(top level)", data, "a mapping with the list 'segments'")
+    for key in data:
+        if key not in ("segments", "description"):
+            raise reader.fail(str(key), data[key], "no such key; segments and description only")
+    segments = data.get("segments")
     if not isinstance(segments, list) or not segments:
-        raise DataError(f"{file}: key 'segments': got {segments!r}, expected a list of sweep, hold and chirp")
+        raise reader.fail("segments", segments, "a list of sweep, hold and chirp")
     built = tuple(_segment(item, f"{file}: key 'segments[{i}]'") for i, item in enumerate(segments))
     return Manoeuvre(file.stem, str(data.get("description", f"from {file.name}")), built)
 
@@ -302,13 +306,16 @@ def from_csv(file: Path, vehicle: Vehicle) -> Motion:
 
 def _csv_rows(file: Path) -> tuple[list[str], Array]:
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
+        lines = file.read_text(encoding="utf-8-sig").splitlines()  # spreadsheets put a byte order mark first
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{file}: cannot be read: {error}") from error
     kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if len(kept) < 3:
         raise DataError(f"{file}: has {max(len(kept) - 1, 0)} data rows, expected a header and at least two rows")
     header = [cell.strip() for cell in kept[0][1].split(",")]
+    for name in header:
+        if header.count(name) > 1:
+            raise DataError(f"{file}: line {kept[0][0]}: column '{name}' occurs twice; expected distinct column names")
     rows = np.empty((len(kept) - 1, len(header)))
     for i, (number, line) in enumerate(kept[1:]):
         cells = line.split(",")

@@ -120,6 +120,7 @@ def test_a_mean_angle_in_a_csv_is_shared_out_by_ackermann(tmp_path: Path) -> Non
         ("time_s,angle_deg\n0,1\n1,x\n", "line 3"),
         ("time_s,angle_deg\n0,1\n1\n", "line 3"),
         ("time_s,angle_deg\n0,1\n1,nan\n", "finite"),
+        ("time_s,angle_deg,angle_deg\n0,1,2\n1,2,3\n", "line 1: column 'angle_deg' occurs twice"),
         ("time_s,angle_deg\n0,1\n0,2\n", "increasing"),
         ("time_s,angle_deg\n0,1\n1,200\n", "200 deg"),
         ("time_s,angle_deg\n0,1\n1e9,2\n", "7200 s"),
@@ -133,10 +134,16 @@ def test_bad_csv_files_are_refused(tmp_path: Path, text: str, wanted: str) -> No
     assert wanted in str(caught.value)
 
 
+def test_a_csv_of_a_spreadsheet_with_a_byte_order_mark(tmp_path: Path) -> None:
+    file = tmp_path / "mean.csv"
+    file.write_text("time_s,angle_rad\n0,0.3\n5,0.3\n", encoding="utf-8-sig")
+    assert mean_deg(manoeuvres.from_csv(file, VEHICLE))[100] == pytest.approx(np.degrees(0.3))
+
+
 def test_yaml_manoeuvres(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(
-        "segments:\n- hold: {duration_s: 1}\n- sweep: {to_deg: 10, rate_deg_s: 5, hold_s: 2}\n"
+        "segments:\n- hold: {duration_s: 1}\n- sweep: {to_deg: 1e1, rate_deg_s: 5, hold_s: 2}\n"
         "- chirp: {amplitude_deg: 2, from_Hz: 0.1, to_Hz: 1, duration_s: 5}\n",
         encoding="utf-8",
     )
@@ -149,6 +156,7 @@ def test_yaml_manoeuvres(tmp_path: Path) -> None:
         ("[", "YAML"),
         ("{}", "segments"),
         ("segments: []", "segments"),
+        ("segments: [{hold: {duration_s: 5}}]\nspeling: 1", "key 'speling': got 1"),
         ("segments: [{jump: {}}]", "segments[0]"),
         ("segments: [{sweep: {to_deg: 5}}]", "sweep.rate_deg_s: got nothing"),
         ("segments: [{sweep: {to_deg: 5, rate_deg_s: 0}}]", "sweep.rate_deg_s"),
