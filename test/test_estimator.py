@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lugre_steering.estimator import Estimator, Options
+from lugre_steering.estimator import WAITING_RING, Estimator, Options
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
 
@@ -274,10 +274,18 @@ def test_late_line_and_missing_line() -> None:
 
 
 def test_missing_side_gives_no_torque_and_is_told() -> None:
-    estimator, estimates, _ = feed([m for m in messages() if m[0] != RIGHT])
+    estimator, estimates, _ = feed([m for m in messages(15.0) if m[0] != RIGHT])
     assert estimates.size == 0
     assert estimator.latest_ns["angle/right"] == 0
-    assert rejected(estimator)["angle/left"]["unpaired"] > 500
+    assert rejected(estimator)["angle/left"]["unpaired"] == 1500 - WAITING_RING
+
+
+def test_a_side_that_comes_much_later_than_the_other_still_pairs() -> None:
+    """500 Hz, the right side 0.5 s late: 250 samples wait."""
+    stream = [(k, T0 + i * 2 * MS, 1e-4 * i) for i in range(1500) for k in (LEFT, RIGHT)]
+    estimator, estimates, _ = feed(sorted(stream, key=lambda m: m[1] + (500 * MS if m[0] == RIGHT else 0)))
+    assert estimates.size == 1500
+    assert rejected(estimator) == {}
 
 
 def test_absolute_pressure_reference_is_removed() -> None:
