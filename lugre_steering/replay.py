@@ -43,7 +43,7 @@ COMMAND = "steering/command"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
-NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun")
+NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart")
 """Counters of the estimator about samples that it did use."""
 
 Progress = Callable[[str, int, "int | None"], None]
@@ -284,9 +284,10 @@ class _Run:
     def _last_findings(self) -> Iterator[Finding]:
         set_back = self._clocks[0].set_back if self._clocks else 0
         if set_back:
-            yield Finding(
-                "clock_set_back", "", f"stamps jumped back {set_back} times; the estimator began anew each time"
-            )
+            yield Finding("clock_set_back", "", f"stamps jumped back {set_back} times")
+        if restarts := self.estimator.restarts:
+            statement = f"the estimator began anew {restarts} times (clock set back, or a torque that was no finite number)"
+            yield Finding("restart", "", statement)
         if self._counts["withheld"]:
             statement = f"{self._counts['withheld']} results were no finite numbers and are left out"
             yield Finding("withheld", "", statement)

@@ -251,6 +251,104 @@ def test_jump_back_in_time_starts_anew_once_confirmed() -> None:
     assert rejected(estimator)["angle/left"]["time_jump"] == 1
 
 
+def torque_error(estimates: Array, clean: Array) -> float:
+    """Largest deviation of the total torque [N m] from that of a clean run, at the stamps both have."""
+    _, i, j = np.intersect1d(estimates["stamp_ns"], clean["stamp_ns"], return_indices=True)
+    assert i.size > 0.9 * clean.size
+    return float(np.abs(estimates["total"][i] - clean["total"][j]).max())
+
+
+@pytest.mark.parametrize("channel", [MAIN_A, AIR])
+def test_stray_stamps_of_a_line_or_of_the_air_do_not_touch_the_torque(channel: int) -> None:
+    stream = messages()
+    k = next(i for i, m in enumerate(stream) if m[0] == channel and m[1] >= T0 + 3000 * MS)
+    stream[k:k] = [(channel, T0 + 3600 * 1000 * MS + i * 10 * MS, stream[k][2]) for i in range(2)]
+    estimator, estimates, residuals = feed(stream)
+    _, clean, _ = feed(messages())
+    np.testing.assert_array_equal(estimates["total"], clean["total"])
+    assert estimator.restarts == 0
+    assert residuals["stamp_ns"].max() > T0 + 5900 * MS
+
+
+@pytest.mark.parametrize("channel", [MAIN_A, AIR])
+def test_a_line_or_air_clock_set_back_does_not_touch_the_torque(channel: int) -> None:
+    stream = [(k, s - 3000 * MS if k == channel and s > T0 + 4000 * MS else s, v) for k, s, v in messages(8.0)]
+    stream.sort(key=lambda m: m[1] + (3000 * MS if m[0] == channel and m[1] > T0 + 1000 * MS else 0))
+    estimator, estimates, _ = feed(stream)
+    _, clean, _ = feed(messages(8.0))
+    np.testing.assert_array_equal(estimates["total"], clean["total"])
+    assert estimator.restarts == 0
+
+
+@pytest.mark.parametrize("ahead_s", [5, 3600])
+def test_stray_stamps_of_one_side_do_not_wipe_the_model(ahead_s: int) -> None:
+    stream = messages()
+    k = next(i for i, m in enumerate(stream) if m[0] == LEFT and m[1] >= T0 + 2000 * MS)
+    stray = T0 + ahead_s * 1000 * MS + 2000 * MS
+    stream[k:k] = [(LEFT, stray + i * 10 * MS, stream[k][2]) for i in range(2)]
+    estimator, estimates, _ = feed(stream)
+    _, clean, _ = feed(messages())
+    assert estimator.restarts == 0
+    assert estimates.size >= 598
+    assert torque_error(estimates, clean) < 0.01 * np.abs(clean["total"]).max()
+
+
+def test_one_side_set_back_is_refused_until_its_clock_has_caught_up() -> None:
+    stream = [(k, s - (2500 * MS if k == RIGHT and s >= T0 + 2000 * MS else 0), v) for k, s, v in messages()]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 0
+    assert {"time_jump": 50, "backward": 199, "duplicate": 1}.items() <= rejected(estimator)["angle/right"].items()
+    assert estimates["stamp_ns"].max() == T0 + 3490 * MS
+
+
+def test_a_pause_of_both_sides_is_no_restart() -> None:
+    stream = [(k, s + (60_000 * MS if s >= T0 + 3000 * MS else 0), v) for k, s, v in messages()]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 0
+    assert estimates.size == 599  # the first sample of each side had to be confirmed
+    assert rejected(estimator)["angle/left"] == {"time_jump": 1, "gap": 1}
+
+
+@pytest.mark.parametrize("back_ms", [2500, 4000])
+def test_a_clock_set_back_restarts_once_and_is_counted(back_ms: int) -> None:
+    stream = [(k, s - (back_ms * MS if i > 3000 else 0), v) for i, (k, s, v) in enumerate(messages(12.0))]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 1
+    assert sum(row.get("restart", 0) for row in estimator.counters.values()) == 1
+    assert estimates.size >= 1198
+    assert np.sum(np.diff(estimates["stamp_ns"]) < 0) == 1
+
+
+def test_sides_of_different_rates_restart_together() -> None:
+    slow = [m for m in messages() if not (m[0] == RIGHT and (m[1] - T0) // (10 * MS) % 10)]
+    estimator, estimates, _ = feed(slow + slow)
+    assert estimator.restarts == 1
+    assert 118 <= estimates.size <= 120
+
+
+def test_a_restart_keeps_the_count_of_steps_outside_the_rubber_table_and_counts_torques_without_pressures() -> None:
+    hot = VEHICLE.replace(initial=dataclasses.replace(VEHICLE.initial, rubber_temperature_degC=150.0))
+    angles = [m for m in messages() if m[0] in (LEFT, RIGHT)]
+    estimator, _, _ = feed(angles, hot)
+    before = estimator.saturated_steps
+    assert before > 0
+    for m in angles[:4]:
+        estimator.push(*m)
+    assert estimator.restarts == 1
+    assert estimator.saturated_steps == before + 2  # of the first four, two confirmed the jump
+    assert rejected(estimator)["angle/left"]["overrun"] == 600
+
+
+def test_air_slower_than_any_jump_limit_is_taken_over() -> None:
+    """Every 20 s: each sample stands alone."""
+    stream = [m for m in messages(42.0) if m[0] in (LEFT, RIGHT)]
+    rare = [(AIR, T0 + i * 20_000 * MS + MS, 15.0 - 20.0 * i) for i in range(3)]
+    estimator, estimates, _ = feed(sorted(stream + rare, key=lambda m: m[1]))
+    assert estimator.counters["air_temperature"] == {"accepted": 3}
+    _, mild, _ = feed(sorted([*stream, rare[0]], key=lambda m: m[1]))
+    assert np.all(estimates["temperature"][-1] < mild["temperature"][-1])
+
+
 def test_gap_is_counted_and_no_residual_is_interpolated_across_it() -> None:
     stream = [m for m in messages() if not (m[0] == MAIN_A and T0 + 2000 * MS < m[1] < T0 + 3000 * MS)]
     estimator, estimates, residuals = feed(stream)

@@ -341,7 +341,8 @@ def test_clock_set_back_is_reported_and_replayed(tmp_path: Path) -> None:
     later = [(t, k, log + 100 * SECOND, data) for t, k, log, data in drive(3.0)]  # the same stamps once more
     bag = make.write(tmp_path / "run", [*drive(5.0), *later])
     summary = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]
-    assert "clock_set_back" in [finding["finding"] for finding in summary["findings"]]
+    assert {"clock_set_back", "restart"} <= {finding["finding"] for finding in summary["findings"]}
+    assert sum(counts["noted"].get("restart", 0) for counts in summary["samples"].values()) == 1
     assert summary["estimates"] > 390
 
 
