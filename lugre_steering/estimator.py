@@ -15,6 +15,7 @@ Rules of time (header stamps only, never arrival times):
   believed when the next sample of the same channel confirms it and, for an angle, the other side is there or jumps as
   well. A jump of both sides back in time starts the estimator anew; a side or line that jumps back alone loses its own
   samples in waiting, nothing else. So does a torque that is no finite number start it anew; ``restart`` counts them.
+* A rate that no steering has, or none that is a number, counts as not given.
 """
 
 from __future__ import annotations
@@ -33,15 +34,15 @@ from lugre_steering.chain.model import build_model
 from lugre_steering.chain.rates import MOTION, follow
 from lugre_steering.chain.step import Records, has_effects, step
 from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
-from lugre_steering.recording import Array, IntArray, Kind
+from lugre_steering.recording import RATE_LIMIT, Array, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
 
 REASONS = (
     "duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun",
-    "restart",
+    "restart", "absurd_rate",
 )  # fmt: skip
 (
-    _DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _GAP, _OVERRUN, _RESTART,
+    _DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _GAP, _OVERRUN, _RESTART, _RATE,
 ) = range(len(REASONS))  # fmt: skip
 
 LINE_RING = 8192
@@ -172,14 +173,20 @@ def _clear(ch):
 
 
 @njit
+def _begin_side(core, side):
+    """Forget what one side has been through, but for the count of its steps outside the rubber table."""
+    saturated = core.state[side].saturated
+    core.state[side] = np.zeros_like(core.state)[side]
+    core.motion[side] = np.zeros_like(core.motion)[side]
+    core.state[side].saturated = saturated
+    _clear(core.channels[side])
+
+
+@njit
 def _restart(core, k):
     """Forget the past, except the counters; counted for channel ``k``, like the torques that still lack pressures."""
-    # One by one: slice assignment would compile for ten seconds more.
-    state, motion = np.zeros_like(core.state), np.zeros_like(core.motion)
-    for side in range(state.size):
-        state[side].saturated = core.state[side].saturated
-        core.state[side] = state[side]
-        core.motion[side] = motion[side]
+    for side in range(core.state.size):  # slice assignment would compile for ten seconds more
+        _begin_side(core, side)
     for i in range(core.channels.size):
         _clear(core.channels[i])
     c = core.config[0]
@@ -270,6 +277,9 @@ def _admit(core, k, stamp_ns, value):
                 ch.suspect_ns = stamp_ns
                 ch.suspect_value = value
                 return False
+            if ch.head == 1:  # two agree against the first one
+                _begin_side(core, ch.index)
+                return True
     if ahead > c.max_gap_ns:
         ch.reasons[_GAP] += 1
     ch.suspect_ns = 0
@@ -355,6 +365,9 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
     c, ch = core.config[0], core.channels[k]
     side = ch.index
+    if abs(rate) >= RATE_LIMIT:
+        ch.reasons[_RATE] += 1
+        rate = math.nan
     if c.start_ns == 0 or stamp_ns < c.start_ns:
         c.start_ns = stamp_ns
     dt = 0.0
@@ -406,6 +419,10 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
         e.temperature[other] = w.temperature
         e.feed_forward[other] = w.feed_forward
         e.total += w.torque
+    if not math.isfinite(e.total):
+        e.predicted = e.total
+        _restart(core, k)
+        return count + 1
     if c.lag > 0.0 and c.lagged_ns != 0:
         c.lagged = e.total + (c.lagged - e.total) * math.exp(-(latest - c.lagged_ns) * 1e-9 / c.lag)
     else:
@@ -604,7 +621,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["max_rate"] = options.max_rate_rad_s
     config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
-    config["gauge_offset"] = gauge_offset(vehicle)
+    config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
     config["pressure_gain"] = vehicle.sensors.pressure_gain
     config["delay_ns"] = round(correction.delay_s * 1e9)
     config["lag"] = correction.lag_s

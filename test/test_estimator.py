@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lugre_steering.bag import load as offline
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
-from lugre_steering.recording import Array
+from lugre_steering.recording import RATE_LIMIT, Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
@@ -195,6 +196,40 @@ def test_single_bad_angles_are_rejected(value: float, reason: str) -> None:
     assert estimates.size == 599
     _, clean, _ = feed(messages())
     assert abs(estimates["total"][-1] - clean["total"][-1]) < 5.0
+
+
+@pytest.mark.parametrize("rate", [math.inf, -math.inf, 1e300, RATE_LIMIT])
+def test_a_rate_that_no_steering_has_counts_as_not_given(rate: float) -> None:
+    absurd, without = Estimator(VEHICLE), Estimator(VEHICLE)
+    for i, m in enumerate(messages(3.0)):
+        e, _ = absurd.push(*m, rate if i % 100 == 50 and m[0] == LEFT else math.nan)
+        expected, _ = without.push(*m)
+        np.testing.assert_array_equal(e["total"], expected["total"])
+    assert list(rejected(absurd)) == ["angle/left"]
+    assert rejected(absurd)["angle/left"]["absurd_rate"] > 0
+    assert offline.RATE_LIMIT == RATE_LIMIT
+
+
+def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:
+    estimator, totals = Estimator(VEHICLE), []
+    for i, m in enumerate(messages()):
+        if i == 1000:
+            estimator._core.state["z"][0] = math.nan
+        totals += [float(e["total"]) for e in estimator.push(*m)[0]]
+    assert len(totals) == 600
+    assert sum(math.isnan(total) for total in totals) == 1
+    assert estimator.restarts == 1
+    assert max(abs(total) for total in totals[-100:]) > 1000.0
+
+
+@pytest.mark.parametrize("first", [3.0, -1.0])
+def test_a_bad_first_angle_is_not_held_for_ever(first: float) -> None:
+    """Then the vehicle stands: as soon as two samples contradict the first one, it never happened."""
+    parked = [(k, T0 + i * 10 * MS, first if i + k == 0 else 0.0) for i in range(300) for k in (LEFT, RIGHT)]
+    _, estimates, _ = feed(parked)
+    assert estimates.size == 299
+    assert np.all(estimates["total"][1:] == 0.0)
+    assert np.all(estimates["theta"][1:] == 0.0)
 
 
 def test_bad_pressures_and_air_are_rejected() -> None:
@@ -395,7 +430,9 @@ def test_absolute_pressure_reference_is_removed() -> None:
 
 
 def test_single_side_with_torque_sensor() -> None:
-    one = VEHICLE.replace(sides=("left",), hydraulics=None, torque_sensor=TorqueSensor())
+    """Such a vehicle has no pressure that could be absolute."""
+    absolute = dataclasses.replace(VEHICLE.sensors, pressure_reference="absolute")
+    one = VEHICLE.replace(sides=("left",), hydraulics=None, torque_sensor=TorqueSensor(), sensors=absolute)
     stream: list[Message] = []
     for i in range(300):
         stamp = T0 + i * 10 * MS
