@@ -159,7 +159,8 @@ def simulate(
     from lugre_steering.simulate import command as simulation
 
     if show_list:
-        simulation.show_catalogue(Console())
+        rows = [dict(zip(("kind", "name", "description"), row, strict=True)) for row in simulation.catalogue()]
+        print_json(rows) if as_json else simulation.show_catalogue(Console())
         return
     if not what or out is None:
         raise DataError(

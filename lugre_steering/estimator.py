@@ -12,8 +12,10 @@ Rules of time (header stamps only, never arrival times):
 * The residual of a torque follows when every line has a pressure at or after its stamp; pressures are interpolated
   linearly, never held or extrapolated, and not across a gap.
 * Duplicate, backward, zero, not finite, absurd and jumping samples are rejected and counted by reason. A jump is
-  believed when the next sample of the same channel confirms it; a confirmed jump back in time starts the estimator
-  anew.
+  believed when the next sample of the same channel confirms it and, for an angle, the other side is there or jumps as
+  well. A jump of both sides back in time starts the estimator anew; a side or line that jumps back alone loses its own
+  samples in waiting, nothing else. So does a torque that is no finite number start it anew; ``restart`` counts them.
+* A rate that no steering has, or none that is a number, counts as not given.
 """
 
 from __future__ import annotations
@@ -32,18 +34,22 @@ from lugre_steering.chain.model import build_model
 from lugre_steering.chain.rates import MOTION, follow
 from lugre_steering.chain.step import Records, has_effects, step
 from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
-from lugre_steering.recording import Array, IntArray, Kind
+from lugre_steering.recording import RATE_LIMIT, Array, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
 
 REASONS = (
     "duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun",
+    "restart", "absurd_rate",
 )  # fmt: skip
-_DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _GAP, _OVERRUN = range(len(REASONS))
+(
+    _DUPLICATE, _BACKWARD, _ZERO, _NOT_FINITE, _ABSURD, _SPIKE, _JUMP, _UNPAIRED, _GAP, _OVERRUN, _RESTART, _RATE,
+) = range(len(REASONS))  # fmt: skip
 
 LINE_RING = 8192
 PENDING_RING = 8192
-WAITING_RING = 64
+WAITING_RING = 1024  # one side may come two seconds later than the other, at 500 Hz
 MAX_PAIR_TOLERANCE_NS = 50_000_000
+CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
 PREVIEW_STEPS = 20
 PLAN_POINTS = 1024
 
@@ -157,25 +163,60 @@ class Core(NamedTuple):
 
 
 @njit
-def _reset(core, keep):
-    """Forget the past after a jump back in time, except the counters and channel ``keep``'s confirmation."""
-    # One by one: slice assignment would compile for ten seconds more.
-    state, motion = np.zeros_like(core.state), np.zeros_like(core.motion)
-    for side in range(state.size):
-        core.state[side] = state[side]
-        core.motion[side] = motion[side]
+def _clear(ch):
+    """Forget the samples of one channel, not its counters."""
+    ch.last_ns = 0
+    ch.suspect_ns = 0
+    ch.period_ns = 0
+    ch.head = 0
+    ch.cursor = 0
+
+
+@njit
+def _begin_side(core, side):
+    """Forget what one side has been through, but for the count of its steps outside the rubber table."""
+    saturated = core.state[side].saturated
+    core.state[side] = np.zeros_like(core.state)[side]
+    core.motion[side] = np.zeros_like(core.motion)[side]
+    core.state[side].saturated = saturated
+    _clear(core.channels[side])
+
+
+@njit
+def _restart(core, k):
+    """Forget the past, except the counters; counted for channel ``k``, like the torques that still lack pressures."""
+    for side in range(core.state.size):  # slice assignment would compile for ten seconds more
+        _begin_side(core, side)
+    for i in range(core.channels.size):
+        _clear(core.channels[i])
     c = core.config[0]
+    core.channels[k].reasons[_RESTART] += 1
+    core.channels[k].reasons[_OVERRUN] += c.pending_count
     c.start_ns = 0
     c.lagged_ns = 0
     c.pending_count = 0
     c.plan_size = 0
-    for i in range(core.channels.size):
-        core.channels[i].last_ns = 0
-        core.channels[i].period_ns = 0
-        core.channels[i].head = 0
-        core.channels[i].cursor = 0
-        if i != keep:
-            core.channels[i].suspect_ns = 0
+
+
+_DOUBTED, _SHARED, _THERE = range(3)
+
+
+@njit
+def _other_side(core, k, stamp_ns):
+    """What the other side says to a jump of angle channel ``k``: it is not there, it jumps as well, or it is there.
+
+    A side without any sample yet (or without another) agrees.
+    """
+    near_ns = min(CONFIRM_NS, core.config[0].backward_jump_ns // 2)
+    for side in range(core.state.size):
+        other = core.channels[side]
+        if side == k or other.last_ns == 0:
+            continue
+        if abs(stamp_ns - other.last_ns) < near_ns:
+            return _THERE
+        if other.suspect_ns == 0 or abs(stamp_ns - other.suspect_ns) >= near_ns:
+            return _DOUBTED
+    return _SHARED
 
 
 @njit
@@ -200,24 +241,30 @@ def _admit(core, k, stamp_ns, value):
     if ahead == 0:
         ch.reasons[_DUPLICATE] += 1
         return False
-    follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < 1_000_000_000
-    if ahead < 0:
-        if ahead > -c.backward_jump_ns:
-            ch.reasons[_BACKWARD] += 1
-            return False
-        if not follows_suspect:
+    if -c.backward_jump_ns < ahead < 0:
+        ch.reasons[_BACKWARD] += 1
+        return False
+    if ch.kind == 2:  # air may come as rarely as it likes, and no sample of it is needed at any instant
+        return True
+    follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < CONFIRM_NS
+    if ahead < 0 or ahead > c.forward_jump_ns:
+        other_side = _other_side(core, k, stamp_ns) if ch.kind == 0 else _THERE
+        if not follows_suspect or other_side == _DOUBTED:
             ch.reasons[_JUMP] += 1
             ch.suspect_ns = stamp_ns
             ch.suspect_value = value
             return False
-        _reset(core, k)
-        ch.suspect_ns = 0
-        return True
-    if ahead > c.forward_jump_ns and not follows_suspect:
-        ch.reasons[_JUMP] += 1
-        ch.suspect_ns = stamp_ns
-        ch.suspect_value = value
-        return False
+        if ahead < 0:
+            if other_side == _SHARED:
+                _restart(core, k)
+                return True
+            if ch.kind != 0:
+                _clear(ch)
+                return True
+            # This side alone had strayed ahead: it goes on from the sample before, which the stray one made suspect.
+            ch.last_ns = ch.suspect_ns
+            ch.cursor = ch.head
+            ahead = stamp_ns - ch.last_ns
     if ch.kind == 0:
         reach = c.max_rate * ahead * 1e-9 + 10.0 * c.angle_noise
         if abs(value - ch.last_value) > reach:
@@ -230,7 +277,10 @@ def _admit(core, k, stamp_ns, value):
                 ch.suspect_ns = stamp_ns
                 ch.suspect_value = value
                 return False
-    if ahead > c.max_gap_ns and ch.kind != 2:  # air may come as rarely as it likes
+            if ch.head == 1:  # two agree against the first one
+                _begin_side(core, ch.index)
+                return True
+    if ahead > c.max_gap_ns:
         ch.reasons[_GAP] += 1
     ch.suspect_ns = 0
     return True
@@ -315,7 +365,10 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
     c, ch = core.config[0], core.channels[k]
     side = ch.index
-    if c.start_ns == 0:
+    if abs(rate) >= RATE_LIMIT:
+        ch.reasons[_RATE] += 1
+        rate = math.nan
+    if c.start_ns == 0 or stamp_ns < c.start_ns:
         c.start_ns = stamp_ns
     dt = 0.0
     if ch.last_ns == 0:
@@ -366,6 +419,10 @@ def _angle(core, k, stamp_ns, value, rate, estimates, count):
         e.temperature[other] = w.temperature
         e.feed_forward[other] = w.feed_forward
         e.total += w.torque
+    if not math.isfinite(e.total):
+        e.predicted = e.total
+        _restart(core, k)
+        return count + 1
     if c.lag > 0.0 and c.lagged_ns != 0:
         c.lagged = e.total + (c.lagged - e.total) * math.exp(-(latest - c.lagged_ns) * 1e-9 / c.lag)
     else:
@@ -528,6 +585,11 @@ class Estimator:
         }
 
     @property
+    def restarts(self) -> int:
+        """How often it began anew, because time was set back or a torque was no finite number."""
+        return int(self._core.channels["reasons"][:, _RESTART].sum())
+
+    @property
     def saturated_steps(self) -> int:
         """Steps so far with a rubber temperature outside the rubber table."""
         return int(self._core.state["saturated"].sum())
@@ -559,7 +621,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["max_rate"] = options.max_rate_rad_s
     config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
-    config["gauge_offset"] = gauge_offset(vehicle)
+    config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
     config["pressure_gain"] = vehicle.sensors.pressure_gain
     config["delay_ns"] = round(correction.delay_s * 1e9)
     config["lag"] = correction.lag_s

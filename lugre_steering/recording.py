@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+RATE_LIMIT = 100.0  # rad/s, far beyond any steering: such a rate counts as not given
+
 
 class Kind(IntEnum):
     """What a channel carries; the number is the code used inside the compiled loop."""

@@ -43,7 +43,7 @@ COMMAND = "steering/command"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
-NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun")
+NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate")
 """Counters of the estimator about samples that it did use."""
 
 Progress = Callable[[str, int, "int | None"], None]
@@ -120,8 +120,24 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
             if source == result or source in result.parents or result in source.parents:
                 raise BagError(f"{path}: the result {out / name} would touch this bag; choose another --out")
         if result.exists() and not _is_result(result):
-            raise BagError(f"{out / name}: exists and is not an earlier result of replay; choose another --out")
+            raise _not_ours(out / name)
+        picture = out / f"{name}.png"
+        if picture.exists() and not result.exists():  # ours only come with the bag
+            raise _not_ours(picture)
+    if (out / "summary.json").exists() and not _is_summary(out / "summary.json"):
+        raise _not_ours(out / "summary.json")
     return names
+
+
+def _not_ours(path: Path) -> BagError:
+    return BagError(f"{path}: exists and is not an earlier result of replay; choose another --out")
+
+
+def _is_summary(file: Path) -> bool:
+    try:
+        return bool(json.loads(file.read_bytes())["schema"] == SCHEMA)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def _is_result(folder: Path) -> bool:
@@ -150,18 +166,20 @@ class _Run:
         self._found: list[Finding] = []
         self._clocks: tuple[Timeline, Timeline] | None = None  # of estimates and of residuals
         self._log_ns = (0, 0)
+        self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
     def write(self, out: Path, progress: Progress | None) -> dict[str, Any]:
         """Write the bag and the picture; returns the summary of this bag."""
         with Bag(self.path) as bag, tempfile.TemporaryDirectory(prefix=".replay_", dir=out) as folder:
-            topics = bag.match(self.vehicle.channels)
+            channels = self._wanted(bag)
+            topics = bag.match(channels)
             for channel in self.vehicle.channels:
                 if channel.kind is Kind.ANGLE and channel not in topics:
                     found = ", ".join(sorted(bag.topics)) or "none"
                     raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
             result = Path(folder) / self.name
             with BagWriter(result, custom_data=MARK) as writer:
-                self._stream(bag, writer, progress)
+                self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
             if not self._counts["estimates"]:
                 raise BagError(f"{self.path}: no torque could be estimated ({_counted(samples, Kind.ANGLE)})")
@@ -177,21 +195,34 @@ class _Run:
             "messages": self._counts["messages"],
             "estimates": self._counts["estimates"],
             "fit": fit,
-            "fit_note": None if fit else f"residual not available ({_counted(samples, Kind.PRESSURE, Kind.TORQUE)})",
+            "fit_note": None if fit else f"residual not available ({self._why_no_fit(samples)})",
             "samples": samples,
             "saturated_rubber_table_steps": self.estimator.saturated_steps,
             "findings": [asdict(finding) for finding in findings],
         }
         return summary | self._picture(out / f"{self.name}.png", fit)
 
-    def _stream(self, bag: Bag, writer: BagWriter, progress: Progress | None) -> None:
+    def _wanted(self, bag: Bag) -> Sequence[Channel]:
+        """The vehicle's channels, without the optional one where the bag leaves open which topic it is."""
+        *needed, air = self.vehicle.channels  # air is the last, so that all keep their numbers
+        return self.vehicle.channels if self._optional(bag, air.topic) else needed
+
+    def _optional(self, bag: Bag, name: str) -> str | None:
+        """The recorded topic of an optional input; None where there is none, or more than one."""
+        try:
+            return bag.find_topic(name)
+        except BagError as error:
+            self._found.append(Finding("ambiguous_topic", "", f"{error}; none of them was used"))
+            return None
+
+    def _stream(self, bag: Bag, channels: Sequence[Channel], writer: BagWriter, progress: Progress | None) -> None:
         """All messages through the estimator and, with what comes of them, into the output."""
         outputs = _Outputs(writer, self.vehicle)
         if old := sorted(outputs.topics & set(bag.topics)):
             statement = f"{', '.join(old)}: recorded before; replaced in the output by the results of this replay"
             self._found.append(Finding("replaced_topics", "", statement))
-        command = bag.find_topic(COMMAND)
-        for block in bag.blocks(self.vehicle.channels, all_messages=True):
+        command = self._optional(bag, COMMAND)
+        for block in bag.blocks(channels, all_messages=True):
             if not len(block.messages):
                 continue
             # Connections may still be added while a damaged file is read.
@@ -248,10 +279,15 @@ class _Run:
 
     def _learn(self, block: Block, estimates: Records, residuals: Records) -> None:
         """Statistics and curves."""
+        for i in range(len(self.vehicle.channels)):
+            stamps = block.stamp_ns[(block.channel == i) & (block.stamp_ns > 0)]
+            if stamps.size:
+                begin, end = self._spans.get(i, (stamps[0], stamps[0]))
+                self._spans[i] = min(begin, int(stamps.min())), max(end, int(stamps.max()))
         if self._clocks is None:
-            if not block.stamp_ns.size:
+            start_ns = _first_stamp(block, len(self.vehicle.sides))
+            if start_ns is None:
                 return
-            start_ns = _first_stamp(block)
             self._clocks = Timeline(start_ns), Timeline(start_ns)
         sides = len(self.vehicle.sides)
         time_s = self._clocks[0](estimates["stamp_ns"])
@@ -281,12 +317,26 @@ class _Run:
             }  # fmt: skip
         return table
 
+    def _why_no_fit(self, samples: Mapping[str, Mapping[str, Any]]) -> str:
+        """What came of pressures or measured torque, and how far their stamps are from the angles' where they miss them."""
+        angle, words = self._spans[0], [_counted(samples, Kind.PRESSURE, Kind.TORQUE)]
+        for i, (channel, label) in enumerate(zip(self.vehicle.channels, samples, strict=False)):
+            if channel.kind not in (Kind.PRESSURE, Kind.TORQUE):
+                continue
+            begin, end = self._spans.get(i, angle)
+            if end < angle[0]:
+                words.append(f"{label}: stamps end {(angle[0] - end) * 1e-9:.1f} s before those of the angles begin")
+            elif begin > angle[1]:
+                words.append(f"{label}: stamps begin {(begin - angle[1]) * 1e-9:.1f} s after those of the angles end")
+        return "; ".join(words)
+
     def _last_findings(self) -> Iterator[Finding]:
         set_back = self._clocks[0].set_back if self._clocks else 0
         if set_back:
-            yield Finding(
-                "clock_set_back", "", f"stamps jumped back {set_back} times; the estimator began anew each time"
-            )
+            yield Finding("clock_set_back", "", f"stamps jumped back {set_back} times")
+        if restarts := self.estimator.restarts:
+            statement = f"the estimator began anew {restarts} times (clock set back, or a torque that was no finite number)"
+            yield Finding("restart", "", statement)
         if self._counts["withheld"]:
             statement = f"{self._counts['withheld']} results were no finite numbers and are left out"
             yield Finding("withheld", "", statement)
@@ -305,10 +355,17 @@ class _Run:
         return {"picture": file.name, "picture_note": None}
 
 
-def _first_stamp(block: Block) -> int:
-    """First header stamp [ns] that belongs to this recording: not zero, not far from where the log clock puts it."""
+def _first_stamp(block: Block, sides: int) -> int | None:
+    """First header stamp [ns] that belongs to this recording: not zero, not far from where the angles' clock puts it.
+
+    None without such a stamp. The angles are the first channels; they alone give torques.
+    """
     offset = block.stamp_ns - block.log_ns
-    near = np.abs(offset - np.median(offset)) <= STRAY_NS
+    usual = np.sort(offset[(block.channel < sides) & (block.stamp_ns > 0)])
+    if not usual.size:
+        return None
+    # One of them, not the mean of two: half of the stamps may be of another clock.
+    near = np.abs(offset - usual[(usual.size - 1) // 2]) <= STRAY_NS
     return int(block.stamp_ns[near].min())
 
 

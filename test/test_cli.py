@@ -94,6 +94,14 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert all(word in done.stderr for word in words), done.stderr
 
 
+def test_list_of_simulations_as_json(tmp_path: Path) -> None:
+    done = run("simulate", "--list", "--json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    rows = json.loads(done.stdout)
+    assert {"manoeuvre", "experiment", "file"} == {row["kind"] for row in rows}
+    assert all(row["name"] and row["description"] for row in rows)
+
+
 def test_wrong_usage_is_exit_code_2_without_traceback(tmp_path: Path) -> None:
     done = run("replay", cwd=tmp_path)
     assert done.returncode == 2

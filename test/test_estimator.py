@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lugre_steering.estimator import Estimator, Options
-from lugre_steering.recording import Array
+from lugre_steering.bag import load as offline
+from lugre_steering.estimator import WAITING_RING, Estimator, Options
+from lugre_steering.recording import RATE_LIMIT, Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
@@ -197,6 +198,40 @@ def test_single_bad_angles_are_rejected(value: float, reason: str) -> None:
     assert abs(estimates["total"][-1] - clean["total"][-1]) < 5.0
 
 
+@pytest.mark.parametrize("rate", [math.inf, -math.inf, 1e300, RATE_LIMIT])
+def test_a_rate_that_no_steering_has_counts_as_not_given(rate: float) -> None:
+    absurd, without = Estimator(VEHICLE), Estimator(VEHICLE)
+    for i, m in enumerate(messages(3.0)):
+        e, _ = absurd.push(*m, rate if i % 100 == 50 and m[0] == LEFT else math.nan)
+        expected, _ = without.push(*m)
+        np.testing.assert_array_equal(e["total"], expected["total"])
+    assert list(rejected(absurd)) == ["angle/left"]
+    assert rejected(absurd)["angle/left"]["absurd_rate"] > 0
+    assert offline.RATE_LIMIT == RATE_LIMIT
+
+
+def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:
+    estimator, totals = Estimator(VEHICLE), []
+    for i, m in enumerate(messages()):
+        if i == 1000:
+            estimator._core.state["z"][0] = math.nan
+        totals += [float(e["total"]) for e in estimator.push(*m)[0]]
+    assert len(totals) == 600
+    assert sum(math.isnan(total) for total in totals) == 1
+    assert estimator.restarts == 1
+    assert max(abs(total) for total in totals[-100:]) > 1000.0
+
+
+@pytest.mark.parametrize("first", [3.0, -1.0])
+def test_a_bad_first_angle_is_not_held_for_ever(first: float) -> None:
+    """Then the vehicle stands: as soon as two samples contradict the first one, it never happened."""
+    parked = [(k, T0 + i * 10 * MS, first if i + k == 0 else 0.0) for i in range(300) for k in (LEFT, RIGHT)]
+    _, estimates, _ = feed(parked)
+    assert estimates.size == 299
+    assert np.all(estimates["total"][1:] == 0.0)
+    assert np.all(estimates["theta"][1:] == 0.0)
+
+
 def test_bad_pressures_and_air_are_rejected() -> None:
     stream = messages()
     extra = [
@@ -251,6 +286,104 @@ def test_jump_back_in_time_starts_anew_once_confirmed() -> None:
     assert rejected(estimator)["angle/left"]["time_jump"] == 1
 
 
+def torque_error(estimates: Array, clean: Array) -> float:
+    """Largest deviation of the total torque [N m] from that of a clean run, at the stamps both have."""
+    _, i, j = np.intersect1d(estimates["stamp_ns"], clean["stamp_ns"], return_indices=True)
+    assert i.size > 0.9 * clean.size
+    return float(np.abs(estimates["total"][i] - clean["total"][j]).max())
+
+
+@pytest.mark.parametrize("channel", [MAIN_A, AIR])
+def test_stray_stamps_of_a_line_or_of_the_air_do_not_touch_the_torque(channel: int) -> None:
+    stream = messages()
+    k = next(i for i, m in enumerate(stream) if m[0] == channel and m[1] >= T0 + 3000 * MS)
+    stream[k:k] = [(channel, T0 + 3600 * 1000 * MS + i * 10 * MS, stream[k][2]) for i in range(2)]
+    estimator, estimates, residuals = feed(stream)
+    _, clean, _ = feed(messages())
+    np.testing.assert_array_equal(estimates["total"], clean["total"])
+    assert estimator.restarts == 0
+    assert residuals["stamp_ns"].max() > T0 + 5900 * MS
+
+
+@pytest.mark.parametrize("channel", [MAIN_A, AIR])
+def test_a_line_or_air_clock_set_back_does_not_touch_the_torque(channel: int) -> None:
+    stream = [(k, s - 3000 * MS if k == channel and s > T0 + 4000 * MS else s, v) for k, s, v in messages(8.0)]
+    stream.sort(key=lambda m: m[1] + (3000 * MS if m[0] == channel and m[1] > T0 + 1000 * MS else 0))
+    estimator, estimates, _ = feed(stream)
+    _, clean, _ = feed(messages(8.0))
+    np.testing.assert_array_equal(estimates["total"], clean["total"])
+    assert estimator.restarts == 0
+
+
+@pytest.mark.parametrize("ahead_s", [5, 3600])
+def test_stray_stamps_of_one_side_do_not_wipe_the_model(ahead_s: int) -> None:
+    stream = messages()
+    k = next(i for i, m in enumerate(stream) if m[0] == LEFT and m[1] >= T0 + 2000 * MS)
+    stray = T0 + ahead_s * 1000 * MS + 2000 * MS
+    stream[k:k] = [(LEFT, stray + i * 10 * MS, stream[k][2]) for i in range(2)]
+    estimator, estimates, _ = feed(stream)
+    _, clean, _ = feed(messages())
+    assert estimator.restarts == 0
+    assert estimates.size >= 598
+    assert torque_error(estimates, clean) < 0.01 * np.abs(clean["total"]).max()
+
+
+def test_one_side_set_back_is_refused_until_its_clock_has_caught_up() -> None:
+    stream = [(k, s - (2500 * MS if k == RIGHT and s >= T0 + 2000 * MS else 0), v) for k, s, v in messages()]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 0
+    assert {"time_jump": 50, "backward": 199, "duplicate": 1}.items() <= rejected(estimator)["angle/right"].items()
+    assert estimates["stamp_ns"].max() == T0 + 3490 * MS
+
+
+def test_a_pause_of_both_sides_is_no_restart() -> None:
+    stream = [(k, s + (60_000 * MS if s >= T0 + 3000 * MS else 0), v) for k, s, v in messages()]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 0
+    assert estimates.size == 599  # the first sample of each side had to be confirmed
+    assert rejected(estimator)["angle/left"] == {"time_jump": 1, "gap": 1}
+
+
+@pytest.mark.parametrize("back_ms", [2500, 4000])
+def test_a_clock_set_back_restarts_once_and_is_counted(back_ms: int) -> None:
+    stream = [(k, s - (back_ms * MS if i > 3000 else 0), v) for i, (k, s, v) in enumerate(messages(12.0))]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 1
+    assert sum(row.get("restart", 0) for row in estimator.counters.values()) == 1
+    assert estimates.size >= 1198
+    assert np.sum(np.diff(estimates["stamp_ns"]) < 0) == 1
+
+
+def test_sides_of_different_rates_restart_together() -> None:
+    slow = [m for m in messages() if not (m[0] == RIGHT and (m[1] - T0) // (10 * MS) % 10)]
+    estimator, estimates, _ = feed(slow + slow)
+    assert estimator.restarts == 1
+    assert 118 <= estimates.size <= 120
+
+
+def test_a_restart_keeps_the_count_of_steps_outside_the_rubber_table_and_counts_torques_without_pressures() -> None:
+    hot = VEHICLE.replace(initial=dataclasses.replace(VEHICLE.initial, rubber_temperature_degC=150.0))
+    angles = [m for m in messages() if m[0] in (LEFT, RIGHT)]
+    estimator, _, _ = feed(angles, hot)
+    before = estimator.saturated_steps
+    assert before > 0
+    for m in angles[:4]:
+        estimator.push(*m)
+    assert estimator.restarts == 1
+    assert estimator.saturated_steps == before + 2  # of the first four, two confirmed the jump
+    assert rejected(estimator)["angle/left"]["overrun"] == 600
+
+
+def test_air_slower_than_any_jump_limit_is_taken_over() -> None:
+    """Every 20 s: each sample stands alone."""
+    stream = [m for m in messages(42.0) if m[0] in (LEFT, RIGHT)]
+    rare = [(AIR, T0 + i * 20_000 * MS + MS, 15.0 - 20.0 * i) for i in range(3)]
+    estimator, estimates, _ = feed(sorted(stream + rare, key=lambda m: m[1]))
+    assert estimator.counters["air_temperature"] == {"accepted": 3}
+    _, mild, _ = feed(sorted([*stream, rare[0]], key=lambda m: m[1]))
+    assert np.all(estimates["temperature"][-1] < mild["temperature"][-1])
+
+
 def test_gap_is_counted_and_no_residual_is_interpolated_across_it() -> None:
     stream = [m for m in messages() if not (m[0] == MAIN_A and T0 + 2000 * MS < m[1] < T0 + 3000 * MS)]
     estimator, estimates, residuals = feed(stream)
@@ -274,10 +407,18 @@ def test_late_line_and_missing_line() -> None:
 
 
 def test_missing_side_gives_no_torque_and_is_told() -> None:
-    estimator, estimates, _ = feed([m for m in messages() if m[0] != RIGHT])
+    estimator, estimates, _ = feed([m for m in messages(15.0) if m[0] != RIGHT])
     assert estimates.size == 0
     assert estimator.latest_ns["angle/right"] == 0
-    assert rejected(estimator)["angle/left"]["unpaired"] > 500
+    assert rejected(estimator)["angle/left"]["unpaired"] == 1500 - WAITING_RING
+
+
+def test_a_side_that_comes_much_later_than_the_other_still_pairs() -> None:
+    """500 Hz, the right side 0.5 s late: 250 samples wait."""
+    stream = [(k, T0 + i * 2 * MS, 1e-4 * i) for i in range(1500) for k in (LEFT, RIGHT)]
+    estimator, estimates, _ = feed(sorted(stream, key=lambda m: m[1] + (500 * MS if m[0] == RIGHT else 0)))
+    assert estimates.size == 1500
+    assert rejected(estimator) == {}
 
 
 def test_absolute_pressure_reference_is_removed() -> None:
@@ -289,7 +430,9 @@ def test_absolute_pressure_reference_is_removed() -> None:
 
 
 def test_single_side_with_torque_sensor() -> None:
-    one = VEHICLE.replace(sides=("left",), hydraulics=None, torque_sensor=TorqueSensor())
+    """Such a vehicle has no pressure that could be absolute."""
+    absolute = dataclasses.replace(VEHICLE.sensors, pressure_reference="absolute")
+    one = VEHICLE.replace(sides=("left",), hydraulics=None, torque_sensor=TorqueSensor(), sensors=absolute)
     stream: list[Message] = []
     for i in range(300):
         stamp = T0 + i * 10 * MS

@@ -341,7 +341,8 @@ def test_clock_set_back_is_reported_and_replayed(tmp_path: Path) -> None:
     later = [(t, k, log + 100 * SECOND, data) for t, k, log, data in drive(3.0)]  # the same stamps once more
     bag = make.write(tmp_path / "run", [*drive(5.0), *later])
     summary = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]
-    assert "clock_set_back" in [finding["finding"] for finding in summary["findings"]]
+    assert {"clock_set_back", "restart"} <= {finding["finding"] for finding in summary["findings"]}
+    assert sum(counts["noted"].get("restart", 0) for counts in summary["samples"].values()) == 1
     assert summary["estimates"] > 390
 
 
@@ -354,6 +355,54 @@ def test_torn_bag_is_replayed_as_far_as_it_goes(tmp_path: Path, storage: str) ->
     assert summary["findings"]
     assert 0 < summary["estimates"] < 10_000
     assert len(decoded(tmp_path / "out" / "run", f"{NODE}/torque")) == summary["estimates"]
+
+
+def restamped(words: tuple[str, ...], shift_ns: int | None) -> list[Message]:
+    """A drive with the stamps of some topics on another clock; None: zero."""
+    messages = []
+    for topic, kind, log, data in drive():
+        if any(word in topic for word in words):
+            message: Any = make.TYPES.deserialize_cdr(data, kind)
+            message.header = make.header(0 if shift_ns is None else stamp_of(message) + shift_ns)
+            data = make.pack(message)
+        messages.append((topic, kind, log, data))
+    return messages
+
+
+def test_half_of_the_stamps_on_another_clock(tmp_path: Path) -> None:
+    """The middle of all stamps lies between the clocks then."""
+    boot = make.write(tmp_path / "boot", restamped(("main_a", "main_b", "aux_a"), 100 * SECOND - make.T0))
+    summary = replay([boot], VEHICLE, tmp_path / "out")["bags"][0]
+    assert summary["estimates"] == 300
+    assert summary["fit"] is None
+    assert "pressure/aux_a: stamps end" in summary["fit_note"]
+    zero = make.write(tmp_path / "zero", restamped(("right", "main_a", "main_b"), None))
+    with pytest.raises(BagError, match="angle/right: 0 samples used, 300 zero_stamp"):
+        replay([zero], VEHICLE, tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("shift_s", "said"), [(-3600, "stamps end 3594.0 s before those of the angles begin"), (60, "stamps begin 54.0 s after")]
+)
+def test_pressures_on_another_clock_are_told(tmp_path: Path, shift_s: int, said: str) -> None:
+    bag = make.write(tmp_path / "run", restamped(("main_a",), shift_s * SECOND))
+    note = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]["fit_note"]
+    assert f"pressure/main_a: {said}" in note
+    assert "main_b: stamps" not in note
+
+
+def test_optional_topics_that_exist_twice_are_left_out_and_told(tmp_path: Path) -> None:
+    air = [
+        (f"/{space}/steering/ambient_temperature", make.TEMPERATURE, make.T0 + i, make.temperature(make.T0 + 1, 20.0))
+        for i, space in enumerate(("a", "b"), 1)
+    ]
+    plans = [(f"/{space}{row[0]}", *row[1:]) for space in "ab" for row in [command(make.T0, make.T0 + 3, [0.1])]]
+    summary = replay([make.write(tmp_path / "run", [*air, *plans, *drive()])], VEHICLE, tmp_path / "out")["bags"][0]
+    assert summary["estimates"] == 300
+    found = [finding["statement"] for finding in summary["findings"] if finding["finding"] == "ambiguous_topic"]
+    assert ["ambient_temperature" in statement for statement in found] == [True, False]
+    assert ["command" in statement for statement in found] == [False, True]
+    assert summary["samples"]["air_temperature"] == {"topic": None, "used": 0, "rejected": {}, "noted": {}}
 
 
 # ------------------------------------------------------------ where it goes
@@ -389,6 +438,16 @@ def test_what_is_no_earlier_result_is_never_overwritten(tmp_path: Path) -> None:
     shutil.copytree(bag, tmp_path / "out" / "run")
     with pytest.raises(BagError, match="not an earlier result"):
         replay([bag], VEHICLE, tmp_path / "out")
+
+
+@pytest.mark.parametrize("file", ["summary.json", "run.png"])
+def test_a_summary_or_picture_of_others_is_never_overwritten(tmp_path: Path, file: str) -> None:
+    bag = make.write(tmp_path / "run", drive(2.0))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / file).write_text('{"schema": "mine"}')
+    with pytest.raises(BagError, match=f"{file}: exists and is not an earlier result"):
+        replay([bag], VEHICLE, tmp_path / "out")
+    assert (tmp_path / "out" / file).read_text() == '{"schema": "mine"}'
 
 
 def test_a_result_can_be_replayed_and_its_old_outputs_are_replaced(tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 
 class CommandRamp:
-    """Leads each command from the last one published to the wanted one, over a fixed time after every silence.
+    """Leads each command from the last one published to the wanted one, over a fixed time after every interruption: a
+    silence, or ``restart``.
 
     An effort controller may hold the last command it got; the topic therefore continues where it stopped. Before the
     first command a controller has none: the ramp starts at zero.
@@ -21,6 +22,10 @@ class CommandRamp:
         self._start = self._published
         self._start_ns = 0
         self._last_ns: int | None = None
+
+    def restart(self) -> None:
+        """Begin the next ramp with the next command, however soon it comes."""
+        self._last_ns = None
 
     def __call__(self, now_ns: int, wanted: Sequence[float]) -> list[float]:
         """The command [N m] of each joint to publish now."""

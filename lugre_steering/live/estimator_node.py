@@ -54,6 +54,7 @@ class SteeringTorqueEstimator(Node):
         self.outputs = Outputs(self, self.vehicle, settings)
         self._fresh_ns = round(settings.angle_timeout_s * 1e9)
         self._joints = [getattr(self.vehicle.topics, f"{side}_joint") for side in self.vehicle.sides]
+        self._torque_ns = 0  # stamp of the newest torque
         self._now_ns: Callable[[], int] = time.time_ns
         self._choose_clock()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -101,6 +102,7 @@ class SteeringTorqueEstimator(Node):
     def fault(self, error: BaseException) -> None:
         """Count an exception, report it, and withhold the outputs for a while."""
         self.health.fault(error, time.monotonic_ns())
+        self.outputs.interrupt_commands()
         self.get_logger().error(f"{type(error).__name__}: {error}", throttle_duration_sec=1.0)
 
     def _joint_state(self, topic: str, wanted: list[tuple[int, str]]) -> Callable[[Any], None]:
@@ -122,7 +124,7 @@ class SteeringTorqueEstimator(Node):
                     angle, rate = map(float, other_track(np.array(angle), np.array(rate), ratio))
                 self._push(channel, stamp_ns, angle, rate)
             if not carried:
-                self.health.unused[f"{topic} without a wanted joint"] += 1
+                self.health.foreign[topic] += 1
 
         return handle
 
@@ -164,22 +166,29 @@ class SteeringTorqueEstimator(Node):
     def _publish(self, row: Records, begin_ns: int) -> None:
         health, outputs = self.health, self.outputs
         stamp_ns = int(row["stamp_ns"])
+        if stamp_ns <= self._torque_ns:  # the estimator began anew
+            outputs.interrupt_commands()
+        self._torque_ns = stamp_ns
         if health.faulty(begin_ns):
-            health.withheld["after an exception"] += 1
+            self._withhold("after an exception")
             return
         if not outputs.torque(stamp_ns, float(row["total"])):
-            health.withheld["torque is not a finite number"] += 1
+            self._withhold("torque is not a finite number")
             return
         now_ns = self._now_ns()
         health.estimates += 1
         health.arrival_to_publish.add(time.monotonic_ns() - begin_ns)
         health.stamp_to_publish.add(now_ns - stamp_ns)
         if not outputs.estimate(stamp_ns, row):
-            health.withheld["estimate is not a finite number"] += 1
+            self._withhold("estimate is not a finite number")
         elif abs(now_ns - stamp_ns) <= self._fresh_ns:
             outputs.commands(now_ns, row)
         elif self.settings.publish_commands:
-            health.withheld["commands: stamps are not close to the clock"] += 1
+            self._withhold("commands: stamps are not close to the clock")
+
+    def _withhold(self, reason: str) -> None:
+        self.health.withheld[reason] += 1
+        self.outputs.interrupt_commands()
 
     def _choose_clock(self) -> None:
         """ROS time: simulated time where it is in use, else the system clock itself (30 times cheaper to read)."""

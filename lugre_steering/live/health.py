@@ -59,6 +59,7 @@ class Health:
         self.residuals = 0
         self.withheld: Counter[str] = Counter()  # outputs not published, by reason
         self.unused: Counter[str] = Counter()  # messages that never reached the estimator, by reason
+        self.foreign: Counter[str] = Counter()  # messages without a wanted joint, by topic
         self.exceptions = 0
         self.last_exception = ""
         self._fault_ns = -FAULT_HOLD_NS
@@ -69,6 +70,8 @@ class Health:
         self._then_residuals = 0
         self._then_saturated = 0
         self._then_exceptions = 0
+        self._then_withheld: Counter[str] = Counter()
+        self._then_estimates = 0
 
     def set_topics(self, topics: Sequence[str]) -> None:
         """Full names of the input topics, in the order of the channels."""
@@ -96,13 +99,15 @@ class Health:
         saturated_steps: int,
     ) -> list[DiagnosticStatus]:
         """The status messages of the last ``elapsed_s`` seconds; ``counters`` as the estimator keeps them."""
-        return [
+        statuses = [
             self._inputs(now_ns, elapsed_s, list(counters)),
             self._rejected(counters),
             self._latency(),
             self._residual(saturated_steps),
             self._outputs(monotonic_ns),
         ]
+        self._then_arrivals = list(self.arrivals)
+        return statuses
 
     def _status(self, component: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
@@ -127,13 +132,15 @@ class Health:
             elif abs(self.behind_ns[i]) > self._timeouts_s[i] * 1e9:
                 troubles.append(f"{label} stamps are not close to the clock")
                 level = max(level, WARN)
-        self._then_arrivals = list(self.arrivals)
         return self._status("inputs", level, "; ".join(troubles) or "all inputs arrive", values)
 
     def _rejected(self, counters: Mapping[str, Mapping[str, int]]) -> DiagnosticStatus:
         values = {f"{label} {reason}": n for label, counts in counters.items() for reason, n in counts.items()}
         values.update(self.unused)
-        now = {key: n for key, n in values.items() if not key.endswith(" accepted")}
+        # Other joints beside the wanted ones are usual on a shared topic; instead of them they are a mistake.
+        values |= {f"{topic} without a wanted joint": n for topic, n in self.foreign.items()}
+        usual = {f"{topic} without a wanted joint" for topic, n in zip(self._topics, self.arrivals, strict=True) if n}
+        now = {key: n for key, n in values.items() if not key.endswith(" accepted") and key not in usual}
         new = [key for key, n in now.items() if n > self._then.get(key, 0)]
         self._then = now
         message = f"new: {', '.join(new)}" if new else "nothing new rejected"
@@ -169,8 +176,18 @@ class Health:
     def _outputs(self, monotonic_ns: int) -> DiagnosticStatus:
         faulty = self.faulty(monotonic_ns) or self.exceptions > self._then_exceptions  # every exception is told once
         self._then_exceptions = self.exceptions
-        level = ERROR if faulty else (WARN if self.exceptions else OK)
-        message = f"withheld after an exception: {self.last_exception}" if faulty else "running"
+        troubles = [f"exception: {self.last_exception}"] if faulty else []
+        troubles += [f"withheld: {reason}" for reason in self.withheld - self._then_withheld]
+        arrived = [
+            now - then
+            for now, then, kind in zip(self.arrivals, self._then_arrivals, self._kinds, strict=True)
+            if kind is Kind.ANGLE
+        ]
+        if self.estimates == self._then_estimates and min(arrived) > 1:
+            troubles.append("no torque although angles arrive")
+        self._then_withheld, self._then_estimates = self.withheld.copy(), self.estimates
+        level = ERROR if troubles else (WARN if self.exceptions else OK)
+        message = "; ".join(troubles) or "running"
         values: dict[str, object] = {"exceptions": self.exceptions, "last exception": self.last_exception}
         values |= {f"withheld: {reason}": n for reason, n in self.withheld.items()}
         return self._status("outputs", level, message, values)

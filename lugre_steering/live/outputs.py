@@ -98,6 +98,10 @@ class Outputs:
             publisher.publish(message)
         return True
 
+    def interrupt_commands(self) -> None:
+        """Commands go on from the last one along a new ramp: what comes next may be far from it."""
+        self._ramp.restart()
+
     def commands(self, now_ns: int, row: Records) -> None:
         """Publish the feed-forward as commands, if the node is to; the caller sees to it that ``row`` is fresh."""
         if self._commands is not None:

@@ -89,7 +89,7 @@ _TABLE = (
     _Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000),
     _Parameter("angle_timeout_s", 0.2, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
     _Parameter("pressure_timeout_s", 0.5, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
-    _Parameter("recovery_ramp_s", 1.0, "feed-forward commands are ramped over this time after silence [s]", 0.0, 60.0),
+    _Parameter("recovery_ramp_s", 1.0, "feed-forward commands are ramped over this time after an interruption [s]", 0.0, 60.0),
     _Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)"),
 )
 _OPTION_TABLE = (
@@ -100,7 +100,7 @@ _OPTION_TABLE = (
     _Parameter(
         "backward_jump_s",
         _OPTIONS.backward_jump_s,
-        "a confirmed jump back in time this long is a restart [s]",
+        "a confirmed jump of all angles back in time this long is a restart [s]",
         0.1,
         1e6,
     ),

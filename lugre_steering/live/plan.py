@@ -22,7 +22,8 @@ if TYPE_CHECKING:  # replay reads the same messages without ROS
 def planned_angles(message: JointTrajectory, joints: Sequence[str], latest_ns: int) -> tuple[IntArray, Array]:
     """Times (n,) [ns] and angles (joints, n) [rad] of a trajectory; ``DataError`` says why one is of no use.
 
-    A zero header stamp means "from now on" (as ros2_control reads it): from ``latest_ns``, the newest angle's stamp.
+    A zero header stamp means "from now on" (as ros2_control reads it): from ``latest_ns``, the newest angle's stamp (0:
+    none has come, and there is no now).
     """
     missing = [joint for joint in joints if joint not in message.joint_names]
     if missing:
@@ -30,6 +31,8 @@ def planned_angles(message: JointTrajectory, joints: Sequence[str], latest_ns: i
     if len(message.points) > PLAN_POINTS:
         raise DataError(f"{len(message.points)} points, more than {PLAN_POINTS}")
     start_ns = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec or latest_ns
+    if not start_ns:
+        raise DataError("no stamp, and no angle before it to count from")
     columns = [message.joint_names.index(joint) for joint in joints]
     times, angles = [], []
     for point in message.points:

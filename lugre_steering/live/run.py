@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions, install_signal_handlers
@@ -34,7 +36,7 @@ def run(args: list[str]) -> int:
         gc.collect()
         gc.freeze()
         spin(node, node.settings.executor, node.fault)
-    except LugreSteeringError as error:
+    except (LugreSteeringError, ParameterException, RCLError) as error:  # rclpy's: its own parameters, names of topics
         return _refused(error)
     finally:
         rclpy.try_shutdown()

@@ -35,5 +35,15 @@ def test_a_clock_set_back_counts_as_silence() -> None:
     assert ramp(100 * MS, [90.0]) == [90.0]
 
 
+def test_a_restart_ramps_without_any_silence() -> None:
+    ramp = CommandRamp(5.0, 0.1, 1)
+    for i in range(20):
+        ramp(i * 10 * MS, [10.0])
+    ramp.restart()
+    assert ramp(200 * MS, [90.0]) == [10.0]
+    assert ramp(250 * MS, [90.0]) == pytest.approx([50.0])
+    assert ramp(300 * MS, [90.0]) == [90.0]
+
+
 def test_no_ramp_wanted() -> None:
     assert CommandRamp(0.2, 0.0, 1)(5, [7.0]) == [7.0]

@@ -19,6 +19,7 @@ from builtin_interfaces.msg import Time
 from live_harness import SECOND, T0, VEHICLE, LiveNode, Sample, World, motion, to_time
 from rosgraph_msgs.msg import Clock
 
+from lugre_steering.live.health import Health
 from lugre_steering.vehicle import load
 
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -193,6 +194,86 @@ def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> 
         assert len(commands) == 220
         _, _, values = world.status("outputs")
         assert values["withheld: commands: stamps are not close to the clock"] == "30"
+
+
+@pytest.mark.parametrize("cause", ["a clock set back", "an exception"])
+def test_commands_do_not_jump_when_the_torque_does(tmp_path: Path, cause: str) -> None:
+    """No silence comes near the time-out here, so only the node can know that a ramp is due."""
+    script = tmp_path / "failing_node.py"
+    script.write_text(FAILING_NODE)
+    arguments = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=2.0", "-p", "angle_timeout_s:=60.0")
+    vehicle = load(VEHICLE)
+    with LiveNode(*arguments, command=[str(script)]) as node, World(vehicle) as world:
+        commands = world.heard["feed_forward/commands"]
+        angle = 0.0
+
+        def steer(seconds: float, rate: float, age_ns: int = 0) -> None:
+            nonlocal angle
+            for _ in range(round(seconds * 100)):
+                angle += 0.01 * rate
+                stamp_ns = time.time_ns() - age_ns
+                for channel in (0, 1):
+                    world.send(Sample(channel, stamp_ns, angle))
+                time.sleep(0.01)
+
+        steer(3.0, 0.1)
+        world.wait(lambda: len(commands) > 290)
+        time.sleep(0.2)
+        last, before = commands[-1].data[0], len(commands)
+        assert last > 5000.0
+        if cause == "a clock set back":
+            steer(0.5, -0.1, age_ns=10 * SECOND)
+        else:
+            world.send(now_sample(0, 0.1255))
+            steer(1.6, -0.1)
+        world.wait(lambda: len(commands) > before + 20)
+        after = commands[before].data[0]
+        wanted = world.heard["feed_forward"][-1].effort[0]
+        assert abs(wanted - last) > 3000.0  # or this test would show nothing
+        assert after == last
+        if cause == "a clock set back":
+            _, _, values = world.status("rejected")
+            assert [key for key in values if key.endswith(" restart")]
+        assert node.process.poll() is None
+
+
+def outputs_of(health: Health) -> tuple[bytes, str]:
+    """Level and message of the next report, a second after the one before."""
+    status = health.statuses(0, 0, 1.0, {}, 0)[-1]
+    return status.level, status.message
+
+
+def test_angles_without_a_torque_are_an_error() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    assert outputs_of(health) == (OK, "running")
+    health.arrivals[0] += 100
+    assert outputs_of(health) == (OK, "running")  # the missing side is what the inputs tell
+    health.arrivals[0] += 100
+    health.arrivals[1] += 100
+    assert outputs_of(health) == (ERROR, "no torque although angles arrive")
+    health.arrivals[0] += 100
+    health.arrivals[1] += 100
+    health.estimates += 100
+    assert outputs_of(health) == (OK, "running")
+
+
+def test_every_withheld_output_is_an_error_once() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    health.withheld["torque is not a finite number"] += 3
+    assert outputs_of(health) == (ERROR, "withheld: torque is not a finite number")
+    assert outputs_of(health) == (OK, "running")
+
+
+def test_other_joints_are_a_mistake_only_where_no_wanted_joint_comes() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    health.set_topics(["/joint_states"] * 2 + ["/pressure"] * 5)
+    health.foreign["/joint_states"] += 5
+    assert health.statuses(0, 0, 1.0, {}, 0)[1].level == WARN
+    health.arrivals[0] += 1
+    health.foreign["/joint_states"] += 5
+    status = health.statuses(0, 0, 1.0, {}, 0)[1]
+    assert status.level == OK
+    assert {pair.key: pair.value for pair in status.values} == {"/joint_states without a wanted joint": "10"}
 
 
 def test_simulated_time() -> None:

@@ -25,7 +25,7 @@ def start_refused(*ros_args: str) -> str:
     command = [sys.executable, "-m", "lugre_steering.node", "--ros-args", *ros_args]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(), check=False)
     assert done.returncode == 2, done.stderr
-    lines = [line for line in done.stderr.splitlines() if not line.startswith("[ERROR]")]  # rcl's own
+    lines = [line for line in done.stderr.splitlines() if not line.startswith(("[ERROR]", "[INFO]"))]  # of the log
     assert len(lines) == 1, done.stderr
     assert lines[0].startswith("estimator: ")
     return lines[0]
@@ -37,6 +37,7 @@ def start_refused(*ros_args: str) -> str:
         ("max_gap_s:=.nan", ("max_gap_s", "nan", "0.001 to 60")),
         ("max_gap_s:=1", ("max_gap_s", "1", "decimal point")),
         ("executor:=multi", ("executor", "multi", "events, single")),
+        ("use_sim_time:=3", ("use_sim_time", "3", "BOOL")),
     ],
 )
 def test_bad_parameters_are_refused(argument: str, said: tuple[str, ...]) -> None:
@@ -53,6 +54,8 @@ def test_bad_vehicle_files_are_refused(tmp_path: Path) -> None:
     wrong.with_name("rubber_dma_10hz.csv").write_text(VEHICLE.with_name("rubber_dma_10hz.csv").read_text())
     message = start_refused("-p", f"vehicle_file:={wrong}")
     assert all(text in message for text in (str(wrong), "track.width_m", "-0.45"))
+    wrong.write_text(VEHICLE.read_text() + 'topics: {left: "steering/left angle"}\n')
+    assert "topic" in start_refused("-p", f"vehicle_file:={wrong}")
 
 
 @pytest.mark.parametrize(

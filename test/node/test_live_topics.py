@@ -107,6 +107,8 @@ def test_both_joints_on_one_topic_in_a_namespace() -> None:
         world.wait(lambda: len(world.heard["torque"]) >= 100)
         np.testing.assert_allclose(column(world.heard["torque"], "wrench.torque.z"), expected, **EXACT)
         _, _, inputs = world.status("rejected")
+        levels = [s.level for d in world.heard["diagnostics"] for s in d.status if s.name.endswith("rejected")]
+        assert set(levels) == {b"\x00"}
         assert inputs["/joint_states without a wanted joint"] == "10"
 
 
@@ -219,6 +221,7 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
         trajectory(joints, T0, [(1.0, [0.1, math.nan])]),
         trajectory(joints, T0, [(1.0, [0.1])]),
     ]
+    early = trajectory(joints, 0, [(1.0, [0.1, 0.1])])  # from now on, when there is no now yet
     good = trajectory(joints, T0 + SECOND // 2, [(0.0, [0.0, 0.0]), (1.5, [0.2, 0.3])])
     estimator = Estimator(vehicle, options)
     still = [Sample(channel, T0 + i * 10_000_000, 0.0) for i in range(100) for channel in (0, 1)]
@@ -227,6 +230,8 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
     estimator.set_plan(np.array(points_ns, np.int64), np.array([[0.0, 0.3], [0.0, 0.2]]))
     estimates += direct(estimator, still[50:])[0]
     with LiveNode("-p", "feed_forward_horizon_s:=0.3"), World(vehicle) as world:
+        world.command.publish(early)
+        world.status("rejected")
         world.play(still[:50])
         for message in (good, *bad):
             world.command.publish(message)
@@ -241,5 +246,5 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
         assert np.all(effort[60:] > torque[60:] + 1000.0)
         assert to_ns(good.header.stamp) == points_ns[0]
         refused = {key: n for key, n in rejected.items() if key.startswith("steering/command")}
-        assert sum(int(n) for n in refused.values()) == 4
-        assert len(refused) == 4
+        assert sum(int(n) for n in refused.values()) == 5
+        assert len(refused) == 5
