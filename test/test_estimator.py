@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lugre_steering.bag import load as offline
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
 from lugre_steering.recording import RATE_LIMIT, Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
@@ -207,7 +206,6 @@ def test_a_rate_that_no_steering_has_counts_as_not_given(rate: float) -> None:
         np.testing.assert_array_equal(e["total"], expected["total"])
     assert list(rejected(absurd)) == ["angle/left"]
     assert rejected(absurd)["angle/left"]["absurd_rate"] > 0
-    assert offline.RATE_LIMIT == RATE_LIMIT
 
 
 def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lugre_steering.bag.reader import Bag, Block
 from lugre_steering.errors import BagError
-from lugre_steering.recording import Array, Channel, Finding, IntArray, Kind, Recording, Signal
+from lugre_steering.recording import RATE_LIMIT, Array, Channel, Finding, IntArray, Kind, Recording, Signal
 
 LIMITS = {
     Kind.ANGLE: (-np.pi, np.pi),
@@ -21,7 +21,6 @@ LIMITS = {
     Kind.AIR_TEMPERATURE: (-100.0, 300.0),
     Kind.TORQUE: (-1e9, 1e9),
 }
-RATE_LIMIT = 100.0  # rad/s, far beyond any steering
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 

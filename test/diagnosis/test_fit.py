@@ -127,7 +127,8 @@ def test_wrong_signs_are_no_physics() -> None:
     residual = np.vstack([-np.ones(10), np.ones((2, 10))])
     basis = np.zeros((10, 0))
     wrong, right = (score_columns(candidate, column, basis, sign * residual, 10.0) for sign in (1.0, -1.0))
-    assert wrong is not None and right is not None
+    assert wrong is not None
+    assert right is not None
     assert (wrong.explained, wrong.coefficients, wrong.p_value) == (0.0, (0.0,), 1.0)
     assert right.explained == pytest.approx(10.0)
     assert wrong.visible == right.visible == pytest.approx(10.0)  # its detection limit is the same

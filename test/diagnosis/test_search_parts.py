@@ -234,6 +234,6 @@ def test_two_parts_of_a_law_that_do_the_same_work_are_not_both_dropped(problem: 
 
 def test_short_standstills_leave_more_doubt_about_slow_noise(problem: Problem) -> None:
     run = problem.runs[0]
-    rest = [part for part in noise.standstill(run)]
+    rest = noise.standstill(run)
     shorter = replace(run, valid=np.where(np.arange(run.time.size) < rest[-1].start, False, run.valid))
     assert noise.slow_doubt(shorter) > 1.3 * noise.slow_doubt(run) > 0.0
