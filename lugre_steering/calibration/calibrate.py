@@ -208,7 +208,7 @@ def calibrate_recordings(
     qualities = [inspect(recording, vehicle) for recording in recordings]
     for quality in qualities:
         for finding in quality.blocking:
-            raise DataError(f"{quality.recording.name}: {finding.statement}; expected sound wiring, nothing is fitted to this")
+            raise DataError(f"{quality.recording.name}: the data must be put right first: {finding.statement}")
     progress("preparing")
     runs = [prepare(quality.recording, vehicle) for quality in qualities]
     problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)

@@ -191,7 +191,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
         if abs(correlation) < UNLIKE:  # which channel it is, an error that stays poor does not tell
             convincing = [h for h in convincing if h.topics == max(other.topics for other in convincing)]
     if not convincing:
-        return _unlike(vehicle, correlation) if tiny or abs(correlation) < UNLIKE else ()
+        return _no_torque(vehicle) if tiny else _unlike(vehicle, correlation) if abs(correlation) < UNLIKE else ()
     best = min(h.error for h in convincing)
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
@@ -214,6 +214,17 @@ def _noted(vehicle: Vehicle, faults: Faults, note: str) -> Faults:
         )
         for fault, others in together.items()
     )
+
+
+def _no_torque(vehicle: Vehicle) -> Faults:
+    """Next to no torque, in whatever unit. Blocking: no physics of the catalogue takes it all away."""
+    kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
+    topics = tuple(_topics(vehicle, kind).values())
+    statement = (
+        f"{', '.join(topics)}: the measured torque is less than {100 * TINY:g} % of that of the nominal model, and no common unit explains "
+        "it; check that the sensors are connected, that the hydraulics were on, and the units"
+    )
+    return (_Fault("unit_suspect", topics, words(vehicle, statement)),)
 
 
 def _unlike(vehicle: Vehicle, correlation: float) -> Faults:
