@@ -12,7 +12,7 @@ import dataclasses
 import math
 import re
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -312,13 +312,13 @@ def save(vehicle: Vehicle, path: str | Path) -> None:
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:
     """Plain data of a vehicle, ready for YAML or JSON."""
-    plain = _plain(vehicle.replace(effects=_each_once(vehicle.effects)))
+    plain = _plain(vehicle.replace(effects=each_once(vehicle.effects)))
     assert isinstance(plain, dict)
     plain.setdefault("effects", [])
     return plain
 
 
-def _each_once(effects: tuple[EffectEntry, ...]) -> tuple[EffectEntry, ...]:
+def each_once(effects: Iterable[EffectEntry]) -> tuple[EffectEntry, ...]:
     """Effects found again stand once, as a file must have them: later values replace earlier ones, other lines join."""
     joined: dict[str, dict[str, float]] = {}
     for entry in effects:

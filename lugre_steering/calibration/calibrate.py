@@ -37,15 +37,14 @@ import numpy as np
 
 from lugre_steering import __version__, units
 from lugre_steering.bag import read_recording
-from lugre_steering.calibration.estimate import LINEARISATIONS, Effects, Estimate, estimate
+from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
 from lugre_steering.diagnosis.apply import apply_calibration
 from lugre_steering.diagnosis.dataset import prepare
 from lugre_steering.diagnosis.fit import fit
-from lugre_steering.diagnosis.problem import GAIN, KINGPIN, STATIC, Calibration, Candidate, Problem, calibrations_for
+from lugre_steering.diagnosis.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
 from lugre_steering.diagnosis.quality import inspect
 from lugre_steering.diagnosis.split import split
-from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import Vehicle, load, save
@@ -213,18 +212,17 @@ def calibrate_recordings(
     runs = [prepare(quality.recording, vehicle) for quality in qualities]
     problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)
     check_motion(problem)
-    effects = standing_effects(vehicle)
     progress("fitting")
-    result = estimate(problem, effects, priors=priors)
+    result = estimate(problem, priors=priors)
     progress("judging on held-out stretches")
-    held = heldout_rmse(problem, result, effects, priors)
+    held = heldout_rmse(problem, result, priors)
     progress("what the data cannot tell")
-    weak, assumed = identifiability(problem, result, effects)
+    weak, assumed = identifiability(problem, result)
     fitted = _rounded(apply_calibration(vehicle, problem, result.x))
     rows = parameter_rows(problem, result, fitted, priors)
     used = result.weight > 0.0
     rmse = {
-        "sheet": _rms((problem.measured - problem.predict_all(problem.start(), effects))[used]),
+        "sheet": _rms((problem.measured - problem.predict_all(problem.start()))[used]),
         "calibrated": _rms(result.residual[used]),
         "noise_floor": result.noise_floor,
     }
@@ -263,27 +261,14 @@ def check_motion(problem: Problem) -> None:
         )
 
 
-def standing_effects(vehicle: Vehicle) -> list[tuple[Candidate, dict[str, float]]]:
-    """Effects that the vehicle file already has, at their values: sensor effects act on the prediction too."""
-    found: list[tuple[Candidate, dict[str, float]]] = []
-    for entry in vehicle.effects:
-        effect = catalogue_entry(entry.id)
-        if effect.per_line:
-            name = effect.parameters[0].name
-            found += [(Candidate(effect, line=line), {name: value}) for line, value in entry.parameters.items()]
-        else:
-            found.append((Candidate(effect), dict(entry.parameters)))
-    return found
-
-
-def heldout_rmse(problem: Problem, result: Estimate, effects: Effects, priors: bool) -> dict[str, float | None]:
+def heldout_rmse(problem: Problem, result: Estimate, priors: bool) -> dict[str, float | None]:
     """RMSE [N m] of sheet and calibrated vehicle on held-out stretches that a fit of its own did not see."""
     parts = split(problem)
     if not parts.held.any() or not parts.fit.any():
         return {"sheet": None, "calibrated": None}
     weight = np.where(parts.fit, result.weight, 0.0)
-    other = fit(problem, weight, effects, result.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
-    sheet = problem.predict_all(problem.start(), effects)
+    other = fit(problem, weight, start=result.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    sheet = problem.predict_all(problem.start())
     return {
         "sheet": _rms((problem.measured - sheet)[parts.held]),
         "calibrated": _rms((problem.measured - other.prediction)[parts.held]),

@@ -12,7 +12,6 @@ The error of the chain's finite time step is taken out, and a quarter of it kept
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +21,7 @@ from scipy.signal import correlate
 from lugre_steering.diagnosis.dataset import Run, motion
 from lugre_steering.diagnosis.fit import ROBUST, Fit, fit
 from lugre_steering.diagnosis.noise import noise_model, repeated_motion
-from lugre_steering.diagnosis.problem import Candidate, Problem, Values
+from lugre_steering.diagnosis.problem import Problem
 from lugre_steering.recording import Array
 
 DRAWS = 16
@@ -35,7 +34,6 @@ FEWEST_BLOCKS = 12
 STEP_REMAINDER = 0.25
 """Share of the time step's error that may be left after it was taken out."""
 
-Effects = Sequence[tuple[Candidate, Values]]
 
 
 @dataclass(frozen=True)
@@ -82,19 +80,17 @@ def influence(z: Array) -> Array:
     return np.asarray(z / np.sqrt(1.0 + (z / ROBUST) ** 2))
 
 
-def estimate(
-    problem: Problem, effects: Effects = (), *, priors: bool = True, seed: int = 0, draws: int = DRAWS
-) -> Estimate:
+def estimate(problem: Problem, *, priors: bool = True, seed: int = 0, draws: int = DRAWS) -> Estimate:
     """Fit all valid samples, learn the noise, fit again with it, and work out the covariance."""
     valid = problem.valid.astype(float)
     weight = valid / np.concatenate([run.sigma for run in problem.runs])
-    first = fit(problem, weight, effects, linearisations=LINEARISATIONS, robust=True, priors=priors)
-    noise = noise_model(problem, first.x, effects, repeated_motion(problem, draws, seed), seed=seed)
+    first = fit(problem, weight, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    noise = noise_model(problem, first.x, (), repeated_motion(problem, draws, seed), seed=seed)
     weight = valid / noise.sigma
-    step = step_error(problem, first.x, effects)
+    step = step_error(problem, first.x)
     refined = copy.copy(problem)
     refined.measured = problem.measured - step  # the same as adding the error to every prediction
-    final = fit(refined, weight, effects, first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    final = fit(refined, weight, start=first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     residual = refined.measured - final.prediction
     cluster = _clusters(problem, residual * weight)
     scales = problem.scales()
@@ -116,12 +112,12 @@ def physical_jacobian(result: Estimate) -> Array:
     return np.asarray(result.fit.jacobian / weight[:, None])
 
 
-def step_error(problem: Problem, x: Array, effects: Effects = ()) -> Array:
+def step_error(problem: Problem, x: Array) -> Array:
     """Error of the chain's finite time step (n,) [N m]: the change when it is doubled (Richardson, first order)."""
     errors = []
     for bag, run in enumerate(problem.runs):
-        whole = problem.torque(bag, x, effects)
-        doubled = problem.torque(bag, x, effects, _every_second(run))
+        whole = problem.torque(bag, x)
+        doubled = problem.torque(bag, x, run=_every_second(run))
         errors.append(np.interp(run.time, run.time[::2], whole[::2] - doubled))
     return np.concatenate(errors)
 

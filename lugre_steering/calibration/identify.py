@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.calibration.estimate import Effects, Estimate, physical_jacobian
+from lugre_steering.calibration.estimate import Estimate, physical_jacobian
 from lugre_steering.chain.model import Model
 from lugre_steering.diagnosis.problem import GAIN, KINGPIN, Calibration, Problem
 from lugre_steering.recording import Array
@@ -62,9 +62,7 @@ def assumed_calibrations(problem: Problem) -> list[Calibration]:
     return [calibration for calibration in found if calibration.name not in fitted]
 
 
-def identifiability(
-    problem: Problem, result: Estimate, effects: Effects = ()
-) -> tuple[list[Combination], list[Assumed]]:
+def identifiability(problem: Problem, result: Estimate) -> tuple[list[Combination], list[Assumed]]:
     """Undetermined combinations, worst first, and what each sheet value taken as exact would move."""
     names = [calibration.name for calibration in problem.calibrations]
     sheet = problem.scales()[: len(names)]
@@ -75,7 +73,7 @@ def identifiability(
     inner = np.linalg.pinv(curvature + np.diag(result.prior), hermitian=True)
     assumed = []
     for calibration in assumed_calibrations(problem):
-        column = _column(problem, result, calibration, effects)
+        column = _column(problem, result, calibration)
         # The sheet value first: what the data say about it beside everything fitted is then a Schur complement.
         curvature, score = result.information(np.column_stack([column, own]))
         known = _information(curvature, score, 1)[0, 0] * calibration.prior**2
@@ -127,7 +125,7 @@ def _information(curvature: Array, score: Array, kept: int) -> Array:
     return np.asarray(whole[:kept, :kept] - cross @ np.linalg.pinv(whole[kept:, kept:], hermitian=True) @ cross.T)
 
 
-def _column(problem: Problem, result: Estimate, calibration: Calibration, effects: Effects) -> Array:
+def _column(problem: Problem, result: Estimate, calibration: Calibration) -> Array:
     """Change of the predicted torque per relative change of one sheet value (n,) [N m]."""
     moved = copy.copy(problem)
     if calibration is SENSITIVITY:
@@ -136,7 +134,7 @@ def _column(problem: Problem, result: Estimate, calibration: Calibration, effect
     else:
         moved.calibrations = (*problem.calibrations, calibration)
         x = np.insert(result.x, len(problem.calibrations), STEP)
-    return np.asarray((moved.predict_all(x, effects) - result.fit.prediction) / STEP)
+    return np.asarray((moved.predict_all(x) - result.fit.prediction) / STEP)
 
 
 def _fitted(names: Sequence[str], direction: Array, data_over_sheet: float) -> Combination:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
+from lugre_steering.diagnosis.result import SCHEMA, picture_names
 from lugre_steering.errors import BagError, DataError, LugreSteeringError
 from lugre_steering.vehicle import load, save
 
@@ -19,8 +20,6 @@ STEPS = (
     "next experiment", "writing the report",
 )  # fmt: skip
 """The words with which the steps of a diagnosis announce themselves, in order."""
-REPORT_FILES = ("report.html", "before_after_*.png", "residual_*.png", "evidence.png", "heldout.png")
-"""What a report may consist of; which of them there are depends on the diagnosis."""
 
 
 def run(
@@ -65,7 +64,17 @@ def run(
 
 
 def _take_away_report(out: Path) -> None:
-    if (out / "diagnosis.json").is_file():  # else they are no files of ours
-        for file in (file for pattern in REPORT_FILES for file in out.glob(pattern)):
-            if file.is_file():
-                file.unlink()
+    """Delete the report of the diagnosis whose result lies in ``out``, file by file as it was written; refuse a result not ours."""
+    file = out / "diagnosis.json"
+    if not file.is_file():
+        return
+    try:
+        old = json.loads(file.read_bytes())
+        names = [*(f"before_after_{bag}" for bag in old["bags"]), *(f"residual_{effect['id']}" for effect in old["effects"])]
+        ours = old["schema"] == SCHEMA
+    except (ValueError, KeyError, TypeError):
+        ours = False
+    if not ours:
+        raise DataError(f"{file}: exists and is not an earlier result of diagnose; choose another --out")
+    for name in ("report.html", *picture_names([*names, "evidence", "heldout"])):
+        (out / name).unlink(missing_ok=True)

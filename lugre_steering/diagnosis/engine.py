@@ -28,7 +28,7 @@ from lugre_steering.diagnosis.split import Split, split
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.recording import Array, Finding, Recording
-from lugre_steering.vehicle import EffectEntry, Vehicle
+from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
 
 MIN_SLIDING, MIN_SAMPLES = 2.0, 500
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart; samples that a fit needs."""
@@ -266,7 +266,7 @@ class _Conclusion:
         own = with_line(candidate.line)
         others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
         before = name.cost(problem, fit(problem, weight, rest, whole.x, linearisations=6), weight)
-        tied = name.tied(problem, weight, self.roles, own, others, before, float(problem.valid.sum()))
+        tied = name.tied(problem, weight, self.roles, own, others, before, float(problem.valid.sum()), law=0.0)
         key = candidate.free[0]
         unit = self._unit(candidate.parameter(key).unit)
         found = [f"{trial.candidate.line} ({trial.fit.effects[-1][1][key]:.3g} {unit})" for trial in tied]
@@ -313,11 +313,11 @@ class _Conclusion:
         used = weight > 0.0
         slow, nothing = self._slow_energy(residual * weight), self._slow_energy(self.noise.draws * weight)
         excess = float(np.mean((residual * weight)[used] ** 2)) - 1.0
-        # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
         held = np.where(self.roles.held, weight, 0.0)
         pattern, gain = self.found.pattern if not final.effects else None, 0.0
         if pattern is not None:
             gain = 1.0 - pattern.cost(problem, held) / max(name.cost(problem, self.found.baseline, held), 1e-9)
+        # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
         structured = slow - nothing > max(UNLISTED_EXCESS, self.noise.slow_doubt) or excess > FAST_EXCESS or gain > FORETELLS
         if not structured:
             return (
@@ -359,8 +359,9 @@ class _Conclusion:
                     "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
                     "range": list(locate.active_range(values[axis], piece)), "unit": self._unit(locate.UNITS[axis]),
                 })  # fmt: skip
+        surplus = max(excess, 0.0)
         text = (
-            f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
+            f"{100 * surplus / (1.0 + surplus):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
             f"({100 * share:.0f} % of the residual energy follows it)"
         )
         return {"structured": True, "description": text, "formula": formula, "where": where}, text, True
@@ -394,6 +395,8 @@ class _Conclusion:
             keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
             if candidate.effect.per_line:
                 keep = {candidate.line: float(values[candidate.free[0]])}
+            else:  # found again: nothing of its old values stays
+                entries = [entry for entry in entries if entry.id != candidate.effect.id]
             if keep:
                 entries.append(EffectEntry(candidate.effect.id, keep))
         provenance = {
@@ -405,7 +408,7 @@ class _Conclusion:
             },
         }  # fmt: skip
         changed = apply_calibration(problem.vehicle, problem, whole.x)
-        return replace(changed, effects=tuple(entries), provenance=provenance)
+        return replace(changed, effects=each_once(entries), provenance=provenance)
 
     def _evidence(self, effects: Sequence[dict[str, Any]]) -> tuple[Evidence, ...]:
         problem, found = self.problem, self.found

@@ -147,7 +147,7 @@ def search(
         if freer > FREER * (before - best.cost):
             break
         rivals = tied(problem, weight, split, best, trials[1:], before, samples)
-        best, rivals = simplest(best, rivals)
+        best, rivals = simplest(best, rivals, before)
         gained = (before - best.cost) / max(before - samples, before - best.cost)
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
         steps.append((best.fit, Found(best.score, names, tuple(trials), before - best.cost), gained))
@@ -229,19 +229,25 @@ def _confront(
     before = cost(problem, without, weight)
     # The effect under question stands last, where trials keep theirs.
     ordered = replace(final, effects=(*rest, (own, values)))
-    champion = Trial(best.get(own.effect.id, item.score), ordered, cost(problem, final, weight))
+    seen = best.get(own.effect.id)
+    champion = Trial(seen if seen is not None and seen.explained > 0.0 else item.score, ordered, cost(problem, final, weight))
+
+    def fitted(score: Score) -> Trial:
+        trial = _everywhere(problem, weight, without, try_effect(problem, weight, without, score), scores)
+        return deepen(problem, weight, without, trial, scores)
+
     # Where nothing stands beside it, these have been fitted as deeply before.
     known = {trial.candidate.effect.id: trial for trial in item.trials if trial.deep and len(trial.fit.effects) == 1}
     trials = [
         known[name]
         if name in known and not rest
-        else deepen(problem, weight, without, try_effect(problem, weight, without, best[name]), scores)
+        else fitted(best[name])
         for name in sorted(names)
         if name in best and best[name].explained > 0.3 * champion.score.explained
     ]
-    group = sorted([champion, *trials], key=lambda trial: trial.cost)
+    group = _ranked([champion, *trials], before)
     rivals = tied(problem, weight, split, group[0], group[1:], before, samples)
-    chosen, rivals = simplest(group[0], rivals)
+    chosen, rivals = simplest(group[0], rivals, before)
     names_left = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
     effects = list(chosen.fit.effects)
     effects.insert(index, effects.pop())
@@ -298,10 +304,8 @@ def _keep(
 def choose(scores: Sequence[Score], samples: float) -> list[Score]:
     """Shortlist: the best variant of each effect and line that is significant across the catalogue and not negligible."""
     best: dict[str, Score] = {}
-    for score in scores:
-        label = score.candidate.label
-        if label not in best or score.explained > best[label].explained * _parsimony(score, best[label]):
-            best[label] = score
+    for score in sorted(scores, key=lambda score: -score.explained):
+        best.setdefault(score.candidate.label, score)
     if not best:
         return []
     labels = list(best)
@@ -319,11 +323,6 @@ def choose(scores: Sequence[Score], samples: float) -> list[Score]:
             chosen.append(score)
             per_effect[name] = per_effect.get(name, 0) + 1
     return [score for score in chosen if score.explained > 0.08 * chosen[0].explained][:SHORTLIST]
-
-
-def _parsimony(new: Score, old: Score) -> float:
-    """An effect in one bag only, or from a time on, must beat the same effect everywhere clearly."""
-    return 1.0 + PARTIAL if _partial(new) and not _partial(old) else 1.0
 
 
 def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
@@ -415,9 +414,14 @@ def _always(scores: Sequence[Score]) -> list[Score]:
     return [score for score in scores if not score.candidate.since]
 
 
+def _rank(trial: Trial, before: float) -> float:
+    """Cost by which trials compete: an onset is a freedom that fits many an event, so a late effect must explain clearly more."""
+    return trial.cost + PARTIAL * max(before - trial.cost, 0.0) * bool(trial.candidate.since)
+
+
 def _ranked(trials: Sequence[Trial], before: float) -> list[Trial]:
-    """Best first; an onset is a freedom that fits many an event, so a late effect must explain clearly more than any other."""
-    return sorted(trials, key=lambda trial: trial.cost + PARTIAL * max(before - trial.cost, 0.0) * bool(trial.candidate.since))
+    """Best first."""
+    return sorted(trials, key=lambda trial: _rank(trial, before))
 
 
 def _timed(trial: Trial) -> bool:
@@ -467,11 +471,13 @@ def _without(problem: Problem, weight: Array, result: Fit, values: Values, dropp
 
 
 def tied(
-    problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float, samples: float
+    problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float, samples: float,
+    law: float = LAW,
 ) -> list[Trial]:
     """Rivals that this data cannot tell from the best.
 
-    Either no clear difference block by block (Vuong 1989), or a difference smaller than what even the best leaves over.
+    Either no clear difference block by block (Vuong 1989), or one smaller than a tenth of what even the best leaves over and the
+    share ``law`` of what it explains.
     """
     found = []
     error = ((problem.measured - best.fit.prediction) * weight) ** 2
@@ -482,13 +488,13 @@ def tied(
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
         close = other.cost - best.cost < TIE_MISFIT * misfit + TIE_ENERGY * samples
-        if (close and t < TIE_T) or other.cost - best.cost < 0.1 * misfit + LAW * (before - best.cost) + 10.0:
+        if (close and t < TIE_T) or other.cost - best.cost < 0.1 * misfit + law * (before - best.cost) + 10.0:
             found.append(other)
     return found
 
 
-def simplest(best: Trial, rivals: list[Trial]) -> tuple[Trial, list[Trial]]:
+def simplest(best: Trial, rivals: list[Trial], before: float) -> tuple[Trial, list[Trial]]:
     """Of effects that fit equally well the one with the fewest free parameters stands for the group."""
     group = [best, *rivals]
-    chosen = min(group, key=lambda trial: trial.cost + 10.0 * len(trial.candidate.free))
+    chosen = min(group, key=lambda trial: _rank(trial, before) + 10.0 * len(trial.candidate.free))
     return chosen, [trial for trial in group if trial is not chosen]

@@ -17,6 +17,7 @@ from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_in_phases
 from lugre_steering.diagnosis.dataset import Run
+from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
@@ -103,6 +104,19 @@ class Candidate:
 Values = Mapping[str, float]
 
 
+def standing_effects(vehicle: Vehicle) -> tuple[tuple[Candidate, Values], ...]:
+    """Effects that the vehicle file already has, at their values."""
+    found: list[tuple[Candidate, Values]] = []
+    for entry in vehicle.effects:
+        effect = catalogue_entry(entry.id)
+        if effect.per_line:
+            name = effect.parameters[0].name
+            found += [(Candidate(effect, line=line), {name: value}) for line, value in entry.parameters.items()]
+        else:
+            found.append((Candidate(effect), dict(entry.parameters)))
+    return tuple(found)
+
+
 class Problem:
     """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, effect parameters)."""
 
@@ -119,6 +133,7 @@ class Problem:
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
+        self.standing = standing_effects(vehicle)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
     @property
@@ -185,11 +200,15 @@ class Problem:
     def predict(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
     ) -> Array:
-        """Measured torque that the model expects in one bag (n,): sensor effects included."""
+        """Measured torque that the model expects in one bag (n,): sensor effects included, those of the vehicle file too.
+
+        An effect that stands in the file and is given again counts as given.
+        """
         run = run or self.runs[bag]
         here = [effect for effect in effects if effect[0].active_in(bag)]
         torque = self.torque(bag, x, here, run)
-        for candidate, values in here:
+        given = {candidate.label for candidate, _ in here}
+        for candidate, values in [*(effect for effect in self.standing if effect[0].label not in given), *here]:
             start = candidate.start(bag)
             changed = self._through_sensor(run, candidate, values, torque, start)
             torque = np.where(run.time >= start, changed, torque) if candidate.since else changed

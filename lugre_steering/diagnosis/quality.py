@@ -262,7 +262,7 @@ def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool
     inside = (signal.time_s >= start) & (signal.time_s <= end)
     near = np.concatenate([[start], signal.time_s[inside], [end]])
     limit = _gap_limit(float(np.median(np.diff(signal.time_s))))
-    return float(np.diff(near).max()) <= limit and float(np.ptp(signal.value[inside])) < PARKED * presliding
+    return bool(inside.any()) and float(np.diff(near).max()) <= limit and float(np.ptp(signal.value[inside])) < PARKED * presliding
 
 
 def _examine(

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,17 @@ from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
 SCHEMA = "lugre_steering/diagnosis/1"
+
+
+def picture_names(names: Sequence[str]) -> list[str]:
+    """File names of a report's pictures, in order: safe everywhere, and each its own."""
+    found: list[str] = []
+    for name in names:
+        stem, count = re.sub(r"[^\w.-]+", "_", name), 1
+        while (file := f"{stem}.png" if count == 1 else f"{stem}_{count}.png") in found:
+            count += 1
+        found.append(file)
+    return found
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,12 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import correlate
 from scipy.stats import theilslopes
 
-from lugre_steering.chain.hydraulics import line_gains
+from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_side
 from lugre_steering.diagnosis.dataset import Run, angle_noise, prepare
 from lugre_steering.diagnosis.problem import lagged
+from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
@@ -317,16 +318,17 @@ def _units_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Array, f
         yield (_Fault("unit_suspect", (topic,), statement),), 1e3 * run.pressure, BETTER
         return
     topics = list(_topics(vehicle, Kind.PRESSURE).values())
-    highest = np.abs(run.pressure).max(axis=1)
+    shown = run.pressure + gauge_offset(vehicle)
+    highest = np.abs(shown).max(axis=1)
     for unit, factor in PRESSURE_UNITS.items():
         statement = f"probably in {unit} (multiply by {factor:g})"
         every = _Fault("unit_suspect", tuple(topics), f"{', '.join(topics)}: {statement}")
         if _plausible(vehicle, factor * float(highest.max())):
-            yield (every,), factor * run.pressure, BETTER
+            yield (every,), factor * shown - gauge_offset(vehicle), BETTER
         for i, (topic, high) in enumerate(zip(topics, highest, strict=True)):
             if _plausible(vehicle, factor * float(high)):
                 pressure = run.pressure.copy()
-                pressure[i] *= factor
+                pressure[i] = factor * shown[i] - gauge_offset(vehicle)
                 # A line that hardly works in this recording changes less, but its magnitude speaks too.
                 better = WEAK_BETTER if high < TINY * np.median(highest) else BETTER
                 yield (_Fault("unit_suspect", (topic,), f"{topic}: {statement}"),), pressure, better
@@ -390,18 +392,26 @@ def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:
 def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
     """Torque stamped late or early against the angles, by more than softer springs, play or a slow sensor could imitate.
 
-    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness, play and lag in SOFTER, PLAY and
-    LAG_S. A clock shifts starts and stops alike at any rate; the others do not, so one of the variants fits better there.
+    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness and play in SOFTER and PLAY, and
+    unshifted for the lags in LAG_S too. A clock shifts starts and stops alike at any rate; the others do not, so one of the
+    variants fits better there.
     """
     model = build_model(vehicle)
     step = float(run.time[1] - run.time[0])
     stride = max(1, round(1.0 / SKEW_RATE_HZ / step))
     dt = stride * step
 
+    known = sensor_correction(vehicle)
+
+    def seen(trial: Model) -> Array:
+        """Torque of a model as sensors show it whose delay and lag the vehicle file knows."""
+        torque = _torques(trial, run).sum(axis=0)
+        return lagged(np.interp(run.time - known.delay_s, run.time, torque), step, known.lag_s)
+
     def slope(torque: Array) -> Array:
         return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
 
-    nominal = np.concatenate([[0.0], np.cumsum(slope(_torques(model, run).sum(axis=0)) ** 2)])
+    nominal = np.concatenate([[0.0], np.cumsum(slope(seen(model)) ** 2)])
     ends = np.arange(int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt) + 1)
     # Without the strongest slopes in what is shifted, weak ones that hidden physics changes would decide.
     reach = int(np.flatnonzero(nominal[nominal.size - 1 - ends] - nominal[ends] >= SKEW_HELD * nominal[-1])[-1])
@@ -421,7 +431,7 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
         left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(energy, 1e-30)
         return float(left.min()), (_lowest(left) - reach) * dt, float(left[reach])
 
-    if abs(match(_torques(model, run).sum(axis=0))[1]) <= SKEW_S:
+    if abs(match(seen(model))[1]) <= SKEW_S:
         return
     matches, unshifted = [], np.inf
     for softer, play in product(SOFTER, PLAY):
@@ -429,7 +439,7 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
         for record in trial.parameters:
             record["sigma_0"] *= softer
             record["backlash_width"] += play * presliding
-        torque = _torques(trial, run).sum(axis=0)
+        torque = seen(trial)
         matches.append(match(torque))
         unshifted = min(unshifted, matches[-1][2], *(match(lagged(torque, step, lag))[2] for lag in LAG_S))
     best, shift, _ = min(matches)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.calibration.calibrate import Calibrated, standing_effects
+from lugre_steering.calibration.calibrate import Calibrated
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure
 
 BAGS_SHOWN = 3
@@ -21,7 +21,7 @@ def draw_calibration(done: Calibrated, file: Path) -> None:
     """Write the picture as PNG."""
     problem, result = done.problem, done.result
     unit = problem.vehicle.coordinate.force_unit
-    sheet = problem.predict_all(problem.start(), standing_effects(problem.vehicle))
+    sheet = problem.predict_all(problem.start())
     runs = problem.runs[:BAGS_SHOWN]
     caption = f"Vehicle: {problem.vehicle.name}. {result['statement']}"
     if len(problem.runs) > len(runs):

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Callable
 from functools import partial
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.result import BagTrace, Diagnosis
+from lugre_steering.diagnosis.result import BagTrace, Diagnosis, picture_names
 from lugre_steering.report import diagnosis_plots as plots
 from lugre_steering.report import shown
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, figure
@@ -25,24 +24,23 @@ POINTS = 6000
 
 def draw_all(diagnosis: Diagnosis, folder: Path) -> dict[str, Path]:
     """Every picture that this diagnosis has something to show in, by what it shows."""
-    found: dict[str, Path] = {}
-
-    def draw(key: str, name: str, picture: Callable[[Path], None]) -> None:
-        stem, count = re.sub(r"[^\w.-]+", "_", name), 1
-        while (file := folder / (f"{stem}.png" if count == 1 else f"{stem}_{count}.png")) in found.values():
-            count += 1
-        picture(file)
-        found[key] = file
-
-    for i, trace in enumerate(diagnosis.traces):
-        draw(f"bag {i}", f"before_after_{trace.name}", partial(_before_after, diagnosis, trace))
-    for effect in diagnosis.json["effects"]:
-        if any(effect["id"] in trace.contributions for trace in diagnosis.traces):
-            draw(f"effect {effect['id']}", f"residual_{effect['id']}", partial(_residual, diagnosis, effect))
+    wanted: list[tuple[str, str, Callable[[Path], None]]] = [
+        (f"bag {i}", f"before_after_{trace.name}", partial(_before_after, diagnosis, trace))
+        for i, trace in enumerate(diagnosis.traces)
+    ]
+    wanted += [
+        (f"effect {effect['id']}", f"residual_{effect['id']}", partial(_residual, diagnosis, effect))
+        for effect in diagnosis.json["effects"]
+        if any(effect["id"] in trace.contributions for trace in diagnosis.traces)
+    ]
     if diagnosis.evidence:
-        draw("evidence", "evidence", partial(_evidence, diagnosis))
+        wanted.append(("evidence", "evidence", partial(_evidence, diagnosis)))
     if diagnosis.json["effects"] and plots.heldout_rows(diagnosis):
-        draw("heldout", "heldout", partial(_heldout, diagnosis))
+        wanted.append(("heldout", "heldout", partial(_heldout, diagnosis)))
+    found = {}
+    for (key, _, picture), file in zip(wanted, picture_names([name for _, name, _ in wanted]), strict=True):
+        picture(folder / file)
+        found[key] = folder / file
     return found
 
 

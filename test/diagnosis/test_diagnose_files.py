@@ -49,14 +49,26 @@ def test_a_file_that_cannot_be_written_is_named(parked: Path, tmp_path: Path) ->
         run([parked], SHEET, tmp_path, report=False)
 
 
-def test_the_report_of_an_earlier_diagnosis_is_taken_away(parked: Path, tmp_path: Path) -> None:
-    old = ["report.html", "before_after_other.png", "residual_end_stop.png", "evidence.png", "heldout.png"]
-    others = ["my_report.html", "notes.txt", "before_after.png", "residual_end_stop.csv"]
+def test_the_report_of_an_earlier_diagnosis_is_taken_away_and_nothing_else(parked: Path, tmp_path: Path) -> None:
+    run([parked], SHEET, tmp_path, report=False)
+    earlier = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
+    assert earlier["verdict"] == "insufficient_data"
+    earlier |= {"bags": ["a run"], "effects": [{"id": "end_stop"}]}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(earlier), encoding="utf-8")
+    old = ["report.html", "before_after_a_run.png", "residual_end_stop.png", "evidence.png", "heldout.png"]
+    others = ["my_report.html", "notes.txt", "before_after_mine.png", "residual_mine.png", "residual_end_stop.csv"]
     for name in (*old, *others):
         (tmp_path / name).write_text("old", encoding="utf-8")
     run([parked], SHEET, tmp_path, report=False)
-    assert all((tmp_path / name).is_file() for name in (*old, *others)), "without a diagnosis they are not ours"
-    run([parked], SHEET, tmp_path, report=False)
     assert not any((tmp_path / name).exists() for name in old)
     assert all((tmp_path / name).is_file() for name in others)
-    assert json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))["verdict"] == "insufficient_data"
+
+
+@pytest.mark.parametrize("content", ['{"mine": 1}', '{"schema": "other/1", "bags": [], "effects": []}', "[]", "no json"])
+def test_a_result_of_something_else_is_never_replaced(parked: Path, tmp_path: Path, content: str) -> None:
+    for name in ("diagnosis.json", "report.html"):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(LugreSteeringError, match="not an earlier result of diagnose"):
+        run([parked], SHEET, tmp_path, report=False)
+    assert (tmp_path / "diagnosis.json").read_text(encoding="utf-8") == content
+    assert (tmp_path / "report.html").exists()

@@ -17,6 +17,7 @@ from lugre_steering.diagnosis import fingerprint
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.errors import BagError
 from lugre_steering.proof.simulator import Case, CaseData, Concealed, load_sheet, simulate_case, write_case
 from lugre_steering.recording import Recording, Signal
 from lugre_steering.vehicle import load
@@ -122,6 +123,17 @@ def cut(recording: Recording, until_s: float) -> Recording:
         recording.name, recording.start_ns, {k: short(s) for k, s in recording.angle.items()},
         {k: short(s) for k, s in recording.pressure.items()},
     )  # fmt: skip
+
+
+def test_a_recording_counts_once_and_names_are_told_apart(tmp_path: Path) -> None:
+    _, (first, second) = made(tmp_path, seed=21)
+    with pytest.raises(BagError, match="given more than once"):
+        diagnose([first, second, first.parent / "." / first.name], load(VEHICLE))
+    twin = tmp_path / "other" / first.name
+    twin.parent.mkdir()
+    second.rename(twin)
+    result = diagnose([first, twin], load(VEHICLE))
+    assert result.json["bags"] == [first.name, f"{first.name}_2"]
 
 
 def test_too_short_a_recording_is_insufficient_and_says_what_to_drive(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ from lugre_steering.resources import config_folder
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate
-from lugre_steering.vehicle import Contact, TorqueSensor, Vehicle
+from lugre_steering.vehicle import Contact, EffectEntry, TorqueSensor, Vehicle
 
 Array = NDArray[np.float64]
 Edit = Callable[[Signal], Signal]
@@ -474,6 +474,28 @@ def test_a_slow_logger_has_no_gaps(sound: Recording) -> None:
     quality = inspect(every, VEHICLE)
     assert not [f for f in quality.findings if f.finding in ("friction_memory_lost", "dropout")]
     assert quality.recording.pressure["main_a"].time_s.size == every.pressure["main_a"].time_s.size
+
+
+def test_a_hole_in_one_angle_beside_a_slow_other_one(sound: Recording) -> None:
+    """The other side has no sample in the hole: nothing says that it was parked."""
+    slow = {side: Signal(s.time_s[::50], s.value[::50]) if side == "right" else s for side, s in sound.angle.items()}
+    hole = angle("left", missing(24.06, 24.46))(replace(sound, angle=slow))
+    assert ("friction_memory_lost", LEFT) in names(inspect(hole, VEHICLE).findings)
+
+
+def test_a_delay_that_the_vehicle_file_knows_is_no_skew(sound: Recording) -> None:
+    late = pressure(later(0.2), *LINES)(sound)
+    assert "clock_skew" in {finding for finding, _ in names(inspect(late, VEHICLE).blocking)}
+    knowing = VEHICLE.replace(effects=(EffectEntry("time_delay", {"delay": 0.2}),))
+    assert names(inspect(late, knowing).blocking) == []
+
+
+def test_absolute_pressures_in_bar(sound: Recording) -> None:
+    absolute = VEHICLE.replace(sensors=replace(VEHICLE.sensors, pressure_reference="absolute"))
+    bar = pressure(lambda s: Signal(s.time_s, (s.value + 101_325.0) / 1e5), *LINES)(sound)
+    (fault,) = inspect(bar, absolute).blocking
+    assert fault.finding == "unit_suspect"
+    assert "bar" in fault.statement
 
 
 def test_rates_go_with_their_angles(sound: Recording) -> None:

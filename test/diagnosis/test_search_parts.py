@@ -11,9 +11,10 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.diagnosis import experiment, fingerprint, flexible, foreign, limits, name, noise, split, verify
 from lugre_steering.diagnosis.fingerprint import Score
-from lugre_steering.diagnosis.fit import fit
-from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.fit import Fit, fit
+from lugre_steering.diagnosis.problem import Candidate, Problem
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.vehicle import EffectEntry
 
 
 @pytest.fixture(scope="module")
@@ -200,13 +201,37 @@ def test_detection_limits_are_sizes_at_which_so_much_can_be_seen(problem: Proble
     found = limits.smallest(problem, result, weight(problem), scores, ["slope_bias"])
     assert "slope_bias" not in found
     assert {"viscous_friction", "distributed_contact", "yaw_inertia", "end_stop"} <= set(found)
-    base = problem.predict_all(result.x)
-    columns = result.jacobian[:, np.linalg.norm(result.jacobian, axis=0) > 0.0]
     for id_ in ("viscous_friction", "distributed_contact", "yaw_inertia"):
         parameter, size = found[id_]
-        trace = (problem.predict_all(result.x, [effect(id_, **{parameter.name: size})]) - base) * weight(problem)
-        left = trace - columns @ np.linalg.lstsq(columns, trace, rcond=1e-10)[0]
-        assert np.sum(left**2) == pytest.approx(limits.REVEALED * problem.valid.sum(), rel=0.15)
+        shown = visible_energy(problem, result, weight(problem), effect(id_, **{parameter.name: size}))
+        assert shown == pytest.approx(limits.REVEALED * problem.valid.sum(), rel=0.15)
+
+
+def visible_energy(problem: Problem, result: Fit, seen: np.ndarray, *effects: tuple) -> float:
+    """What recalibration cannot imitate of a trace, by plain least squares."""
+    columns = result.jacobian[:, np.linalg.norm(result.jacobian, axis=0) > 0.0]
+    trace = (problem.predict_all(result.x, effects) - problem.predict_all(result.x)) * seen
+    left = trace - columns @ np.linalg.lstsq(columns, trace, rcond=1e-10)[0]
+    return float(np.sum(left**2))
+
+
+@pytest.mark.parametrize("blunter", [4.0, 16.0, 30.0])
+def test_no_shape_and_no_sign_shows_at_half_a_limit(problem: Problem, blunter: float) -> None:
+    """In blunter recordings the sizes are large, where traces bend, other shapes are better seen, and a sign makes a difference."""
+    blunt = weight(problem) / blunter
+    result, draws = fit(problem, blunt), blunter * SIGMA * np.random.default_rng(4).standard_normal((8, problem.measured.size))
+    scores = fingerprint.screen(problem, result, blunt, draws)
+    found = limits.smallest(problem, result, blunt, scores, [])
+    needed = limits.REVEALED * problem.valid.sum()
+    for id_ in ("static_ageing", "wear_polishing", "angle_scale", "linkage_compliance"):
+        parameter, size = found[id_]
+        shapes = {s.candidate.shapes for s in scores if s.candidate.effect.id == id_ and not s.candidate.since}
+        largest = max(abs(parameter.high), abs(parameter.low))
+        for sign, bound in ((1.0, parameter.high), (-1.0, -parameter.low)):
+            half = largest if size is None else 0.5 * size
+            for shape in shapes if bound > 0.0 else ():
+                values = {**dict(shape), parameter.name: sign * min(half, bound)}
+                assert visible_energy(problem, result, blunt, effect(id_, **values)) < 1.2 * needed
 
 
 def test_what_no_size_could_show_has_no_limit(problem: Problem) -> None:
@@ -214,6 +239,58 @@ def test_what_no_size_could_show_has_no_limit(problem: Problem) -> None:
     result, draws = fit(problem, blunt), 1e3 * SIGMA * np.random.default_rng(4).standard_normal((8, problem.measured.size))
     found = limits.smallest(problem, result, blunt, fingerprint.screen(problem, result, blunt, draws), [])
     assert found["heat_partition"][1] is None
+
+
+def test_an_onset_must_explain_clearly_more_to_stand_for_a_group() -> None:
+    before, candidates = 1000.0, [effect("slope_bias", torque=1.0)[0], effect("kingpin_jacking", amplitude=1.0)[0]]
+    score = Score(candidates[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+
+    def trial(candidate: Candidate, cost: float, since: tuple[float, ...] = ()) -> name.Trial:
+        nothing = np.zeros((1, 1))
+        made = Fit(nothing[0], ((replace(candidate, since=since), {}),), nothing[0], cost, nothing, nothing)
+        return name.Trial(score, made, cost)
+
+    always, late = trial(candidates[0], 500.0), trial(candidates[1], 480.0, (10.0, 10.0))
+    much_better = trial(candidates[1], 300.0, (10.0, 10.0))
+    assert name._ranked([late, always], before)[0] is always
+    assert name.simplest(always, [late], before)[0] is always
+    assert name._ranked([always, much_better], before)[0] is much_better
+    assert name.simplest(much_better, [always], before)[0] is much_better
+
+
+def test_laws_that_differ_by_a_hundredth_of_what_they_explain_are_tied(problem: Problem) -> None:
+    """Nature is true to no law to a hundredth; lines of the same law are another matter."""
+    roles, x = split.split(problem), problem.start()
+    truth = effect("slope_bias", torque=2000.0)
+    hidden = with_torque(problem, problem.predict_all(x, [truth]))
+    seen = np.where(roles.fit, weight(hidden), 0.0)
+    score = Score(truth[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    before = name.cost(hidden, fit(hidden, seen), seen)
+
+    def trial(id_: str, off: float) -> name.Trial:
+        right = fit(hidden, seen, [truth])
+        wrong = replace(right, prediction=right.prediction + off, effects=((effect(id_, torque=1.0)[0], {}),))
+        return name.Trial(score, wrong, name.cost(hidden, wrong, seen))
+
+    best = trial("slope_bias", 0.0)
+    for off, law, tied in ((30.0, name.LAW, True), (30.0, 0.0, False), (300.0, name.LAW, False)):
+        other = trial("back_pressure", off)
+        rivals = name.tied(hidden, seen, roles, best, [other], before, float(roles.fit.sum()), law=law)
+        assert bool(rivals) == tied
+
+
+def test_sensor_effects_of_the_vehicle_file_are_in_the_baseline(problem: Problem) -> None:
+    """And count once where they are given again."""
+    for id_, values in (("pressure_offset", {"main_a": 5e4}), ("time_delay", {"delay": 0.2}), ("moment_arm_error", {"linear": 0.1})):
+        knowing = Problem(problem.vehicle.replace(effects=(EffectEntry(id_, values),)), problem.runs)
+        line, key = (next(iter(values)), "offset") if CATALOGUE[id_].per_line else ("", next(iter(values)))
+        given = replace(effect(id_, **{key: 1.0})[0], line=line)
+        plain, x = problem.predict_all(problem.start()), problem.start()
+        expected = problem.predict_all(x, [(given, {key: next(iter(values.values()))})])
+        assert np.abs(expected - plain).max() > 50.0
+        np.testing.assert_allclose(knowing.predict_all(x), expected, atol=1e-9)
+        other = [(given, {key: 0.5 * next(iter(values.values()))})]
+        np.testing.assert_allclose(knowing.predict_all(x, other), problem.predict_all(x, other), atol=1e-9)
 
 
 def test_two_parts_of_a_law_that_do_the_same_work_are_not_both_dropped(problem: Problem) -> None:
