@@ -318,8 +318,8 @@ class _Conclusion:
         if pattern is not None:
             gain = 1.0 - pattern.cost(problem, held) / max(name.cost(problem, self.found.baseline, held), 1e-9)
         # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
-        structured = slow - nothing > max(UNLISTED_EXCESS, self.noise.slow_doubt) or excess > FAST_EXCESS or gain > FORETELLS
-        if not structured:
+        loud = slow - nothing > max(UNLISTED_EXCESS, self.noise.slow_doubt) or excess > FAST_EXCESS
+        if not loud and not gain > FORETELLS:
             return (
                 {
                     "structured": False,
@@ -342,7 +342,7 @@ class _Conclusion:
         if pattern is not None and gain > (proposal.gain if proposal is not None else 0.02):
             proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
             # A pattern that explains most of it also says where it acts below the noise.
-            shape = pattern.torque if gain > TELLING else None
+            shape = pattern.torque if gain > TELLING or not loud else None
         if proposal is not None:
             formula = f"{units.law(problem.vehicle, proposal.text)} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
         where = []
@@ -359,10 +359,11 @@ class _Conclusion:
                     "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
                     "range": list(locate.active_range(values[axis], piece)), "unit": self._unit(locate.UNITS[axis]),
                 })  # fmt: skip
-        surplus = max(excess, 0.0)
         text = (
-            f"{100 * surplus / (1.0 + surplus):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
+            f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
             f"({100 * share:.0f} % of the residual energy follows it)"
+            if loud
+            else f"a pattern outside the catalogue foretells {100 * gain:.0f} % of the held-out residual energy"
         )
         return {"structured": True, "description": text, "formula": formula, "where": where}, text, True
 

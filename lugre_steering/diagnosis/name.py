@@ -42,7 +42,7 @@ PARTIAL = 0.1
 VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
-"""Excess from which patterns outside the catalogue compete, and share of the names' gain that counts as a difference."""
+"""Excess from which patterns outside the catalogue compete with names, and share of their gain that counts as a difference."""
 MEMORY = 4.0
 """Samples that count as one, roughly: errors have a memory."""
 TRIAL_TOLERANCE = 1e-4
@@ -94,7 +94,7 @@ class Search:
     first_scores: tuple[Score, ...]
     trials: tuple[Trial, ...]
     pattern: Pattern | None
-    """The strongest pattern that no entry makes, where there was anything to explain."""
+    """The strongest pattern that no entry makes, unless what names explain was hardly there."""
 
 
 def cost(problem: Problem, result: Fit, weight: Array) -> float:
@@ -157,7 +157,8 @@ def search(
             break
     kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + noise.slow_doubt)
     final, found = _confirmed(problem, noise, weight, split, baseline, steps[:kept], samples, progress)
-    pattern = strongest(problem, baseline, weight) if excess > PATTERN_EXCESS * samples else None
+    # What rings on at standstill passes for noise, so a pattern may be there though nothing seems left over.
+    pattern = strongest(problem, baseline, weight) if not found or excess > PATTERN_EXCESS * samples else None
     if pattern is not None and found:
         named = [cost(problem, steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
         if _foreign(pattern.cost(problem, weight), named, start_cost):
