@@ -21,7 +21,7 @@ def _keep_compiled_code() -> None:
     Numba looks at the file of the cached function only and would run stale code after an edit of a stage it calls.
     """
     package = Path(__file__).resolve().parent.parent
-    sources = [*sorted((package / "chain").glob("*.py")), package / "estimator.py"]
+    sources = [*sorted((package / "chain").glob("*.py")), *sorted((package / "estimator").glob("*.py"))]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     numba.config.CACHE_DIR = str(base / "lugre_steering" / digest)  # type: ignore[attr-defined]

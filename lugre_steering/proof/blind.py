@@ -64,8 +64,8 @@ class Job:
 
 def source_version() -> str:
     """Hash of the code that decides the outcome of a case: what a diagnosis and its recordings need, not reports, scores and shells."""
-    aside = {PACKAGE / folder for folder in ("report", "live", "bench", "calibration", "importing")}
-    beside = {PACKAGE / f"{name}.py" for name in ("cli", "estimator", "online", "replay")}
+    aside = {PACKAGE / folder for folder in ("report", "live", "bench", "calibration", "importing", "estimator")}
+    beside = {PACKAGE / f"{name}.py" for name in ("cli", "online", "replay")}
     scoring = {PACKAGE / "proof" / f"{name}.py" for name in ("scoreboard", "table", "command", "peers")}
     digest = hashlib.sha256()
     for file in sorted(PACKAGE.rglob("*.py")):

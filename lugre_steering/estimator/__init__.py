@@ -1,0 +1,23 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator: timestamped samples in, torque, temperature and residual out.
+
+Live node and replay push the same messages through the same compiled loop, so equal inputs give equal numbers.
+
+Rules of time (header stamps only, never arrival times):
+
+* Each angle sample advances its own side exactly once. A torque is published when both sides have a sample of the same
+  stamp, to within half a sampling period; samples wait for a partner that arrives late, and one that gets none is
+  counted as unpaired (it has advanced its side all the same).
+* The residual of a torque follows when every line has a pressure at or after its stamp; pressures are interpolated
+  linearly, never held or extrapolated, and not across a gap.
+* Duplicate, backward, zero, not finite, absurd and jumping samples are rejected and counted by reason. A jump is
+  believed when the next sample of the same channel confirms it and, for an angle, the other side is there or jumps as
+  well. A jump of both sides back in time starts the estimator anew; a side or line that jumps back alone loses its own
+  samples in waiting, nothing else. So does a torque that is no finite number start it anew; ``restart`` counts them.
+* A rate that no steering has, or none that is a number, counts as not given.
+"""
+
+from lugre_steering.estimator.estimator import PLAN_POINTS, WAITING_RING, Estimator, Options
+
+__all__ = ["PLAN_POINTS", "WAITING_RING", "Estimator", "Options"]

@@ -1,0 +1,150 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which samples are accepted, and what a jump in time means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from lugre_steering.estimator.layout import (
+    ABSURD,
+    BACKWARD,
+    DUPLICATE,
+    GAP,
+    JUMP,
+    NOT_FINITE,
+    OVERRUN,
+    RESTART,
+    SPIKE,
+    ZERO,
+)
+from lugre_steering.recording import Kind
+
+CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
+
+
+@njit
+def _clear(ch):
+    """Forget the samples of one channel, not its counters."""
+    ch.last_ns = 0
+    ch.suspect_ns = 0
+    ch.period_ns = 0
+    ch.head = 0
+    ch.cursor = 0
+
+
+@njit
+def _begin_side(core, side):
+    """Forget what one side has been through, but for the count of its steps outside the rubber table."""
+    saturated = core.state[side].saturated
+    core.state[side] = np.zeros_like(core.state)[side]
+    core.motion[side] = np.zeros_like(core.motion)[side]
+    core.state[side].saturated = saturated
+    _clear(core.channels[side])
+
+
+@njit
+def restart(core, k):
+    """Forget the past, except the counters; counted for channel ``k``, like the torques that still lack pressures."""
+    for side in range(core.state.size):  # slice assignment would compile for ten seconds more
+        _begin_side(core, side)
+    for i in range(core.channels.size):
+        _clear(core.channels[i])
+    c = core.config[0]
+    core.channels[k].reasons[RESTART] += 1
+    core.channels[k].reasons[OVERRUN] += c.pending_count
+    c.start_ns = 0
+    c.lagged_ns = 0
+    c.pending_count = 0
+    c.plan_size = 0
+
+
+_DOUBTED, _SHARED, _THERE = range(3)
+
+
+@njit
+def _other_side(core, k, stamp_ns):
+    """What the other side says to a jump of angle channel ``k``: it is not there, it jumps as well, or it is there.
+
+    A side without any sample yet (or without another) agrees.
+    """
+    near_ns = min(CONFIRM_NS, core.config[0].backward_jump_ns // 2)
+    for side in range(core.state.size):
+        other = core.channels[side]
+        if side == k or other.last_ns == 0:
+            continue
+        if abs(stamp_ns - other.last_ns) < near_ns:
+            return _THERE
+        if other.suspect_ns == 0 or abs(stamp_ns - other.suspect_ns) >= near_ns:
+            return _DOUBTED
+    return _SHARED
+
+
+@njit
+def admit(core, k, stamp_ns, value):
+    """Whether channel ``k`` accepts the sample; counts the reason if not."""
+    c, ch = core.config[0], core.channels[k]
+    if stamp_ns <= 0:
+        ch.reasons[ZERO] += 1
+        return False
+    if not math.isfinite(value):
+        ch.reasons[NOT_FINITE] += 1
+        return False
+    if (ch.kind == Kind.ANGLE and abs(value) > c.max_angle) or (ch.kind == Kind.PRESSURE and abs(value) > c.max_pressure):
+        ch.reasons[ABSURD] += 1
+        return False
+    if (ch.kind == Kind.AIR_TEMPERATURE and not -100.0 < value < 100.0) or abs(value) > 1e12:
+        ch.reasons[ABSURD] += 1
+        return False
+    if ch.last_ns == 0:
+        return True
+    ahead = stamp_ns - ch.last_ns
+    if ahead == 0:
+        ch.reasons[DUPLICATE] += 1
+        return False
+    if -c.backward_jump_ns < ahead < 0:
+        ch.reasons[BACKWARD] += 1
+        return False
+    if ch.kind == Kind.AIR_TEMPERATURE:  # air may come as rarely as it likes, and no sample of it is needed at any instant
+        return True
+    follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < CONFIRM_NS
+    if ahead < 0 or ahead > c.forward_jump_ns:
+        other_side = _other_side(core, k, stamp_ns) if ch.kind == Kind.ANGLE else _THERE
+        if not follows_suspect or other_side == _DOUBTED:
+            ch.reasons[JUMP] += 1
+            ch.suspect_ns = stamp_ns
+            ch.suspect_value = value
+            return False
+        if ahead < 0:
+            if other_side == _SHARED:
+                restart(core, k)
+                return True
+            if ch.kind != Kind.ANGLE:
+                _clear(ch)
+                return True
+            # This side alone had strayed ahead: it goes on from the sample before, which the stray one made suspect.
+            ch.last_ns = ch.suspect_ns
+            ch.cursor = ch.head
+            ahead = stamp_ns - ch.last_ns
+    if ch.kind == Kind.ANGLE:
+        reach = c.max_rate * ahead * 1e-9 + 10.0 * c.angle_noise
+        if abs(value - ch.last_value) > reach:
+            near = (
+                follows_suspect
+                and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
+            )
+            if not near:
+                ch.reasons[SPIKE] += 1
+                ch.suspect_ns = stamp_ns
+                ch.suspect_value = value
+                return False
+            if ch.head == 1:  # two agree against the first one
+                _begin_side(core, ch.index)
+                return True
+    if ahead > c.max_gap_ns:
+        ch.reasons[GAP] += 1
+    ch.suspect_ns = 0
+    return True

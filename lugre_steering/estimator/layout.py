@@ -1,0 +1,116 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the compiled loop reads and writes: records and rings, and the reasons for which a sample is counted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lugre_steering.chain.step import Records
+from lugre_steering.recording import Array, IntArray
+
+REASONS = (
+    "duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun",
+    "restart", "absurd_rate",
+)  # fmt: skip
+(
+    DUPLICATE, BACKWARD, ZERO, NOT_FINITE, ABSURD, SPIKE, JUMP, UNPAIRED, GAP, OVERRUN, RESTART, RATE,
+) = range(len(REASONS))  # fmt: skip
+
+ESTIMATE = np.dtype(
+    [
+        ("stamp_ns", np.int64),
+        ("theta", np.float64, (2,)),
+        ("omega", np.float64, (2,)),
+        ("torque", np.float64, (2,)),
+        ("temperature", np.float64, (2,)),
+        ("feed_forward", np.float64, (2,)),
+        ("total", np.float64),
+        ("predicted", np.float64),  # total as the pressure sensors would show it (lagged)
+        ("message", np.int64),  # the pushed message that completed it, counted from 0
+    ]
+)
+RESIDUAL = np.dtype(
+    [("stamp_ns", np.int64), ("measured_torque", np.float64), ("residual", np.float64), ("message", np.int64)]
+)
+
+CONFIG = np.dtype(
+    [
+        ("pair_tolerance_ns", np.int64),
+        ("max_gap_ns", np.int64),
+        ("backward_jump_ns", np.int64),
+        ("forward_jump_ns", np.int64),
+        ("max_angle", np.float64),
+        ("max_rate", np.float64),
+        ("max_pressure", np.float64),
+        ("angle_noise", np.float64),
+        ("gauge_offset", np.float64),
+        ("pressure_gain", np.float64),
+        ("delay_ns", np.int64),
+        ("lag", np.float64),
+        ("arm_linear", np.float64),
+        ("arm_quadratic", np.float64),
+        ("horizon", np.float64),
+        ("start_ns", np.int64),
+        ("lagged", np.float64),
+        ("lagged_ns", np.int64),
+        ("pending_first", np.int64),
+        ("pending_count", np.int64),
+        ("plan_size", np.int64),
+        ("effects", np.bool_),
+        ("message", np.int64),  # number of the message being processed, from 0
+    ]
+)
+CHANNEL = np.dtype(
+    [
+        ("kind", np.int64),
+        ("index", np.int64),
+        ("last_ns", np.int64),
+        ("suspect_ns", np.int64),
+        ("suspect_value", np.float64),
+        ("last_value", np.float64),
+        ("accepted", np.int64),
+        ("period_ns", np.int64),  # from the last but one accepted sample to the last
+        ("head", np.int64),  # samples stored so far in the ring of this line or side
+        ("cursor", np.int64),  # first ring sample that may still be needed
+        ("offset", np.float64),  # sensor offset [Pa]
+        ("drift", np.float64),  # sensor drift [Pa/s]
+        ("reasons", np.int64, (len(REASONS),)),
+    ]
+)
+WAITING = np.dtype(
+    [
+        ("stamp_ns", np.int64),
+        ("theta", np.float64),
+        ("omega", np.float64),
+        ("torque", np.float64),
+        ("temperature", np.float64),
+        ("feed_forward", np.float64),
+    ]
+)
+
+
+class Core(NamedTuple):
+    """Everything the compiled loop reads and writes; arrays only, so that it can be copied and restored."""
+
+    config: Records
+    channels: Records
+    parameters: Records
+    state: Records
+    motion: Records
+    output: Records
+    waiting: Records
+    rubber: Array
+    pending: Records
+    line_ns: IntArray
+    line_value: Array
+    geometry: Array
+    areas: Array
+    lines: IntArray
+    plan_ns: IntArray
+    plan_theta: Array
+    scratch_value: Array
+    scratch_state: Records
+    scratch_output: Records

@@ -1,0 +1,129 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From accepted angle samples to the torque of both sides at one instant."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from lugre_steering.chain.rates import follow
+from lugre_steering.chain.step import step
+from lugre_steering.estimator.admission import restart
+from lugre_steering.estimator.layout import OVERRUN, RATE, UNPAIRED
+from lugre_steering.estimator.preview import preview
+from lugre_steering.recording import RATE_LIMIT
+
+MAX_PAIR_TOLERANCE_NS = 50_000_000
+
+
+@njit
+def _pair(core):
+    """Drop waiting samples that can get no partner; stamp of the pair now at the head of the sides' queues, or 0."""
+    sides, ring = core.waiting.shape
+    period_ns = MAX_PAIR_TOLERANCE_NS
+    for side in range(sides):
+        if core.channels[side].period_ns > 0:
+            period_ns = min(period_ns, core.channels[side].period_ns)
+    tolerance_ns = max(core.config[0].pair_tolerance_ns, period_ns // 2)
+    while True:
+        latest = 0
+        for side in range(sides):
+            ch = core.channels[side]
+            if ch.head == ch.cursor:
+                return 0
+            latest = max(latest, core.waiting[side, ch.cursor % ring].stamp_ns)
+        paired = True
+        for side in range(sides):
+            ch = core.channels[side]
+            if latest - core.waiting[side, ch.cursor % ring].stamp_ns > tolerance_ns:
+                ch.cursor += 1
+                ch.reasons[UNPAIRED] += 1
+                paired = False
+        if paired:
+            return latest
+
+
+@njit
+def _complete(core, k, stamp_ns, e):
+    """Write the estimate of the pair at the head of the sides' queues, and keep it until its pressures come."""
+    c, ring = core.config[0], core.waiting.shape[1]
+    e.stamp_ns = stamp_ns
+    e.message = c.message
+    e.total = 0.0
+    for side in range(core.waiting.shape[0]):
+        w = core.waiting[side, core.channels[side].cursor % ring]
+        core.channels[side].cursor += 1
+        e.theta[side] = w.theta
+        e.omega[side] = w.omega
+        e.torque[side] = w.torque
+        e.temperature[side] = w.temperature
+        e.feed_forward[side] = w.feed_forward
+        e.total += w.torque
+    if not math.isfinite(e.total):
+        e.predicted = e.total
+        restart(core, k)
+        return
+    if c.lag > 0.0 and c.lagged_ns != 0:
+        c.lagged = e.total + (c.lagged - e.total) * math.exp(-(stamp_ns - c.lagged_ns) * 1e-9 / c.lag)
+    else:
+        c.lagged = e.total
+    c.lagged_ns = stamp_ns
+    e.predicted = c.lagged
+    if c.pending_count == core.pending.size:
+        c.pending_first = (c.pending_first + 1) % core.pending.size
+        c.pending_count -= 1
+        core.channels[k].reasons[OVERRUN] += 1
+    core.pending[(c.pending_first + c.pending_count) % core.pending.size] = e
+    c.pending_count += 1
+
+
+@njit
+def advance(core, k, stamp_ns, value, rate, estimates, count):
+    """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
+    c, ch = core.config[0], core.channels[k]
+    side = ch.index
+    if abs(rate) >= RATE_LIMIT:
+        ch.reasons[RATE] += 1
+        rate = math.nan
+    if c.start_ns == 0 or stamp_ns < c.start_ns:
+        c.start_ns = stamp_ns
+    dt = 0.0
+    if ch.last_ns == 0:
+        core.state[side].time = max(0.0, (stamp_ns - c.start_ns) * 1e-9)
+    else:
+        ch.period_ns = stamp_ns - ch.last_ns
+        dt = ch.period_ns * 1e-9
+    ch.last_ns = stamp_ns
+    ch.last_value = value
+    motion = core.motion[side]
+    follow(motion, dt, value, rate, c.angle_noise)
+    step(
+        core.parameters[side],
+        core.state[side],
+        core.rubber,
+        core.output[side],
+        dt,
+        motion.theta,
+        motion.omega,
+        motion.alpha,
+        c.effects,
+    )
+    ring = core.waiting.shape[1]
+    if ch.head - ch.cursor == ring:
+        ch.reasons[UNPAIRED] += 1
+        ch.cursor += 1
+    waiting = core.waiting[side, ch.head % ring]
+    ch.head += 1
+    waiting.stamp_ns = stamp_ns
+    waiting.theta = core.state[side].theta
+    waiting.omega = motion.omega
+    waiting.torque = core.output[side].torque
+    waiting.temperature = core.output[side].temperature
+    waiting.feed_forward = preview(core, side, stamp_ns)
+    latest = _pair(core)
+    if latest == 0:
+        return count
+    _complete(core, k, latest, estimates[count])
+    return count + 1
