@@ -18,10 +18,10 @@ from lugre_steering.calibration.calibrate import KEYS, chosen
 from lugre_steering.calibration.estimate import _larger
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.cli import app
-from lugre_steering.diagnosis.apply import apply_calibration
-from lugre_steering.diagnosis.dataset import prepare
-from lugre_steering.diagnosis.fit import fit
-from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.data.dataset import prepare
+from lugre_steering.diagnosis.fitting.apply import apply_calibration
+from lugre_steering.diagnosis.fitting.fit import fit
+from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Signal
 from lugre_steering.replay import replay

@@ -22,10 +22,10 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
-from lugre_steering.diagnosis import experiment
-from lugre_steering.diagnosis.dataset import prepare
+from lugre_steering.diagnosis.conclude import experiment
+from lugre_steering.diagnosis.data.dataset import prepare
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
-from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.estimator import Estimator

@@ -39,12 +39,12 @@ from lugre_steering import __version__, units
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
-from lugre_steering.diagnosis.apply import apply_calibration
-from lugre_steering.diagnosis.dataset import prepare
-from lugre_steering.diagnosis.fit import fit
-from lugre_steering.diagnosis.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
-from lugre_steering.diagnosis.quality import inspect
-from lugre_steering.diagnosis.split import split
+from lugre_steering.diagnosis.data.dataset import prepare
+from lugre_steering.diagnosis.data.quality import inspect
+from lugre_steering.diagnosis.fitting.apply import apply_calibration
+from lugre_steering.diagnosis.fitting.fit import fit
+from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
+from lugre_steering.diagnosis.fitting.split import split
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import Vehicle, load, save

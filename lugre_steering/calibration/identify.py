@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.calibration.estimate import Estimate, physical_jacobian
 from lugre_steering.chain.model import Model
-from lugre_steering.diagnosis.problem import GAIN, KINGPIN, Calibration, Problem
+from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, Calibration, Problem
 from lugre_steering.recording import Array
 
 SENSITIVITY = Calibration("temperature_sensitivity", (), 0.15, -0.6, 0.6)

@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.dataset import Run
-from lugre_steering.diagnosis.fit import Fit, fit
-from lugre_steering.diagnosis.name import Search, search
-from lugre_steering.diagnosis.noise import Noise, noise_model, repeated_motion
-from lugre_steering.diagnosis.problem import Problem
-from lugre_steering.diagnosis.split import Split, balanced, split
+from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.fitting.noise import Noise, noise_model, repeated_motion
+from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.diagnosis.fitting.split import Split, balanced, split
+from lugre_steering.diagnosis.search.build_up import Search, search
 
 NULL_DRAWS = 16
 NOISE_ROUNDS, QUIETER = 2, 0.8

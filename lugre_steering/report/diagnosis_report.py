@@ -18,7 +18,7 @@ from typing import Any
 
 from lugre_steering import units
 from lugre_steering.calibration.calibrate import KEYS
-from lugre_steering.diagnosis.problem import calibrations_for
+from lugre_steering.diagnosis.fitting.problem import calibrations_for
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError

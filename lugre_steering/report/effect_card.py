@@ -16,11 +16,11 @@ from rich.table import Table
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.chain.hydraulics import line_gains
-from lugre_steering.diagnosis import locate
-from lugre_steering.diagnosis.dataset import Run
-from lugre_steering.diagnosis.fingerprint import candidates
-from lugre_steering.diagnosis.problem import Candidate, Problem
+from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
 from lugre_steering.diagnosis.result import finite
+from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search.fingerprint import candidates
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.effects.entry import Effect
 from lugre_steering.recording import Array

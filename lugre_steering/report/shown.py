@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.locate import UNITS
 from lugre_steering.diagnosis.result import BagTrace
+from lugre_steering.diagnosis.search.locate import UNITS
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 

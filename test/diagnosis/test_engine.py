@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis import fingerprint
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
+from lugre_steering.diagnosis.search import fingerprint
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import BagError
 from lugre_steering.proof.simulator import Case, CaseData, Concealed, load_sheet, simulate_case, write_case

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis.dataset import prepare
-from lugre_steering.diagnosis.fit import fit
-from lugre_steering.diagnosis.problem import Problem
-from lugre_steering.diagnosis.quality import inspect
+from lugre_steering.diagnosis.data.dataset import prepare
+from lugre_steering.diagnosis.data.quality import inspect
+from lugre_steering.diagnosis.fitting.fit import fit
+from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder

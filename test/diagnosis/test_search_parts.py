@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis import experiment, fingerprint, flexible, foreign, limits, name, noise, split, verify
-from lugre_steering.diagnosis.fingerprint import Score
-from lugre_steering.diagnosis.fit import Fit, fit
-from lugre_steering.diagnosis.problem import Candidate, Problem
+from lugre_steering.diagnosis.conclude import experiment, limits, verify
+from lugre_steering.diagnosis.fitting import noise, split
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
+from lugre_steering.diagnosis.search import build_up, fingerprint, flexible, foreign, ties, trial
+from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.vehicle import EffectEntry
 
@@ -75,11 +77,11 @@ def test_a_late_effect_acts_from_its_start_and_is_timed(problem: Problem) -> Non
     guess = replace(candidate, since=(20.0, 20.0))
     result = fit(hidden, weight(hidden), [(guess, {"torque": 200.0})])
     score = Score(guess, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
-    trial = name.Trial(score, result, name.cost(hidden, result, weight(hidden)))
-    for _ in range(name.RETIMED):
-        trial = name.retime(hidden, weight(hidden), trial)
-    assert trial.candidate.since == pytest.approx(starts, abs=0.3)
-    assert trial.fit.effects[0][1]["torque"] == pytest.approx(400.0, rel=0.02)
+    tried = trial.Trial(score, result, trial.cost(hidden, result, weight(hidden)))
+    for _ in range(trial.RETIMED):
+        tried = trial.retime(hidden, weight(hidden), tried)
+    assert tried.candidate.since == pytest.approx(starts, abs=0.3)
+    assert tried.fit.effects[0][1]["torque"] == pytest.approx(400.0, rel=0.02)
 
 
 def ringing(torque: np.ndarray, dt: float) -> np.ndarray:
@@ -134,7 +136,7 @@ def test_a_pattern_is_sought_even_where_noise_seems_to_explain_all(problem: Prob
     roles, loud = split.split(hidden), 6.0 * SIGMA
     draws = loud * np.random.default_rng(4).standard_normal((16, hidden.measured.size))
     seen = noise.Noise(np.full(hidden.measured.size, loud), draws, 0.5)
-    found = name.search(hidden, seen, roles, fit(hidden, np.where(roles.fit, 1.0 / loud, 0.0)))
+    found = build_up.search(hidden, seen, roles, fit(hidden, np.where(roles.fit, 1.0 / loud, 0.0)))
     assert found.found == ()
     assert found.excess < 0.0
     assert found.pattern is not None
@@ -150,9 +152,9 @@ def test_a_freer_shape_takes_what_a_wrong_law_leaves_and_no_more(problem: Proble
         hidden = with_torque(problem, problem.predict_all(x, truth))
         wrong = fit(hidden, weight(hidden), [linear])
         right = fit(hidden, weight(hidden), truth)
-        gain = name.cost(hidden, wrong, weight(hidden)) - name.cost(hidden, right, weight(hidden))
+        gain = trial.cost(hidden, wrong, weight(hidden)) - trial.cost(hidden, right, weight(hidden))
         share = flexible.explained(hidden, wrong, weight(hidden), 0) / gain
-        assert share > name.FREER if taken else share < 0.3
+        assert share > build_up.FREER if taken else share < 0.3
 
 
 def test_the_jackknife_widens_where_the_law_is_wrong(problem: Problem) -> None:
@@ -179,8 +181,8 @@ def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(proble
     seen = noise.Noise(np.full(hidden.measured.size, SIGMA), draws, 0.0)
     final = fit(hidden, fitted, [linear, offset])
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
-    item = name.Found(score, ("line_loss_quadratic",), (), 1.0)
-    result, found = name._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()))
+    item = build_up.Found(score, ("line_loss_quadratic",), (), 1.0)
+    result, found = build_up._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()))
     assert [candidate.effect.id for candidate, _ in result.effects] == ["line_loss_quadratic", "slope_bias"]
     assert found.score.candidate.effect.id == "line_loss_quadratic"
     change = problem.predict_all(result.x, result.effects[:1]) - problem.predict_all(result.x, [(result.effects[0][0], {"c": 0.0})])
@@ -267,17 +269,17 @@ def test_an_onset_must_explain_clearly_more_to_stand_for_a_group() -> None:
     before, candidates = 1000.0, [effect("slope_bias", torque=1.0)[0], effect("kingpin_jacking", amplitude=1.0)[0]]
     score = Score(candidates[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
 
-    def trial(candidate: Candidate, cost: float, since: tuple[float, ...] = ()) -> name.Trial:
+    def made_up(candidate: Candidate, cost: float, since: tuple[float, ...] = ()) -> trial.Trial:
         nothing = np.zeros((1, 1))
         made = Fit(nothing[0], ((replace(candidate, since=since), {}),), nothing[0], cost, nothing, nothing)
-        return name.Trial(score, made, cost)
+        return trial.Trial(score, made, cost)
 
-    always, late = trial(candidates[0], 500.0), trial(candidates[1], 480.0, (10.0, 10.0))
-    much_better = trial(candidates[1], 300.0, (10.0, 10.0))
-    assert name._ranked([late, always], before)[0] is always
-    assert name.simplest(always, [late], before)[0] is always
-    assert name._ranked([always, much_better], before)[0] is much_better
-    assert name.simplest(much_better, [always], before)[0] is much_better
+    always, late = made_up(candidates[0], 500.0), made_up(candidates[1], 480.0, (10.0, 10.0))
+    much_better = made_up(candidates[1], 300.0, (10.0, 10.0))
+    assert trial.ranked([late, always], before)[0] is always
+    assert ties.simplest(always, [late], before)[0] is always
+    assert trial.ranked([always, much_better], before)[0] is much_better
+    assert ties.simplest(much_better, [always], before)[0] is much_better
 
 
 def test_laws_that_differ_by_a_hundredth_of_what_they_explain_are_tied(problem: Problem) -> None:
@@ -287,17 +289,17 @@ def test_laws_that_differ_by_a_hundredth_of_what_they_explain_are_tied(problem: 
     hidden = with_torque(problem, problem.predict_all(x, [truth]))
     seen = np.where(roles.fit, weight(hidden), 0.0)
     score = Score(truth[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
-    before = name.cost(hidden, fit(hidden, seen), seen)
+    before = trial.cost(hidden, fit(hidden, seen), seen)
 
-    def trial(id_: str, off: float) -> name.Trial:
+    def made_up(id_: str, off: float) -> trial.Trial:
         right = fit(hidden, seen, [truth])
         wrong = replace(right, prediction=right.prediction + off, effects=((effect(id_, torque=1.0)[0], {}),))
-        return name.Trial(score, wrong, name.cost(hidden, wrong, seen))
+        return trial.Trial(score, wrong, trial.cost(hidden, wrong, seen))
 
-    best = trial("slope_bias", 0.0)
-    for off, law, tied in ((30.0, name.LAW, True), (30.0, 0.0, False), (300.0, name.LAW, False)):
-        other = trial("back_pressure", off)
-        rivals = name.tied(hidden, seen, roles, best, [other], before, float(roles.fit.sum()), law=law)
+    best = made_up("slope_bias", 0.0)
+    for off, law, tied in ((30.0, ties.LAW, True), (30.0, 0.0, False), (300.0, ties.LAW, False)):
+        other = made_up("back_pressure", off)
+        rivals = ties.tied(hidden, seen, roles, best, [other], before, float(roles.fit.sum()), law=law)
         assert bool(rivals) == tied
 
 
@@ -322,12 +324,12 @@ def test_two_parts_of_a_law_that_do_the_same_work_are_not_both_dropped(problem: 
     plain = effect("back_pressure", torque=150.0)
     score = Score(plain[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     result = fit(hidden, weight(hidden), [plain])
-    refined = name.refine(hidden, weight(hidden), name.Trial(score, result, name.cost(hidden, result, weight(hidden))))
+    refined = trial.refine(hidden, weight(hidden), trial.Trial(score, result, trial.cost(hidden, result, weight(hidden))))
     assert refined.cost < 1.02 * hidden.valid.sum()  # without either 1.07
     # Where the law is plain, nothing is added to it.
     hidden = with_torque(problem, problem.predict_all(problem.start(), [plain]))
     result = fit(hidden, weight(hidden), [plain])
-    lean = name.refine(hidden, weight(hidden), name.Trial(score, result, name.cost(hidden, result, weight(hidden))))
+    lean = trial.refine(hidden, weight(hidden), trial.Trial(score, result, trial.cost(hidden, result, weight(hidden))))
     assert lean.candidate.free == ("torque",)
 
 

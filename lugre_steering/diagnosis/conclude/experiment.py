@@ -7,13 +7,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.dataset import Run
-from lugre_steering.diagnosis.fit import Fit
-from lugre_steering.diagnosis.problem import Candidate, Problem
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.fitting.fit import Fit
+from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
 
@@ -100,3 +102,26 @@ def recommend(problem: Problem, energies: Mapping[str, float]) -> tuple[str, str
     """Name, description and separation of the manoeuvre that tells most."""
     best = max(energies, key=lambda name: energies[name])
     return best, manoeuvres(problem)[best].description, energies[best]
+
+
+def next_experiment(done: Finished, verdict: str, whole: Fit) -> dict[str, Any] | None:
+    """For a tie the manoeuvre that separates the rivals best; for unlisted structure those that vary one quantity at a time."""
+    for index, item in enumerate(done.found.found if verdict == "missing_physics" else ()):
+        rivals = [trial for trial in item.trials if trial.candidate.effect.id in item.rivals]
+        if rivals:
+            chosen = whole.effects[index]
+            energies = separation(done.problem, whole, [chosen], [rivals[0].fit.effects[-1]], done.noise.floor)
+            best, description, energy = recommend(done.problem, energies)
+            others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
+            return {
+                "manoeuvre": f"{best}: {description}", "separates": [chosen[0].effect.id, rivals[0].candidate.effect.id],
+                "why": f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
+                f"more than in any other manoeuvre tried ({others})",
+            }  # fmt: skip
+    if verdict == "unlisted_physics":
+        return {
+            "manoeuvre": "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",
+            "separates": ["dependence on rate", "on amplitude", "on dwell"],
+            "why": "the structure follows none of the catalogue's laws; runs that vary one quantity at a time show which it depends on",
+        }
+    return None

@@ -16,7 +16,7 @@ import numpy as np
 from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_in_phases
-from lugre_steering.diagnosis.dataset import Run
+from lugre_steering.diagnosis.data.dataset import Run, lagged
 from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
@@ -238,15 +238,3 @@ class Problem:
 
     def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:
         return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects), range(len(self.runs))))
-
-
-def lagged(torque: Array, dt: float, tau: float) -> Array:
-    """First-order lag of a uniformly sampled signal, exact for piecewise linear input between samples."""
-    if tau < 0.02 * dt:
-        return torque
-    from scipy.signal import lfilter
-
-    decay = np.exp(-dt / tau)
-    ramp = (1.0 - decay) * tau / dt  # response at the end of a unit ramp is 1 - ramp
-    filtered, _ = lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], torque, zi=[torque[0] * (1.0 - (1.0 - ramp))])
-    return np.asarray(filtered)

@@ -18,8 +18,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
 from lugre_steering.chain.model import build_model
-from lugre_steering.diagnosis.dataset import GAP_S, angle_noise
-from lugre_steering.diagnosis.wiring import BLOCKING, inspect_wiring
+from lugre_steering.diagnosis.data.dataset import GAP_S, angle_noise
+from lugre_steering.diagnosis.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
 

@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from lugre_steering.diagnosis.fingerprint import Score, signature
-from lugre_steering.diagnosis.fit import Fit
-from lugre_steering.diagnosis.problem import Problem, in_threads
+from lugre_steering.diagnosis.fitting.fit import Fit
+from lugre_steering.diagnosis.fitting.problem import Problem, in_threads
+from lugre_steering.diagnosis.search.fingerprint import Score, signature
 from lugre_steering.effects.entry import Parameter
 from lugre_steering.recording import Array
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
-from lugre_steering.diagnosis.smoother import smooth_angle
+from lugre_steering.diagnosis.data.smoother import smooth_angle
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -145,3 +145,15 @@ def _at(time: Array, signal: Signal) -> Array:
 
 def prepare_all(recordings: Sequence[Recording], vehicle: Vehicle) -> list[Run]:
     return [prepare(recording, vehicle) for recording in recordings]
+
+
+def lagged(torque: Array, dt: float, tau: float) -> Array:
+    """First-order lag of a uniformly sampled signal, exact for piecewise linear input between samples."""
+    if tau < 0.02 * dt:
+        return torque
+    from scipy.signal import lfilter
+
+    decay = np.exp(-dt / tau)
+    ramp = (1.0 - decay) * tau / dt  # response at the end of a unit ramp is 1 - ramp
+    filtered, _ = lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], torque, zi=[torque[0] * (1.0 - (1.0 - ramp))])
+    return np.asarray(filtered)

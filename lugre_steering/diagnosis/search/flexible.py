@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from lugre_steering.diagnosis import locate
-from lugre_steering.diagnosis.fit import Fit
-from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.fitting.fit import Fit
+from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.diagnosis.search import locate
 from lugre_steering.recording import Array
 
 KNOTS = 7

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lugre_steering.diagnosis.dataset import Run
-from lugre_steering.diagnosis.fit import Fit
-from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.fitting.fit import Fit
+from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 ACTIVE_SHARE = 0.05

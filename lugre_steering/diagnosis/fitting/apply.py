@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 
 from lugre_steering.chain.loads import vertical_load
-from lugre_steering.diagnosis.problem import Problem
+from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 

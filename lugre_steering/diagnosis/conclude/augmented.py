@@ -1,0 +1,42 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The vehicle file of the result: recalibrated, with the effects that were named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.verify import rmse
+from lugre_steering.diagnosis.fitting.apply import apply_calibration
+from lugre_steering.diagnosis.fitting.fit import Fit
+from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
+
+
+def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]]) -> Vehicle:
+    """Recalibrated vehicle with the named effects that act in the last bag."""
+    problem = done.problem
+    entries = list(problem.vehicle.effects)
+    last = len(problem.runs) - 1
+    for candidate, values in whole.effects if effects else ():
+        if not candidate.active_in(last) or candidate.start(last) > problem.runs[last].time[-1]:
+            continue
+        keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
+        if candidate.effect.per_line:
+            keep = {candidate.line: float(values[candidate.free[0]])}
+        else:  # found again: nothing of its old values stays
+            entries = [entry for entry in entries if entry.id != candidate.effect.id]
+        if keep:
+            entries.append(EffectEntry(candidate.effect.id, keep))
+    provenance = {
+        "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
+        "heldout_rmse_Nm": round(rmse(problem, whole, done.roles.held), 3),
+        "recalibrated": {
+            field: {"sheet": float(problem.model.parameters[0][0][field]), "now": round(value, 6)}
+            for field, value in problem.fields(whole.x).items()
+        },
+    }  # fmt: skip
+    changed = apply_calibration(problem.vehicle, problem, whole.x)
+    return replace(changed, effects=each_once(entries), provenance=provenance)

@@ -1,0 +1,100 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From a finished search to the result: verified on held-out data, located, judged and put into words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from lugre_steering import units
+from lugre_steering.diagnosis.conclude import limits, verify
+from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
+from lugre_steering.diagnosis.conclude.effects import named_effects
+from lugre_steering.diagnosis.conclude.evidence import evidence, traces
+from lugre_steering.diagnosis.conclude.experiment import next_experiment
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.left_over import left_over
+from lugre_steering.diagnosis.conclude.statement import statement
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
+from lugre_steering.diagnosis.search import onset
+from lugre_steering.effects.catalogue import CATALOGUE
+
+CONTRADICTED = 0.02
+"""Growth of the held-out error that overrules a name."""
+
+
+def conclude(
+    done: Finished, findings: list[dict[str, Any]], *, seed: int, material: float, progress: Callable[[str], None]
+) -> Diagnosis:
+    """The result of a search; ``findings``: what the check of the data found, ``material``: see ``diagnose``."""
+    problem, found = done.problem, done.found
+    judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
+    # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
+    named = bool(found.found) and judged.gain > -CONTRADICTED
+    final = found.final if named else found.baseline
+    whole = _whole(done, final)
+    if any(candidate.since for candidate, _ in final.effects):
+        final = whole  # timed by all data
+    left = left_over(done, final)
+    if named:
+        verdict = "missing_physics"
+    elif left.structured:
+        verdict = "unlisted_physics"
+    else:
+        verdict = "consistent"
+    effects = named_effects(done, whole, material) if named else []
+    vehicle = augmented_vehicle(done, whole, effects)
+    baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": judged.before}
+    augmented: dict[str, Any] = {
+        "rmse_Nm": verify.rmse(problem, final, problem.valid),
+        "heldout_rmse_Nm": judged.after if named else judged.before,
+        "improvement": judged.gain if named else 0.0,
+        "improvement_ci95": list(judged.interval) if named else [0.0, 0.0],
+    }
+    progress("next experiment")
+    json = {
+        "schema": SCHEMA,
+        "bags": [run.name for run in problem.runs],
+        "verdict": verdict,
+        "statement": statement(done, verdict, effects, baseline, augmented, left.text, judged.rotated),
+        "noise_floor_Nm": done.noise.floor,
+        "baseline": baseline,
+        "augmented": augmented,
+        "effects": effects,
+        "unexplained": left.entry,
+        "detection_limits": _limits(done, [effect["id"] for effect in effects]),
+        "data_quality": findings,
+        "next_experiment": next_experiment(done, verdict, whole),
+    }
+    return Diagnosis(
+        units.in_words(vehicle, finite(json)),
+        vehicle,
+        traces(done, whole, final),
+        evidence(done, effects),
+        {effect["id"]: CATALOGUE[effect["id"]].coordinate for effect in effects},
+    )
+
+
+def _whole(done: Finished, final: Fit) -> Fit:
+    """All valid data fitted, for the values that are reported; what began late is timed anew."""
+    problem, weight = done.problem, done.weight
+    whole = fit(problem, weight, final.effects, final.x)
+    for index, (candidate, values) in enumerate(whole.effects):
+        if candidate.since:
+            effects = [*whole.effects]
+            effects[index] = (replace(candidate, since=onset.timed(problem, weight, whole, index)), values)
+            again = fit(problem, weight, effects, whole.x)
+            whole = again if again.cost < whole.cost else whole
+    return whole
+
+
+def _limits(done: Finished, named: Sequence[str]) -> dict[str, Any]:
+    """Smallest amplitude of each effect that this recording would have revealed."""
+    found = limits.smallest(done.problem, done.found.baseline, done.fitted, done.found.first_scores, named)
+    return {
+        effect: {"parameter": parameter.name, "smallest": value, "unit": done.unit(parameter.unit)}
+        for effect, (parameter, value) in found.items()
+    }

@@ -1,0 +1,137 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The named effects as the contract wants them: values with intervals, places, size, share, ties."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lugre_steering import units
+from lugre_steering.diagnosis.conclude import verify
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.fitting.problem import Candidate
+from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search.build_up import Found
+from lugre_steering.diagnosis.search.ties import tied
+from lugre_steering.diagnosis.search.trial import Trial, cost
+from lugre_steering.recording import Array
+
+BOTH_SIDES = 0.5
+"""Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
+
+
+def named_effects(done: Finished, whole: Fit, material: float) -> list[dict[str, Any]]:
+    """Entries of the effects in ``whole`` (fitted to all data), largest share first; ``material``: see ``_statement``."""
+    problem, found = done.problem, done.found
+    intervals = _intervals(done, whole)
+    start = cost(problem, found.baseline, done.fitted)
+    removed = start - cost(problem, found.final, done.fitted)
+    total = sum(item.gain for item in found.found)
+    entries = []
+    for index, ((candidate, _), item) in enumerate(zip(whole.effects, found.found, strict=True)):
+        part = locate.contribution(problem, whole, index)
+        rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
+        entries.append({
+            "id": candidate.effect.id, "stage": candidate.effect.stage,
+            "statement": _statement(done, whole, index, item, part, rivals, material),
+            "p_value": item.score.p_value, "parameters": intervals[index], "where": _where(done, candidate, part),
+            "energy_share": float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0)),
+            "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,
+        })  # fmt: skip
+    return sorted(entries, key=lambda entry: -entry["energy_share"])
+
+
+def _intervals(done: Finished, whole: Fit) -> list[dict[str, dict[str, Any]]]:
+    """Value, 95 % interval and unit of each free parameter, effect by effect."""
+    covariance = verify.robust_covariance(done.problem, whole, done.weight, done.roles.cluster)
+    spread = verify.jackknife(done.problem, whole, done.weight)
+    position = 0
+    found: list[dict[str, dict[str, Any]]] = []
+    for candidate, values in whole.effects:
+        parameters: dict[str, dict[str, Any]] = {}
+        for key in candidate.free:
+            place = done.problem.nuisances + position
+            half = verify.WIDTH * max(float(np.sqrt(max(covariance[place, place], 0.0))), float(spread[position]))
+            parameters[candidate.line if candidate.effect.per_line else key] = {
+                "value": values[key], "ci95": [values[key] - half, values[key] + half],
+                "unit": done.unit(candidate.parameter(key).unit),
+            }  # fmt: skip
+            position += 1
+        found.append(parameters)
+    return found
+
+
+def _statement(
+    done: Finished, whole: Fit, index: int, item: Found, part: Array, rivals: list[str], material: float
+) -> str:
+    """One sentence; an effect is material above the share ``material`` of the torque amplitude."""
+    candidate, _ = whole.effects[index]
+    amplitude = float(np.percentile(np.abs(done.problem.measured), 99.0))
+    size = float(np.max(np.abs(part)))
+    law = units.law(done.problem.vehicle, candidate.effect.equation)
+    label = "material" if size > material * amplitude else "small"
+    return (
+        f"{done.title(candidate.effect.id)}: {law}. Up to {done.torque(size)} "
+        f"({100 * size / amplitude:.1f} % of the torque amplitude, {label}){_since(done, candidate)}"
+        + _lines(done, whole, index, item)
+        + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
+    )
+
+
+def _lines(done: Finished, whole: Fit, index: int, item: Found) -> str:
+    """Other pressure lines on which the same error would fit as well, with its size there."""
+    problem, hydraulics = done.problem, done.problem.vehicle.hydraulics
+    candidate, values = whole.effects[index]
+    if not candidate.effect.per_line or hydraulics is None:
+        return ""
+    rest = [effect for i, effect in enumerate(whole.effects) if i != index]
+
+    def with_line(line: str) -> Trial:
+        fitted = fit(problem, done.weight, [*rest, (replace(candidate, line=line), values)], whole.x, linearisations=6)
+        return Trial(item.score, fitted, cost(problem, fitted, done.weight))
+
+    own = with_line(candidate.line)
+    others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
+    before = cost(problem, fit(problem, done.weight, rest, whole.x, linearisations=6), done.weight)
+    equal = tied(problem, done.weight, done.roles, own, others, before, float(problem.valid.sum()), law=0.0)
+    key = candidate.free[0]
+    unit = done.unit(candidate.parameter(key).unit)
+    named = [f"{trial.candidate.line} ({trial.fit.effects[-1][1][key]:.3g} {unit})" for trial in equal]
+    return f"; line {candidate.line} cannot be told from {', '.join(named)}" if named else ""
+
+
+def _since(done: Finished, candidate: Candidate) -> str:
+    """When an effect began that was not there from the start."""
+    begun = [
+        f"{run.name} from {since - run.time[0]:.0f} s on" if since <= run.time[-1] else f"not in {run.name}"
+        for run, since in zip(done.problem.runs, candidate.since, strict=False)
+        if since > run.time[0]
+    ]
+    return f", {', '.join(begun)}" if begun else ""
+
+
+def _where(done: Finished, candidate: Candidate, part: Array) -> list[dict[str, Any]]:
+    """Bags, stretches and range of the telling coordinate in which its torque ``part`` (n,) [N m] acts."""
+    entries = []
+    for bag, run in enumerate(done.problem.runs):
+        piece = part[done.problem.edges[bag] : done.problem.edges[bag + 1]]
+        spans = locate.intervals(run.time, piece)
+        if not candidate.active_in(bag) or not spans:
+            continue
+        axes = locate.coordinates(run, run.measured)
+        axis = candidate.effect.coordinate if candidate.effect.coordinate in axes else "time"
+        low, high = locate.active_range(axes[axis], piece)
+        if axis == "steering angle" and low < 0.0 < high:
+            # Beyond some angle to both sides says more than nearly everything between.
+            low_size, high_size = locate.active_range(axes["|steering angle|"], piece)
+            if low_size > BOTH_SIDES * high_size:
+                axis, low, high = "|steering angle|", low_size, high_size
+        entries.append({
+            "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
+            "range": [low, high], "unit": done.unit(locate.UNITS[axis]),
+        })  # fmt: skip
+    return entries

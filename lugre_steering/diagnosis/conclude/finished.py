@@ -1,0 +1,56 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A finished search, as every part of the conclusion needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lugre_steering import units
+from lugre_steering.diagnosis.fitting.noise import Noise
+from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.diagnosis.fitting.split import Split
+from lugre_steering.diagnosis.search.build_up import Search
+from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.recording import Array
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The problem, its noise, the roles of its samples and what the search found; weights are one over sigma, (n,) [1/(N m)]."""
+
+    problem: Problem
+    noise: Noise
+    roles: Split
+    found: Search
+
+    @cached_property
+    def weight(self) -> Array:
+        """Of all valid samples."""
+        return np.where(self.problem.valid, 1.0 / self.noise.sigma, 0.0)
+
+    @cached_property
+    def fitted(self) -> Array:
+        """Of the samples that may fit."""
+        return np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0)
+
+    @cached_property
+    def held(self) -> Array:
+        """Of the samples held out."""
+        return np.where(self.roles.held, 1.0 / self.noise.sigma, 0.0)
+
+    def unit(self, unit: str) -> str:
+        """A unit in the words of the vehicle's coordinate."""
+        return units.label(self.problem.vehicle, unit)
+
+    def title(self, effect: str) -> str:
+        """Title of an effect of the catalogue, likewise."""
+        return units.title(self.problem.vehicle, CATALOGUE[effect])
+
+    def torque(self, value: float) -> str:
+        """A torque (or force) in few digits, with its unit."""
+        digits = f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+        return f"{digits} {self.problem.vehicle.coordinate.force_unit}"

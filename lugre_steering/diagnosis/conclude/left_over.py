@@ -1,0 +1,120 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What remains after the final fit: whether it is structure worth a verdict, where it lives, and a formula for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lugre_steering import units
+from lugre_steering.diagnosis.conclude import unlisted
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.fitting.noise import slow_part
+from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search.foreign import Pattern
+from lugre_steering.diagnosis.search.trial import cost
+from lugre_steering.recording import Array
+
+UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
+"""Energy left over, in noise variances, that makes a verdict: slow and above the doubt about slow noise, or of any kind."""
+FORETELLS = 0.1
+"""Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
+TELLING = 0.5
+"""Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
+FORMULA = 0.02
+"""Share of the held-out energy that a formula must explain to be proposed."""
+LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
+"""Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
+
+
+class LeftOver(NamedTuple):
+    """The contract's entry, the same in one sentence, and whether it is structure worth a verdict."""
+
+    entry: dict[str, Any]
+    text: str
+    structured: bool
+
+
+def left_over(done: Finished, final: Fit) -> LeftOver:
+    """Judge what ``final`` leaves of the measured torque."""
+    residual = done.problem.measured - final.prediction
+    standardised = residual * done.weight
+    slow, nothing = _slow_energy(done, standardised), _slow_energy(done, done.noise.draws * done.weight)
+    excess = float(np.mean(standardised[done.weight > 0.0] ** 2)) - 1.0
+    pattern, gain = _pattern(done, final)
+    # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
+    loud = slow - nothing > max(UNLISTED_EXCESS, done.noise.slow_doubt) or excess > FAST_EXCESS
+    if not loud and not gain > FORETELLS:
+        description = "what is left is within noise and the simulation's own error"
+        return LeftOver({"structured": False, "description": description, "formula": None, "where": None}, "", False)
+    if not final.effects:
+        # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
+        sound = fit(done.problem, done.fitted, (), final.x, robust=True, linearisations=25)
+        residual = done.problem.measured - sound.prediction
+    axes = [locate.coordinates(run, run.measured) for run in done.problem.runs]
+    stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
+    axis, share, _ = locate.telling_coordinate(stacked, residual, done.weight, done.noise.draws)
+    proposal = unlisted.propose(stacked, residual, done.fitted, done.held, units.is_linear(done.problem.vehicle))
+    shape = None
+    if pattern is not None and gain > (proposal.gain if proposal is not None else FORMULA):
+        proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
+        # A pattern that explains most of it also says where it acts below the noise.
+        shape = pattern.torque if gain > TELLING or not loud else None
+    formula = None
+    if proposal is not None:
+        law = units.law(done.problem.vehicle, proposal.text)
+        formula = f"{law} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
+    text = (
+        f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
+        f"({100 * share:.0f} % of the residual energy follows it)"
+        if loud
+        else f"a pattern outside the catalogue foretells {100 * gain:.0f} % of the held-out residual energy"
+    )
+    where = _where(done, axes, axis, residual, shape)
+    return LeftOver({"structured": True, "description": text, "formula": formula, "where": where}, text, True)
+
+
+def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
+    """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells."""
+    pattern = done.found.pattern
+    if final.effects or pattern is None:
+        return None, 0.0
+    before = cost(done.problem, done.found.baseline, done.held)
+    return pattern, 1.0 - pattern.cost(done.problem, done.held) / max(before, 1e-9)
+
+
+def _where(
+    done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array, shape: Array | None
+) -> list[dict[str, Any]]:
+    """Stretches and range of ``axis`` that hold it: where ``shape`` (n,) acts if given, else where the residual is loud."""
+    problem = done.problem
+    entries = []
+    for bag, (run, values) in enumerate(zip(problem.runs, axes, strict=True)):
+        part = slice(problem.edges[bag], problem.edges[bag + 1])
+        if shape is None:
+            smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
+            limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
+            spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
+            piece = residual[part] * (smooth > limit)
+        else:
+            spans, piece = locate.intervals(run.time, shape[part]), shape[part]
+        if spans:
+            entries.append({
+                "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
+                "range": list(locate.active_range(values[axis], piece)), "unit": done.unit(locate.UNITS[axis]),
+            })  # fmt: skip
+    return entries
+
+
+def _slow_energy(done: Finished, standardised: Array) -> float:
+    """Mean square per used sample of the slow part of (..., n) errors in noise standard deviations."""
+    problem = done.problem
+    pieces = [
+        slow_part(standardised[..., a:b], run.time[1] - run.time[0])
+        for run, a, b in zip(problem.runs, problem.edges[:-1], problem.edges[1:], strict=True)
+    ]
+    return float(np.mean(np.concatenate(pieces, axis=-1)[..., problem.valid] ** 2))

@@ -1,0 +1,44 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lugre_steering.diagnosis.conclude.finished import Finished
+
+
+def statement(
+    done: Finished, verdict: str, effects: Sequence[Mapping[str, Any]], baseline: Mapping[str, float],
+    augmented: Mapping[str, Any], left: str, rotated: bool,
+) -> str:
+    """The verdict for a reader who sees nothing else; ``left``: what remains, ``rotated``: see ``verify.Verdict``."""
+    floor, torque = done.torque(done.noise.floor), done.torque
+    if verdict == "consistent":
+        return (
+            f"After recalibration the published model explains the recording: held-out error "
+            f"{torque(baseline['heldout_rmse_Nm'])} at a noise floor of {floor}. No missing physics is needed; "
+            "see detection_limits for what could have gone unseen."
+        )
+    if verdict == "unlisted_physics":
+        return (
+            f"The recalibrated model leaves {torque(baseline['heldout_rmse_Nm'])} on held-out data at a noise floor of {floor}, and no "
+            f"entry of the catalogue explains it: {left}. The physics is unlisted; see unexplained for where it lives."
+        )
+    names = " and ".join(f"{done.title(effect['id']).lower()} ({effect['id']})" for effect in effects)
+    ties = [
+        f"{effect['id']} cannot be told from {', '.join(effect['indistinguishable_from'])}"
+        for effect in effects
+        if effect["indistinguishable_from"]
+    ]
+    return (
+        f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
+        f"from {torque(baseline['heldout_rmse_Nm'])} to {torque(augmented['heldout_rmse_Nm'])} "
+        f"(improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
+        f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
+        + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
+        + (f" With these data {'; '.join(ties)}." if ties else "")
+        + (f" Structure is left: {left}." if left else "")
+    )

@@ -1,0 +1,188 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A candidate on trial: fitted inside the simulator beside what was found before, from several shapes, instants and starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.fitting.problem import Candidate, Problem, Values
+from lugre_steering.diagnosis.search import onset
+from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.recording import Array
+
+RETIMED = 2
+"""Rounds of timing a late effect."""
+PARTIAL = 0.1
+"""Share by which an effect in one bag only, or from a time on, must explain more than the same everywhere."""
+VARIANT, VARIANTS = 0.5, 2
+"""Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
+MEMORY = 4.0
+"""Samples that count as one, roughly: errors have a memory."""
+TRIAL_TOLERANCE = 1e-4
+SURE_SIGMA = 4.0
+"""Standard deviations that keep an optional part of a law, or as much for each of several that only matter together."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A screened candidate after its joint fit."""
+
+    score: Score
+    fit: Fit
+    cost: float
+    deep: bool = False
+    """Whether it was fitted from several starts and refined."""
+
+    @property
+    def candidate(self) -> Candidate:
+        return self.fit.effects[-1][0]
+
+
+def cost(problem: Problem, result: Fit, weight: Array) -> float:
+    """Weighted sum of squared errors over the samples with weight, in noise variances."""
+    return float(np.sum(((problem.measured - result.prediction) * weight) ** 2))
+
+
+def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
+    """Joint fit of calibration, earlier effects and this candidate; again from the sheet if the calibration is cornered."""
+    trial = _fitted(problem, weight, current, score, current.x)
+    if not _cornered(problem, current):
+        return trial
+    # Recalibration was bent to imitate what is missing; from there the way back may be closed.
+    return min([trial, _fitted(problem, weight, current, score, problem.start())], key=lambda each: each.cost)
+
+
+def _fitted(problem: Problem, weight: Array, current: Fit, score: Score, start: Array) -> Trial:
+    """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
+    candidate = score.candidate
+    shapes = dict(candidate.shapes)
+    free = tuple(
+        p.name for p in candidate.effect.parameters if p.name in candidate.free or (p.name in shapes and not p.optional)
+    )
+    effects = [*current.effects, (replace(candidate, free=free), score.values)]
+    result = fit(problem, weight, effects, start, linearisations=8, tolerance=TRIAL_TOLERANCE)
+    return Trial(score, result, cost(problem, result, weight))
+
+
+def everywhere(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
+    """A trial of an effect in one bag only, or from a time on, against the same everywhere, which is the simpler claim."""
+    if not _partial(trial.score):
+        return trial
+    whole = next((s for s in scores if s.candidate.label == trial.score.candidate.label and not _partial(s)), None)
+    if whole is None or whole.explained <= 0.0:
+        return trial
+    simpler = try_effect(problem, weight, current, whole)
+    gain = cost(problem, current, weight) - trial.cost
+    return simpler if simpler.cost < trial.cost + PARTIAL * gain else trial
+
+
+def _partial(score: Score) -> bool:
+    return score.candidate.bags is not None or bool(score.candidate.since)
+
+
+def _cornered(problem: Problem, current: Fit) -> bool:
+    """Whether a calibration value lies implausibly far from the sheet."""
+    prior = np.array([calibration.prior for calibration in problem.calibrations])
+    return bool(np.any(np.abs(current.x[: prior.size]) > 2.0 * prior))
+
+
+def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
+    """A promising trial also from its next best shapes, and at its typical size from the sheet; then refined.
+
+    Valleys are narrow, and a linear guess far from the truth may lie beyond the next hill.
+    """
+    tried = trial.score.candidate
+    variants = [
+        score for score in scores
+        if (c := score.candidate).label == tried.label and (c.bags, c.since) == (tried.bags, tried.since)
+        and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
+    ]  # fmt: skip
+    others = [_fitted(problem, weight, current, score, trial.fit.x) for score in variants[:VARIANTS]]
+    typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))
+    others.append(_fitted(problem, weight, current, typical, problem.start()))
+    best = min([trial, *others], key=lambda each: each.cost)
+    for _ in range(RETIMED if tried.since else 0):
+        best = retime(problem, weight, best)
+    return replace(refine(problem, weight, best), deep=True)
+
+
+def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
+    """A late effect from the instants that fit best, one per bag, with its values fitted anew."""
+    *earlier, (candidate, values) = trial.fit.effects
+    since = onset.timed(problem, weight, trial.fit, len(earlier))
+    effects = [*earlier, (replace(candidate, since=since), values)]
+    result = fit(problem, weight, effects, trial.fit.x, linearisations=8, tolerance=TRIAL_TOLERANCE)
+    better = cost(problem, result, weight)
+    return Trial(trial.score, result, better) if better < trial.cost else trial
+
+
+def begun_late(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
+    """A trial of an effect that is always there against the same from an instant on, which must explain clearly more."""
+    tried = trial.score.candidate
+    late = next((s for s in scores if (c := s.candidate).label == tried.label and c.bags is None and c.since), None)
+    if late is None or late.explained <= 0.0 or _partial(trial.score):
+        return trial
+    begun = retime(problem, weight, try_effect(problem, weight, current, late))
+    gain = cost(problem, current, weight) - begun.cost
+    return begun if begun.cost < trial.cost - PARTIAL * gain else trial
+
+
+def rank(trial: Trial, before: float) -> float:
+    """Cost by which trials compete: an onset is a freedom that fits many an event, so a late effect must explain clearly more."""
+    return trial.cost + PARTIAL * max(before - trial.cost, 0.0) * bool(trial.candidate.since)
+
+
+def ranked(trials: Sequence[Trial], before: float) -> list[Trial]:
+    """Best first."""
+    return sorted(trials, key=lambda trial: rank(trial, before))
+
+
+def timed(trial: Trial) -> bool:
+    """Whether what a trial found begins or ends within the recordings."""
+    return bool(trial.candidate.since) or any(trial.fit.effects[-1][1].get(edge) for edge in ("time_start", "time_end"))
+
+
+def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
+    """Let the effect have the optional parts of its family; those that do not earn their place go again."""
+    *earlier, (candidate, values) = trial.fit.effects
+    kept = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
+    start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
+    richer = replace(candidate, free=(*candidate.free, *kept))
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=20, tolerance=1e-5)
+    left = cost(problem, result, weight)
+    # What the model leaves over makes its numbers less sure than noise alone would.
+    misfit = max(left / max(float(np.count_nonzero(weight)), 1.0), 1.0)
+    while weak := _weak(result, values, kept, misfit):
+        # Two that do the same work are both weak, yet not both superfluous.
+        for dropped in (weak, weak[:1]) if len(weak) > 1 else (weak,):
+            leaner = _without(problem, weight, result, values, dropped)
+            after = cost(problem, leaner, weight)
+            if after < left + SURE_SIGMA**2 * MEMORY * misfit * len(dropped):
+                break
+        else:
+            break
+        result, left, kept = leaner, after, [name for name in kept if name not in dropped]
+    return Trial(trial.score, result, left) if left < trial.cost else trial
+
+
+def _weak(result: Fit, values: Values, optional: Sequence[str], misfit: float) -> list[str]:
+    """Parameters of the last effect that left their value in ``values`` by less than some standard deviations, weakest first."""
+    if not optional:
+        return []
+    deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]
+    fitted = result.effects[-1][1]
+    moved = {n: abs(fitted[n] - values.get(n, 0.0)) / max(float(sd), 1e-300) for n, sd in zip(optional, deviation, strict=True)}
+    return sorted((name for name in optional if moved[name] < SURE_SIGMA), key=moved.__getitem__)
+
+
+def _without(problem: Problem, weight: Array, result: Fit, values: Values, dropped: Sequence[str]) -> Fit:
+    """The fit with parameters of its last effect back at their value in ``values``, or gone."""
+    *earlier, (candidate, fitted) = result.effects
+    leaner = replace(candidate, free=tuple(name for name in candidate.free if name not in dropped))
+    start = {**values, **{name: value for name, value in fitted.items() if name not in dropped}}
+    return fit(problem, weight, [*earlier, (leaner, start)], result.x, linearisations=8)
