@@ -47,10 +47,11 @@ def diagnose(
     """Read and diagnose bags of one vehicle together; two of one name get numbers."""
     recordings: list[Recording] = []
     for bag in bags:
-        if sum(bag.resolve() == other.resolve() for other in bags) > 1:
-            raise BagError(f"{bag}: given more than once; a copy of a recording proves nothing, give each bag once")
         progress(f"reading {bag.name}")
         read = read_recording(bag, vehicle.channels)
+        for other, path in zip(recordings, bags, strict=False):
+            if _same(read, other):
+                raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
         taken = {recording.name for recording in recordings}
         names = itertools.chain([read.name], (f"{read.name}_{number}" for number in itertools.count(2)))
         recordings.append(replace(read, name=next(name for name in names if name not in taken)))
@@ -108,6 +109,14 @@ def diagnose_recordings(
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     return conclude(done, findings, seed=seed, material=material, progress=progress)
+
+
+def _same(first: Recording, second: Recording) -> bool:
+    """Whether both hold the same samples of all angles, whatever their files are called."""
+    return bool(first.angle) and first.start_ns == second.start_ns and all(
+        signal is not None and np.array_equal(signal.time_s, own.time_s) and np.array_equal(signal.value, own.value)
+        for own, signal in ((own, second.angle.get(side)) for side, own in first.angle.items())
+    )
 
 
 def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -127,8 +128,11 @@ def cut(recording: Recording, until_s: float) -> Recording:
 
 def test_a_recording_counts_once_and_names_are_told_apart(tmp_path: Path) -> None:
     _, (first, second) = made(tmp_path, seed=21)
-    with pytest.raises(BagError, match="given more than once"):
-        diagnose([first, second, first.parent / "." / first.name], load(VEHICLE))
+    copy = shutil.copytree(first, tmp_path / "copy")
+    inside = next(file for file in first.iterdir() if file.name != "metadata.yaml")
+    for again in (first, inside, copy):
+        with pytest.raises(BagError, match=f"{again.name}: holds the same recording as .*{first.name};"):
+            diagnose([first, second, again], load(VEHICLE))
     twin = tmp_path / "other" / first.name
     twin.parent.mkdir()
     second.rename(twin)

@@ -23,6 +23,7 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis.data.dataset import prepare
 from lugre_steering.diagnosis.data.quality import inspect
+from lugre_steering.diagnosis.data.wiring import SKEW_RANGE_S
 from lugre_steering.diagnosis.fitting.fit import fit
 from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
@@ -443,6 +444,19 @@ def test_a_skew_in_other_manoeuvres(manoeuvre: Manoeuvre, skew_s: float) -> None
     (found,) = inspect(pressure(later(skew_s), *LINES)(made_by(manoeuvre)), VEHICLE).blocking
     assert found.finding == "clock_skew"
     assert float(found.statement.split("stamped ")[1].split(" s")[0]) == pytest.approx(0.3, abs=0.04)
+
+
+@pytest.mark.parametrize(("manoeuvre", "skew_s"), [(TURN, 1.1), (BUILT_IN["slow-sweeps"], SKEW_RANGE_S)])
+def test_a_skew_at_the_end_of_the_search_is_a_lower_bound(manoeuvre: Manoeuvre, skew_s: float) -> None:
+    (found,) = inspect(pressure(later(skew_s), *LINES)(made_by(manoeuvre)), VEHICLE).findings
+    assert found.finding == "clock_skew"
+    assert 0.9 * skew_s < float(found.statement.split("stamped at least ")[1].split(" s")[0]) <= skew_s
+
+
+@pytest.mark.parametrize("skew_s", [SKEW_RANGE_S + 0.5, 10.0])
+def test_a_skew_beyond_the_search_is_told_as_one_possibility(skew_s: float) -> None:
+    findings = inspect(pressure(later(skew_s), *LINES)(made_by(BUILT_IN["double-cycle"])), VEHICLE).findings
+    assert any("clocks more than 5 s apart" in finding.statement for finding in findings)
 
 
 def test_what_reading_found_is_kept(sound: Recording) -> None:

@@ -198,7 +198,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     rivals = "".join(f" The same data would come from this: {h.statement}." for h in tied if h is not first)
     agrees = f" (relative error of the nominal model {as_is:.2f} as recorded, {first.error:.2f} with that undone)"
     if first.error > POOR:
-        rivals += " That is still poor: more than one wiring fault is possible."
+        rivals += f" That is still poor: more than one wiring fault is possible, or clocks more than {SKEW_RANGE_S:g} s apart."
     return _noted(vehicle, first.faults, f"{agrees}.{rivals}")
 
 
@@ -232,8 +232,9 @@ def _unlike(vehicle: Vehicle, correlation: float) -> Faults:
     topics = tuple(dict.fromkeys(c.topic for c in vehicle.channels if c.kind is not Kind.AIR_TEMPERATURE))
     statement = (
         f"{', '.join(topics)}: the measured torque is nothing like that of the nominal model (correlation {correlation:.2f}), and no "
-        "single wiring fault or pair of them explains it; more than one wiring fault is possible, or the vehicle file lacks what "
-        "matters most; check signs, units and plugs before believing any physics named here"
+        "single wiring fault or pair of them explains it; more than one wiring fault is possible, clocks more than "
+        f"{SKEW_RANGE_S:g} s apart, or a vehicle file that lacks what matters most; check signs, units, plugs and clocks before believing "
+        "any physics named here"
     )
     return (_Fault("wiring_suspect", topics, words(vehicle, statement)),)
 
@@ -446,9 +447,10 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
         kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
         topics = ", ".join(_topics(vehicle, kind).values())
         late = "late" if shift > 0.0 else "early"
+        least = "at least " if abs(shift) > (reach - 1.5) * dt else ""  # the best lies at the end of the search, or beyond
         yield Finding(
             "clock_skew", topics,
-            f"{topics}: stamped {abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
+            f"{topics}: stamped {least}{abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
             f"{unshifted:.2f} as recorded, {best:.2f} shifted); synchronise the clocks of the devices",
         )  # fmt: skip
 
