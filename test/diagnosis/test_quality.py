@@ -9,7 +9,6 @@ fault was put in, the oracle of the calibration is the recording before the faul
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -419,8 +418,8 @@ def test_an_idle_line_is_in_no_other_unit_for_a_little_less_error() -> None:
 
 def test_angles_that_obey_the_geometry_are_in_no_other_unit(sound: Recording) -> None:
     """All pressures too low by the same factor look like the torque of one track."""
-    for finding in inspect(pressure(scaled(0.3), *LINES)(sound), VEHICLE).blocking:
-        assert "joint_state" not in finding.topic
+    findings = inspect(pressure(scaled(0.3), *LINES)(sound), VEHICLE).findings
+    assert [finding for finding in findings if "joint_state" in finding.topic] == []
 
 
 @pytest.mark.parametrize(
@@ -620,9 +619,3 @@ def test_too_little_data_is_no_error(left: int, sound: Recording) -> None:
     short = angle("left", lambda s: Signal(s.time_s[:left], s.value[:left]))(sound)
     assert not inspect(short, VEHICLE).blocking
     assert inspect(Recording("empty", 0, {}, {}), VEHICLE).findings == ()
-
-
-def test_it_is_quick(sound: Recording) -> None:
-    began = time.process_time()
-    inspect(sound, VEHICLE)
-    assert time.process_time() - began < 1.0  # 0.1 s alone on a core
