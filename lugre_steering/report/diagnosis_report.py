@@ -40,6 +40,7 @@ STAGES = {
     "measurement": "hydraulics and sensors",
 }
 EVIDENCE_SHOWN = 12
+EXACT_LAW = "The intervals take the form of the law as exact; where nature bends it, values lie further off than they say."
 
 
 @dataclass(frozen=True)
@@ -350,6 +351,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
         f'<div class="effect"><h3><span class="swatch" style="background:{colour}"></span>{_text(units.title(vehicle, entry))} '
         f"(<code>{_text(effect['id'])}</code>)</h3>\n<p>{_text(effect['statement'])}</p>\n"
         + _table([title for title in header if title], rows, numeric=(1, 2, 4) if angular else (1, 2))
+        + f"<p>{EXACT_LAW}</p>\n"
         + facts
         + (_table(["bag", "acts during", "along"], where) if where else "")
         + law
