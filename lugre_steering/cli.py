@@ -188,6 +188,28 @@ def simulate(
     print_json(result) if as_json else simulation.show_run(Console(), result)
 
 
+@command("vehicle")
+def vehicle_(
+    file: Annotated[Path, typer.Argument(help="vehicle file (YAML)")],
+    out: Annotated[Path | None, typer.Option(help="folder for a picture of the footprint of one track")] = None,
+    as_json: Json = False,
+) -> None:
+    """Check a vehicle file, and say what it amounts to: loads, friction, heat, inputs and effects."""
+    from lugre_steering.derived import derive
+    from lugre_steering.report.vehicle_sheet import draw_footprint, show_vehicle
+    from lugre_steering.simulate.command import make_folder
+    from lugre_steering.vehicle import load
+
+    read = load(file)
+    picture = None
+    if out is not None:
+        picture = out / "footprint.png"
+        make_folder(out)
+        draw_footprint(read, picture)
+    result = {**derive(read), "picture": picture and str(picture)}
+    print_json(result) if as_json else show_vehicle(Console(), result)
+
+
 @command("import")
 def import_(
     table: Annotated[Path, typer.Argument(help="CSV, Parquet (.parquet) or MATLAB (.mat) file")],

@@ -135,3 +135,28 @@ def test_agrees_with_an_independent_simulation(tmp_path: Path, name: str) -> Non
     for side in ("left", "right"):
         difference = error[f"rubber_temperature/{side}"] - expected[f"{side}_temperature_degC"]
         assert np.abs(difference).max() < 0.3
+
+
+def test_what_a_vehicle_file_amounts_to(tmp_path: Path) -> None:
+    done = run("vehicle", VEHICLE, "--out", "sheet", "--json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    result = json.loads(done.stdout)
+    found = {row["quantity"]: (row["value"], row["unit"]) for row in result["quantities"]}
+    # Half of 90 kN and 6.2 kN; 0.42 m2; 5393.7 N m per degree.
+    assert found["load on the ground"] == (pytest.approx(51_200.0), "N")
+    assert found["ground pressure, mean"] == (pytest.approx(51_200.0 / 0.42), "Pa")
+    assert found["presliding stiffness"] == (pytest.approx(np.rad2deg(5393.7)), "N m/rad")
+    assert found["time constant of cooling"] == (pytest.approx(1120.0 * 1750.0 * 0.012 / 18.0), "s")
+    assert [row["topic"] for row in result["inputs"]][2] == "steering/pressure/main_a"
+    assert (tmp_path / result["picture"]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_vehicle_sheet_of_a_rig_has_its_units_and_no_footprint(tmp_path: Path) -> None:
+    rig = ROOT / "config" / "emps_vehicle.yaml"
+    done = run("vehicle", rig, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "N s/m" in done.stdout
+    assert "N m" not in done.stdout
+    refused = run("vehicle", rig, "--out", "sheet", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "axle" in refused.stderr

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,10 +140,6 @@ def _at(time: Array, signal: Signal) -> Array:
             kernel[[0, -1]] *= 0.5
         value = np.convolve(np.pad(value, kernel.size // 2, mode="edge"), kernel, mode="valid")
     return np.interp(time, signal.time_s, value)
-
-
-def prepare_all(recordings: Sequence[Recording], vehicle: Vehicle) -> list[Run]:
-    return [prepare(recording, vehicle) for recording in recordings]
 
 
 def lagged(torque: Array, dt: float, tau: float) -> Array:
