@@ -297,3 +297,12 @@ def test_wrong_options_end_with_one_line(options, said, tmp_path):
     assert len(outcome.stderr.splitlines()) == 1
     assert said in outcome.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_copy_of_a_recording_is_no_new_evidence(tmp_path):
+    again = next(file for file in BAG.iterdir() if file.name != "metadata.yaml")
+    done = CliRunner().invoke(
+        app, ["calibrate", str(BAG), str(again), "--vehicle", str(SHEET_FILE), "--out", str(tmp_path / "out")]
+    )
+    assert done.exit_code == 2
+    assert not (tmp_path / "out").exists()

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +69,34 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
         next(iter(signals[Kind.TORQUE].values()), None),
         {topic: dict(sorted(reasons.items())) for topic, reasons in rejected.items() if reasons},
         tuple(findings),
+    )
+
+
+def read_recordings(
+    bags: Sequence[Path], channels: Sequence[Channel], progress: Callable[[str], None] = lambda _: None
+) -> list[Recording]:
+    """Several bags, each by a name of its own (two of one name get numbers); the same recording twice is refused.
+
+    A copy would count as new evidence, whatever its file is called.
+    """
+    recordings: list[Recording] = []
+    for bag in bags:
+        progress(f"reading {bag.name}")
+        read = read_recording(bag, channels)
+        for other, path in zip(recordings, bags, strict=False):
+            if _same(read, other):
+                raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
+        taken = {recording.name for recording in recordings}
+        names = itertools.chain([read.name], (f"{read.name}_{number}" for number in itertools.count(2)))
+        recordings.append(replace(read, name=next(name for name in names if name not in taken)))
+    return recordings
+
+
+def _same(first: Recording, second: Recording) -> bool:
+    """Whether both hold the same samples of all angles."""
+    return bool(first.angle) and first.start_ns == second.start_ns and all(
+        signal is not None and np.array_equal(signal.time_s, own.time_s) and np.array_equal(signal.value, own.value)
+        for own, signal in ((own, second.angle.get(side)) for side, own in first.angle.items())
     )
 
 

@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import __version__, units
-from lugre_steering.bag import read_recording
+from lugre_steering.bag import read_recordings
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
 from lugre_steering.diagnosis.data.dataset import prepare
@@ -135,10 +135,7 @@ def calibrate(
     ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
     """
     vehicle = load(vehicle_file)
-    recordings = []
-    for bag in bags:
-        progress(f"reading {bag}")
-        recordings.append(read_recording(bag, vehicle.channels))
+    recordings = read_recordings(bags, vehicle.channels, progress)
     calibrations = chosen(vehicle, free, fix, prior or {})
     done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
     result = {

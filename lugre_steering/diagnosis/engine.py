@@ -4,16 +4,14 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.bag import read_recording
+from lugre_steering.bag import read_recordings
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.finished import Finished
@@ -24,7 +22,7 @@ from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.diagnosis.fitting.split import split
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
-from lugre_steering.errors import BagError, DataError
+from lugre_steering.errors import DataError
 from lugre_steering.recording import Finding, Recording
 from lugre_steering.vehicle import Vehicle
 
@@ -45,16 +43,7 @@ def diagnose(
     progress: Progress = lambda _: None,
 ) -> Diagnosis:
     """Read and diagnose bags of one vehicle together; two of one name get numbers."""
-    recordings: list[Recording] = []
-    for bag in bags:
-        progress(f"reading {bag.name}")
-        read = read_recording(bag, vehicle.channels)
-        for other, path in zip(recordings, bags, strict=False):
-            if _same(read, other):
-                raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
-        taken = {recording.name for recording in recordings}
-        names = itertools.chain([read.name], (f"{read.name}_{number}" for number in itertools.count(2)))
-        recordings.append(replace(read, name=next(name for name in names if name not in taken)))
+    recordings = read_recordings(bags, vehicle.channels, progress)
     return diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
 
 
@@ -109,14 +98,6 @@ def diagnose_recordings(
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     return conclude(done, findings, seed=seed, material=material, progress=progress)
-
-
-def _same(first: Recording, second: Recording) -> bool:
-    """Whether both hold the same samples of all angles, whatever their files are called."""
-    return bool(first.angle) and first.start_ns == second.start_ns and all(
-        signal is not None and np.array_equal(signal.time_s, own.time_s) and np.array_equal(signal.value, own.value)
-        for own, signal in ((own, second.angle.get(side)) for side, own in first.angle.items())
-    )
 
 
 def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:
