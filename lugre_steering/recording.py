@@ -17,7 +17,8 @@ measured_torque    torque from a torque sensor                 N m
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -85,3 +86,9 @@ class Recording:
     measured_torque: Signal | None = None
     rejected: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+
+def unused_name(name: str, taken: Collection[str]) -> str:
+    """``name``, or with the lowest number from 2 on that is not taken: run_a, run_a_2, run_a_3."""
+    candidates = itertools.chain([name], (f"{name}_{number}" for number in itertools.count(2)))
+    return next(candidate for candidate in candidates if candidate not in taken)

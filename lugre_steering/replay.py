@@ -8,7 +8,6 @@ A bag streams through in blocks; memory does not grow with its length.
 from __future__ import annotations
 
 import importlib.util
-import itertools
 import json
 import os
 import shutil
@@ -33,7 +32,7 @@ from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
 from lugre_steering.online import Curves, Fit, Timeline
-from lugre_steering.recording import Channel, Finding, IntArray, Kind
+from lugre_steering.recording import Channel, Finding, IntArray, Kind, unused_name
 from lugre_steering.vehicle import Vehicle, load
 
 SCHEMA = "lugre_steering/replay/1"
@@ -111,8 +110,7 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
         if not absolute.exists():
             raise BagError(f"{path}: no such file or folder")
         stem = absolute.name if absolute.is_dir() else absolute.name.split(".")[0]
-        candidates = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
-        names.append(next(name for name in candidates if name not in names))
+        names.append(unused_name(stem, names))
     for name in names:
         result = (out / name).resolve()
         for path in bags:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from lugre_steering.bag.reader import Bag, Block
 from lugre_steering.errors import BagError
-from lugre_steering.recording import RATE_LIMIT, Array, Channel, Finding, IntArray, Kind, Recording, Signal
+from lugre_steering.recording import RATE_LIMIT, Array, Channel, Finding, IntArray, Kind, Recording, Signal, unused_name
 
 LIMITS = {
     Kind.ANGLE: (-np.pi, np.pi),
@@ -86,9 +85,7 @@ def read_recordings(
         for other, path in zip(recordings, bags, strict=False):
             if _same(read, other):
                 raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
-        taken = {recording.name for recording in recordings}
-        names = itertools.chain([read.name], (f"{read.name}_{number}" for number in itertools.count(2)))
-        recordings.append(replace(read, name=next(name for name in names if name not in taken)))
+        recordings.append(replace(read, name=unused_name(read.name, [recording.name for recording in recordings])))
     return recordings
 
 
