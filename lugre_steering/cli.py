@@ -197,15 +197,10 @@ def vehicle_(
     """Check a vehicle file, and say what it amounts to: loads, friction, heat, inputs and effects."""
     from lugre_steering.derived import derive
     from lugre_steering.report.vehicle_sheet import draw_footprint, show_vehicle
-    from lugre_steering.simulate.command import make_folder
     from lugre_steering.vehicle import load
 
     read = load(file)
-    picture = None
-    if out is not None:
-        picture = out / "footprint.png"
-        make_folder(out)
-        draw_footprint(read, picture)
+    picture = draw_footprint(read, out) if out is not None else None
     result = {**derive(read), "picture": picture and str(picture)}
     print_json(result) if as_json else show_vehicle(Console(), result)
 

@@ -160,3 +160,4 @@ def test_a_vehicle_sheet_of_a_rig_has_its_units_and_no_footprint(tmp_path: Path)
     refused = run("vehicle", rig, "--out", "sheet", cwd=tmp_path)
     assert refused.returncode == 2
     assert "axle" in refused.stderr
+    assert not (tmp_path / "sheet").exists()

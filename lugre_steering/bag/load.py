@@ -90,11 +90,19 @@ def read_recordings(
 
 
 def _same(first: Recording, second: Recording) -> bool:
-    """Whether both hold the same samples of all angles."""
-    return bool(first.angle) and first.start_ns == second.start_ns and all(
-        signal is not None and np.array_equal(signal.time_s, own.time_s) and np.array_equal(signal.value, own.value)
-        for own, signal in ((own, second.angle.get(side)) for side, own in first.angle.items())
+    """Whether both hold the same samples."""
+    one, other = _signals(first), _signals(second)
+    return first.start_ns == second.start_ns and one.keys() == other.keys() and all(
+        np.array_equal(signal.time_s, other[key].time_s) and np.array_equal(signal.value, other[key].value)
+        for key, signal in one.items()
     )
+
+
+def _signals(recording: Recording) -> dict[tuple[Kind, str], Signal]:
+    """Angles and what the torque comes from."""
+    found = {(Kind.ANGLE, side): signal for side, signal in recording.angle.items()}
+    found |= {(Kind.PRESSURE, line): signal for line, signal in recording.pressure.items()}
+    return found if recording.measured_torque is None else {**found, (Kind.TORQUE, ""): recording.measured_torque}
 
 
 def _of_channel(blocks: Sequence[Block], i: int) -> tuple[IntArray, IntArray, Array, Array]:

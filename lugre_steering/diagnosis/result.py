@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, unused_name
 from lugre_steering.vehicle import Vehicle
 
 SCHEMA = "lugre_steering/diagnosis/1"
@@ -18,13 +18,10 @@ SCHEMA = "lugre_steering/diagnosis/1"
 
 def picture_names(names: Sequence[str]) -> list[str]:
     """File names of a report's pictures, in order: safe everywhere, and each its own."""
-    found: list[str] = []
+    stems: list[str] = []
     for name in names:
-        stem, count = re.sub(r"[^\w.-]+", "_", name), 1
-        while (file := f"{stem}.png" if count == 1 else f"{stem}_{count}.png") in found:
-            count += 1
-        found.append(file)
-    return found
+        stems.append(unused_name(re.sub(r"[^\w.-]+", "_", name), stems))
+    return [f"{stem}.png" for stem in stems]
 
 
 @dataclass(frozen=True)

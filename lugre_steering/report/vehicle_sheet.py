@@ -15,6 +15,7 @@ from rich.table import Table
 from lugre_steering.chain.footprint import contact_lengths, ground_pressure, peak_pressure
 from lugre_steering.errors import DataError
 from lugre_steering.report import shown
+from lugre_steering.simulate.command import make_folder
 from lugre_steering.vehicle import Vehicle
 
 
@@ -38,13 +39,15 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
         console.print(f"effect {effect['id']}: {parameters} (SI)")
 
 
-def draw_footprint(vehicle: Vehicle, file: Path) -> None:
-    """Picture of the ground pressure under the left track, seen from above; the right one is its mirror image."""
+def draw_footprint(vehicle: Vehicle, out: Path) -> Path:
+    """Picture, in the folder ``out``, of the ground pressure under the left track from above; the right one is its mirror image."""
     from lugre_steering.report.style import SERIES, figure  # needs matplotlib
 
     axle, track, rubber = vehicle.axle, vehicle.track, vehicle.rubber
     if axle is None or track is None or rubber is None:
         raise DataError(f"{vehicle.name}: a footprint needs the sections 'axle', 'track' and 'rubber'")
+    make_folder(out)
+    file = out / "footprint.png"
     area = rubber.contact_area_m2
     lengths, centres = contact_lengths(axle, track, area), np.array(track.rollers.x_m)
     x = np.linspace(float((centres - lengths).min()), float((centres + lengths).max()), 600)
@@ -68,3 +71,4 @@ def draw_footprint(vehicle: Vehicle, file: Path) -> None:
         ax.set_xlabel("along the track, from the hinge, forward (m)")
         ax.set_ylabel("from the hinge, outward (m)")
         ax.legend(loc="lower right")
+    return file
