@@ -47,6 +47,8 @@ SLIGHT, SURE = 0.02, 0.3
 is so large against the noise."""
 FREER = 0.7
 """Share of a further effect's gain that a freer shape of an earlier one may have at most."""
+AGAIN, AGAIN_EFFECTS, AGAIN_EXCESS = 2, 2, 0.3
+"""How many other first effects to build up from where none stands, up to how many effects, and the excess from which."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
 """Excess from which patterns outside the catalogue compete with names, and share of their gain that counts as a difference."""
 
@@ -81,26 +83,95 @@ class Search:
 def search(
     problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None
 ) -> Search:
-    """Add effects while they are significant, larger than our own error, and explain what is left."""
+    """Build up from the best first effect, and where that does not stand from those with the best fingerprints."""
+    weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
+    samples, doubt = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt
+
+    def standing(built: _Built) -> int:
+        return _keep(built.steps, problem, weight, cost(problem, built.baseline, weight), samples, doubt)
+
+    built = _build_up(problem, noise, split, baseline, None, progress)
+    first, tried, needed, kept = built.first, built.trials, bool(built.steps), standing(built)
+    for opening in _others(problem, weight, built) if needed and not kept else ():
+        progress(f"building up again from {opening.trials[0].candidate.label}")
+        built = _build_up(problem, noise, split, built.baseline, opening, progress)
+        tried, kept = tried + built.trials, standing(built)
+        if kept:
+            break
+    baseline, start_cost = built.baseline, cost(problem, built.baseline, weight)
+    excess = start_cost - samples
+    final, found = _confirmed(problem, noise, weight, split, baseline, built.steps[:kept], samples, progress)
+    # What rings on at standstill passes for noise, so a pattern may be there though nothing seems left over.
+    pattern = strongest(problem, baseline, weight) if not found or excess > PATTERN_EXCESS * samples else None
+    if pattern is not None and found:
+        named = [cost(problem, built.steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
+        if _foreign(pattern.cost(problem, weight), named, start_cost):
+            final, found = baseline, []
+    explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
+    return Search(
+        baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), bool(found) or not needed,
+        first.scores, tuple(tried), pattern,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Round:
+    """What one round of the build-up tried: the screen's scores, and the trials, best first."""
+
+    scores: tuple[Score, ...] = ()
+    trials: tuple[Trial, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Built:
+    """A build-up: the baseline it left from, its first round, its steps and every trial it took into account."""
+
+    baseline: Fit
+    first: _Round
+    steps: list[tuple[Fit, Found, float]]
+    trials: list[Trial]
+
+
+def _others(problem: Problem, weight: Array, built: _Built) -> list[_Round]:
+    """Other first effects to build up from: those with the best fingerprints, each before the trials it does not lose to.
+
+    Of several effects a wrong one may fit best alone by its freedom, whereas a fingerprint is of the place in the motion.
+    """
+    samples = float(np.count_nonzero(weight))
+    if cost(problem, built.baseline, weight) < (1.0 + AGAIN_EXCESS) * samples:
+        return []
+    scores, trials = built.first.scores, built.first.trials
+    others = sorted(range(1, len(trials)), key=lambda i: -trials[i].score.explained)
+    return [_Round(scores, trials[i:]) for i in others[:AGAIN]]
+
+
+def _build_up(
+    problem: Problem, noise: Noise, split: Split, baseline: Fit, opening: _Round | None, progress: Callable[[str], None]
+) -> _Built:
+    """Add effects while they are significant, larger than our own error, and explain what is left.
+
+    ``opening``: a first round to go on from; without it the shortlist of the screen is fitted.
+    """
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
     samples = float(split.fit.sum())
     start_cost = cost(problem, baseline, weight)
-    excess = start_cost - samples
     steps: list[tuple[Fit, Found, float]] = []
     current, restarts = baseline, 0
-    first_scores: tuple[Score, ...] = ()
+    first, first_choice = opening or _Round(), opening is None
     all_trials: list[Trial] = []
     for _ in range(MAX_ROUNDS):
-        if len(steps) == MAX_EFFECTS:
+        if len(steps) == (MAX_EFFECTS if first_choice else AGAIN_EFFECTS):
             break
-        progress("fingerprints")
-        taken = [candidate.effect.id for candidate, _ in current.effects]
-        scores = screen(problem, current, weight, noise.draws, taken)
-        if steps:
-            scores = _always(scores)
+        if opening is not None and not steps:
+            scores, trials = list(opening.scores), list(opening.trials)
         else:
-            first_scores = tuple(scores)
-        trials = _tried(problem, weight, current, scores, samples, progress)
+            progress("fingerprints")
+            taken = [candidate.effect.id for candidate, _ in current.effects]
+            scores = screen(problem, current, weight, noise.draws, taken)
+            scores = _always(scores) if steps else scores
+            trials = _tried(problem, weight, current, scores, samples, progress)
+        if not steps:
+            first = _Round(tuple(scores), tuple(trials))
         if not trials:
             break
         best, before = trials[0], cost(problem, current, weight)
@@ -108,13 +179,12 @@ def search(
         again = fit(problem, weight, current.effects, best.fit.x, linearisations=12)
         regained = before - cost(problem, again, weight)
         if regained > max(FREER * (before - best.cost), OWN_ERROR * samples) and restarts < MAX_EFFECTS:
-            current, restarts = again, restarts + 1
+            current, restarts, opening = again, restarts + 1, None
             if steps:
                 _, last, gained = steps[-1]
                 steps[-1] = (again, replace(last, gain=last.gain + regained), gained)
             else:
                 baseline, start_cost = again, before - regained
-                excess = start_cost - samples
             continue
         all_trials += trials
         if before - best.cost < (_slight(start_cost, samples) if steps else OWN_ERROR * samples):
@@ -131,19 +201,7 @@ def search(
         steps, current = _prune(steps, problem, weight, samples, start_cost, current)
         if best.cost - samples < OWN_ERROR * samples:
             break
-    kept = _keep(steps, problem, weight, start_cost, samples, OWN_ERROR + noise.slow_doubt)
-    final, found = _confirmed(problem, noise, weight, split, baseline, steps[:kept], samples, progress)
-    # What rings on at standstill passes for noise, so a pattern may be there though nothing seems left over.
-    pattern = strongest(problem, baseline, weight) if not found or excess > PATTERN_EXCESS * samples else None
-    if pattern is not None and found:
-        named = [cost(problem, steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
-        if _foreign(pattern.cost(problem, weight), named, start_cost):
-            final, found = baseline, []
-    explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
-    return Search(
-        baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), bool(found) or not steps,
-        first_scores, tuple(all_trials), pattern,
-    )  # fmt: skip
+    return _Built(baseline, first, steps, all_trials)
 
 
 def _tried(
