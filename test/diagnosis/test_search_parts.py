@@ -4,6 +4,7 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -141,6 +142,41 @@ def test_a_pattern_is_sought_even_where_noise_seems_to_explain_all(problem: Prob
     assert found.excess < 0.0
     assert found.pattern is not None
     assert float(re.search(r"mode of ([\d.]+) Hz", found.pattern.text).group(1)) == pytest.approx(1.2, rel=0.03)
+
+
+def test_a_build_up_that_leads_nowhere_begins_again_from_the_best_fingerprint(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wrong effect that happens to fit best alone, and beside which nothing stands, does not hide the two right ones."""
+    truth = [effect("line_loss_quadratic", c=3e4), effect("slope_bias", torque=200.0)]
+    hidden = with_torque(problem, problem.predict_all(problem.start(), truth))
+    roles = split.split(hidden)
+    fitted = np.where(roles.fit, weight(hidden), 0.0)
+    draws = SIGMA * np.random.default_rng(4).standard_normal((16, hidden.measured.size))
+    seen = noise.Noise(np.full(hidden.measured.size, SIGMA), draws, 0.0)
+    real, openings = build_up._build_up, []
+
+    def misled(*given: Any) -> build_up._Built:
+        opening = given[4]
+        if opening is not None:
+            openings.append(opening.trials[0])
+            return real(*given)
+        built = real(*given)
+        *others, wrong = built.first.trials
+        item = build_up.Found(wrong.score, (), built.first.trials, 1.0)
+        first = replace(built.first, trials=(wrong, *others))
+        return replace(built, first=first, steps=[(wrong.fit, item, 0.01)])
+
+    monkeypatch.setattr(build_up, "_build_up", misled)
+    found = build_up.search(hidden, seen, roles, fit(hidden, fitted))
+    assert {item.score.candidate.effect.id for item in found.found} == {"line_loss_quadratic", "slope_bias"}
+    assert len(found.final.effects) == 2
+    assert openings[0].candidate.effect.id == "line_loss_quadratic"
+    # Where nothing stands on any first effect either, the answer is that no entry explains it.
+    monkeypatch.setattr(build_up, "AGAIN", 0)
+    found = build_up.search(hidden, seen, roles, fit(hidden, fitted))
+    assert found.found == ()
+    assert not found.listed
 
 
 def test_a_freer_shape_takes_what_a_wrong_law_leaves_and_no_more(problem: Problem) -> None:
