@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -112,16 +113,25 @@ def replay(
     bags: Bags,
     vehicle: VehicleFile,
     out: OutFolder,
-    horizon: Annotated[float, typer.Option(min=0.0, max=5.0, help="feed-forward this far ahead [s]")] = 0.0,
+    horizon: Annotated[
+        float | None, typer.Option(min=0.0, max=5.0, help="feed-forward this far ahead [s]")
+    ] = None,
+    parameters: Annotated[
+        Path | None, typer.Option(help="parameter file of the node (YAML), to replay with the same time options")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
     from lugre_steering.estimator import Options
+    from lugre_steering.live.table import read_options
     from lugre_steering.replay import describe
     from lugre_steering.replay import replay as run
 
+    options = read_options(parameters) if parameters is not None else Options()
+    if horizon is not None:
+        options = replace(options, feed_forward_horizon_s=horizon)
     with progress_bar() as progress:
-        result = run(bags, vehicle, out, Options(feed_forward_horizon_s=horizon), progress)
+        result = run(bags, vehicle, out, options, progress)
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:

@@ -31,12 +31,13 @@ from lugre_steering.chain.step import Records
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
+from lugre_steering.live.table import NODE
 from lugre_steering.online import Curves, Fit, Timeline
 from lugre_steering.recording import Channel, Finding, IntArray, Kind, unused_name
 from lugre_steering.vehicle import Vehicle, load
 
 SCHEMA = "lugre_steering/replay/1"
-PREFIX = "/steering_torque_estimator"
+PREFIX = f"/{NODE}"
 FRAME = "base_link"
 COMMAND = "steering/command"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
@@ -62,13 +63,16 @@ def replay(
     """
     vehicle = load(vehicle_file)
     names = _names(bags, out)
-    unit = vehicle.coordinate.force_unit
-    summary: dict[str, Any] = {"schema": SCHEMA, "vehicle": str(vehicle_file), "torque_unit": unit, "bags": []}
+    options = options or Options()
+    summary: dict[str, Any] = {
+        "schema": SCHEMA, "vehicle": str(vehicle_file), "torque_unit": vehicle.coordinate.force_unit,
+        "options": asdict(options), "bags": [],
+    }  # fmt: skip
     overall = Fit()
     try:
         out.mkdir(parents=True, exist_ok=True)
         for path, name in zip(bags, names, strict=True):
-            run = _Run(path, name, vehicle, options or Options())
+            run = _Run(path, name, vehicle, options)
             summary["bags"].append(run.write(out, progress))
             overall.merge(run.fit)
             summary["overall"] = overall.result()

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,15 @@ import numpy as np
 import pytest
 from bag_making import Message
 from rosbags.highlevel import AnyReader
+from typer.testing import CliRunner
 
 import lugre_steering
 from lugre_steering.bench.replay import write_cycle
+from lugre_steering.cli import app
 from lugre_steering.errors import BagError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
+from lugre_steering.live.table import ParameterError, read_options
 from lugre_steering.recording import Kind
 from lugre_steering.replay import replay
 from lugre_steering.vehicle import Vehicle, load
@@ -271,6 +275,51 @@ print(replay([Path({str(bag)!r})], Path({str(VEHICLE)!r}), Path("out"))["bags"][
 
 
 # --------------------------------------------------- what a recording lacks
+
+
+PARAMETER_FILE = """
+camera:
+  ros__parameters: {exposure: 3}
+/**:
+  ros__parameters: {use_sim_time: true, gain_of_another_node: 1.0, max_gap_s: 0.5, max_rate_rad_s: 0.2}
+/front/steering_torque_estimator:
+  ros__parameters: {executor: events, max_gap_s: 1.5}
+"""
+
+
+def test_a_parameter_file_of_the_node_sets_the_options(tmp_path: Path) -> None:
+    """As for the node: what concerns other nodes is left aside, and its own section stands above all."""
+    (tmp_path / "node.yaml").write_text(PARAMETER_FILE)
+    options = read_options(tmp_path / "node.yaml")
+    assert options == Options(max_gap_s=1.5, max_rate_rad_s=0.2)
+    assert read_options(ROOT / "config" / "estimator_parameters.yaml") == Options()
+    bag = make.write(tmp_path / "run", drive())
+    command = ["replay", str(bag), "--vehicle", str(VEHICLE), "--out", str(tmp_path / "out"), "--json"]
+    given = ["--parameters", str(tmp_path / "node.yaml"), "--horizon", "0.4"]
+    done = CliRunner().invoke(app, [*command, *given])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["options"]["feed_forward_horizon_s"] == 0.4
+    assert_same(tmp_path / "out" / "run", one_by_one(bag, load(VEHICLE), replace(options, feed_forward_horizon_s=0.4)), sides=2)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("camera: {ros__parameters: {max_gap_s: 1.0}}", "key '(top level)': got 'camera', expected a section '/**'"),
+        ("[1, 2]", "key '(top level)': got [1, 2], expected a section '/**'"),
+        ("/**: {max_gap_s: 1.0}", "key '/**': got {'max_gap_s': 1.0}, expected a mapping 'ros__parameters' in it"),
+        ("/**: {ros__parameters: {max_gap_s: 0.0}}", "key '/**.ros__parameters.max_gap_s': got 0.0, expected"),
+        ("/**: {ros__parameters: {max_gap_s: soon}}", "key '/**.ros__parameters.max_gap_s': got 'soon', expected a plain number"),
+        ("steering_torque_estimator: {ros__parameters: {max_gap: 1.0}}", "no such key; did you mean 'max_gap_s'?"),
+        ("/**: {ros__parameters: {max_gap_s: 1.0, max_gap_s: 2.0}}", "the key 'max_gap_s' stands twice"),
+    ],
+)
+def test_a_parameter_file_that_cannot_be_used_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "node.yaml").write_text(text)
+    with pytest.raises(ParameterError) as error:
+        read_options(tmp_path / "node.yaml")
+    assert said in str(error.value)
+    assert str(tmp_path / "node.yaml") in str(error.value)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

@@ -23,6 +23,7 @@ from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, 
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
 from lugre_steering.recording import Array, IntArray, Kind
+from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle
 
 LINE_RING = 8192
@@ -35,12 +36,12 @@ PLAN_POINTS = 1024
 class Options:
     """Timing rules; the defaults suit sensors of 20 Hz and more."""
 
-    pair_tolerance_s: float = 0.002  # or half a sampling period, if that is more
-    max_gap_s: float = 0.25
-    backward_jump_s: float = 2.0
-    forward_jump_s: float = 10.0
-    max_rate_rad_s: float = 10.0
-    feed_forward_horizon_s: float = 0.0
+    pair_tolerance_s: float = quantity(0.0, 1.0, default=0.002)  # or half a sampling period, if that is more
+    max_gap_s: float = quantity(0.001, 60.0, default=0.25)
+    backward_jump_s: float = quantity(0.1, 1e6, default=2.0)
+    forward_jump_s: float = quantity(0.1, 1e6, default=10.0)
+    max_rate_rad_s: float = quantity(0.01, 1e3, default=10.0)
+    feed_forward_horizon_s: float = quantity(0.0, 5.0, default=0.0)
 
 
 @njit(nogil=True, cache=True)

@@ -26,10 +26,10 @@ from lugre_steering.live.health import Health
 from lugre_steering.live.outputs import Outputs
 from lugre_steering.live.parameters import declare
 from lugre_steering.live.plan import planned_angles
+from lugre_steering.live.table import NODE
 from lugre_steering.recording import Kind
 from lugre_steering.vehicle import Vehicle, load
 
-NAME = "steering_torque_estimator"
 LATENCY_WINDOW = 4096
 
 _SCALARS: Mapping[Kind, tuple[type, Callable[[Any], float]]] = {
@@ -43,7 +43,7 @@ class SteeringTorqueEstimator(Node):
     """See INTERFACE: topics in, topics out. Raises ``LugreSteeringError`` for bad parameters or a bad vehicle file."""
 
     def __init__(self, *, latency_window: int = LATENCY_WINDOW) -> None:
-        super().__init__(NAME)
+        super().__init__(NODE)
         self.settings = settings = declare(self)
         self.vehicle = load(settings.vehicle_file)
         begin = time.monotonic()

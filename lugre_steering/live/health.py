@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from lugre_steering.live.table import NODE
 from lugre_steering.recording import Kind
 from lugre_steering.vehicle import Vehicle
 
@@ -45,7 +46,7 @@ class Health:
     """Arrivals, latencies, residual level and faults; all cheap to update in a callback."""
 
     def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int) -> None:
-        self._node = "steering_torque_estimator"
+        self._node = NODE
         self._hardware = vehicle.name
         self._kinds = [channel.kind for channel in vehicle.channels]
         self._topics: list[str] = [""] * len(self._kinds)

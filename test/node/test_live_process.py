@@ -18,6 +18,8 @@ from live_harness import PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
+from lugre_steering.live.table import OPTION_TABLE, TABLE
+
 CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"
 
 
@@ -99,10 +101,8 @@ def test_parameters_are_described_ranged_and_fixed() -> None:
 
 
 def test_the_shipped_parameters_are_the_defaults() -> None:
-    from lugre_steering.live import parameters
-
     shipped = yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"]
-    declared = {p.name: p.default for p in (*parameters._TABLE, *parameters._OPTION_TABLE) if p.name != "vehicle_file"}
+    declared = {p.name: p.default for p in (*TABLE, *OPTION_TABLE) if p.name != "vehicle_file"}
     assert shipped == declared
 
 

@@ -1,0 +1,99 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the node's parameters are: names, defaults, ranges and meanings; and a parameter file's options, read without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from lugre_steering.errors import LugreSteeringError
+from lugre_steering.estimator import Options
+from lugre_steering.schema import Reader
+
+NODE = "steering_torque_estimator"
+EXECUTORS = ("events", "single")
+BY_ROS = ("use_sim_time", "start_type_description_service")
+"""Parameters that rclpy declares on every node."""
+
+
+class ParameterError(LugreSteeringError):
+    """A node parameter, or a file of them, has a value that it cannot have."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of the node."""
+
+    name: str
+    default: bool | int | float | str
+    description: str
+    low: float = 0.0
+    high: float = 0.0
+    choices: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> str:
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        if isinstance(self.default, (bool, str)):
+            return "true or false" if isinstance(self.default, bool) else "a text"
+        if isinstance(self.default, int):
+            return f"a whole number from {self.low:g} to {self.high:g}"
+        return f"a number with a decimal point from {self.low:g} to {self.high:g}"
+
+
+TABLE = (
+    Parameter("vehicle_file", "", "vehicle file (YAML); required"),
+    Parameter(
+        "executor",
+        "events",
+        "rclpy executor; only events keeps the order of arrival across topics under load",
+        choices=EXECUTORS,
+    ),
+    Parameter("frame_id", "base_link", "frame of the published torques (z up)"),
+    Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000),
+    Parameter("angle_timeout_s", 0.2, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
+    Parameter("pressure_timeout_s", 0.5, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
+    Parameter("recovery_ramp_s", 1.0, "feed-forward commands are ramped over this time after an interruption [s]", 0.0, 60.0),
+    Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)"),
+)
+_MEANINGS = {
+    "pair_tolerance_s": "left and right stamps this close are one instant [s]",
+    "max_gap_s": "pressures are not interpolated across a longer gap [s]",
+    "backward_jump_s": "a confirmed jump of all angles back in time this long is a restart [s]",
+    "forward_jump_s": "a jump ahead this long must be confirmed [s]",
+    "max_rate_rad_s": "a faster change of an angle is a spike [rad/s]",
+    "feed_forward_horizon_s": "the feed-forward is the torque needed this far ahead, along steering/command if it comes [s]",
+}
+OPTION_TABLE = tuple(
+    Parameter(item.name, getattr(Options(), item.name), _MEANINGS[item.name], item.metadata["low"], item.metadata["high"])
+    for item in fields(Options)
+)
+
+
+def read_options(file: Path) -> Options:
+    """The estimator's options in a parameter file of the node, as ``ros2 run ... --params-file`` would set them.
+
+    Sections of other nodes, and what concerns the node alone, are left aside. ``ParameterError`` if no section is the node's.
+    """
+    reader = Reader(file, ParameterError)
+    content = reader.load()
+    sections = content if isinstance(content, Mapping) else {}
+    own = [key for key in sections if str(key) == "/**" or str(key).split("/")[-1] == NODE]
+    if not own:
+        raise reader.fail("(top level)", ", ".join(map(str, sections)) or content, f"a section '/**' or '{NODE}'")
+    names = {parameter.name for parameter in OPTION_TABLE}
+    others = {parameter.name for parameter in TABLE} | set(BY_ROS)
+    values: dict[str, object] = {}
+    for key in own:
+        section = sections[key]
+        given = section.get("ros__parameters") if isinstance(section, Mapping) else None
+        if not isinstance(given, Mapping):
+            raise reader.fail(str(key), section, "a mapping 'ros__parameters' in it")
+        # Under /** a file may set parameters of several nodes at once.
+        kept = {k: v for k, v in given.items() if k in names or (str(key) != "/**" and k not in others)}
+        reader.build(Options, kept, f"{key}.ros__parameters")
+        values |= kept
+    return reader.build(Options, values, "ros__parameters")
