@@ -17,12 +17,12 @@ def generate_launch_description() -> LaunchDescription:
     """The node with its parameter file; topics are relative, so ``namespace`` moves them all."""
     config = Path(get_package_share_directory("lugre_steering")) / "config"
     arguments = {
-        "vehicle_file": (str(config / "test_vehicle.yaml"), "vehicle file (YAML)"),
+        "vehicle_file": (None, "vehicle file (YAML); required, for the torques of another vehicle look as good"),
         "params_file": (str(config / "estimator_parameters.yaml"), "parameters of the node (YAML)"),
         "namespace": ("", "namespace of the node and its topics"),
-        "left_joint_states": ("steering/left/joint_state", "JointState topic of the left angle"),
-        "right_joint_states": ("steering/right/joint_state", "JointState topic of the right angle; may be the same"),
-        "use_sim_time": ("false", "take the time from /clock"),
+        "left_joint_states": ("steering/left/joint_state", "JointState topic of the left angle, where the vehicle file names none"),
+        "right_joint_states": ("steering/right/joint_state", "the same of the right angle; may be the same topic"),
+        "use_sim_time": ("false", "take the time from /clock; stands above the parameter file"),
     }
     node = Node(
         package="lugre_steering",

@@ -102,6 +102,11 @@ def command(name: str | None = None) -> Callable[[F], F]:
             except LugreSteeringError as error:
                 print(f"lugre-steering: {error}", file=sys.stderr)
                 raise typer.Exit(2) from None
+            except BrokenPipeError:  # whoever read our output has left
+                raise
+            except OSError as error:
+                print(f"lugre-steering: {error.filename or name or function.__name__}: {error.strerror or error}", file=sys.stderr)
+                raise typer.Exit(2) from None
 
         return function
 
@@ -153,7 +158,7 @@ def simulate(
     effect: Annotated[
         list[str] | None, typer.Option(help="add physics, id:parameter=value,... (SI); repeatable")
     ] = None,
-    storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
+    storage: Annotated[str | None, typer.Option(help="mcap or sqlite3 [mcap]")] = None,
     rate: Annotated[float | None, typer.Option(help="angle samples per second [100]")] = None,
     pressure_rate: Annotated[float | None, typer.Option(help="pressure samples per second [as --rate]")] = None,
     jitter: Annotated[float | None, typer.Option(help="standard deviation of the sampling instants [s]")] = None,
@@ -188,13 +193,13 @@ def simulate(
     }
     chosen = simulation.load_vehicle(vehicle, effect or [])
     if simulation.is_experiment(what):
-        if any(value is not None for value in sensing.values()):
-            raise DataError(f"simulate {what}: has its own sampling and noise; expected no such option")
+        if any(value is not None for value in (storage, *sensing.values())):
+            raise DataError(f"simulate {what}: has its own sampling and noise and writes no bag; expected no such option")
         outcomes = simulation.run_experiments(what, chosen)
         result = simulation.write_outcomes(what, outcomes, out)
         print_json(result) if as_json else simulation.show_outcomes(Console(), outcomes, out)
         raise typer.Exit(0 if result["passed"] else 1)
-    result = simulation.run_manoeuvre(what, chosen, out, sensing, storage)
+    result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap")
     print_json(result) if as_json else simulation.show_run(Console(), result)
 
 

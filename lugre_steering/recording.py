@@ -88,6 +88,12 @@ class Recording:
     findings: tuple[Finding, ...] = ()
 
 
+NODE = "steering_torque_estimator"
+"""Name of the live node, in whose namespace its results are published and recorded."""
+TRUTH = "synthetic_truth"
+"""Name in whose namespace simulated recordings keep what a sensor cannot know."""
+
+
 def unused_name(name: str, taken: Collection[str]) -> str:
     """``name``, or with the lowest number from 2 on that is not taken: run_a, run_a_2, run_a_3."""
     candidates = itertools.chain([name], (f"{name}_{number}" for number in itertools.count(2)))

@@ -7,9 +7,7 @@ A bag streams through in blocks; memory does not grow with its length.
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
 import shutil
 import tempfile
 from collections import Counter
@@ -26,14 +24,15 @@ from rosbags.typesys.store import Typestore
 
 from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
 from lugre_steering.bag.load import STRAY_NS
+from lugre_steering.bag.reader import bag_name
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.live.table import NODE
 from lugre_steering.online import Curves, Fit, Timeline
-from lugre_steering.recording import Channel, Finding, IntArray, Kind, unused_name
+from lugre_steering.recording import NODE, Channel, Finding, IntArray, Kind, unused_name
+from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
 
 SCHEMA = "lugre_steering/replay/1"
@@ -109,12 +108,9 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
     """A name for the result of each bag; refuses to touch an input or anything that is not an earlier result."""
     names: list[str] = []
     for path in bags:
-        # Not resolved: a link is known by its own name.
-        absolute = Path(os.path.abspath(path))
-        if not absolute.exists():
+        if not path.exists():
             raise BagError(f"{path}: no such file or folder")
-        stem = absolute.name if absolute.is_dir() else absolute.name.split(".")[0]
-        names.append(unused_name(stem, names))
+        names.append(unused_name(bag_name(path), names))
     for name in names:
         result = (out / name).resolve()
         for path in bags:
@@ -167,7 +163,7 @@ class _Run:
         self._commands: Counter[str] = Counter()  # feed-forward plans that could not be used, by reason
         self._found: list[Finding] = []
         self._clocks: tuple[Timeline, Timeline] | None = None  # of estimates and of residuals
-        self._log_ns = (0, 0)
+        self._log_ns: tuple[int, int] | None = None
         self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
     def write(self, out: Path, progress: Progress | None) -> dict[str, Any]:
@@ -193,7 +189,7 @@ class _Run:
         summary: dict[str, Any] = {
             "bag": str(self.path),
             "name": self.name,
-            "duration_s": (self._log_ns[1] - self._log_ns[0]) * 1e-9,
+            "duration_s": (self._log_ns[1] - self._log_ns[0]) * 1e-9 if self._log_ns else 0.0,
             "messages": self._counts["messages"],
             "estimates": self._counts["estimates"],
             "fit": fit,
@@ -240,7 +236,8 @@ class _Run:
                 ]
             )
             self._counts.update(rows=block.channel.size, messages=len(block.messages), estimates=len(estimates))
-            self._log_ns = (self._log_ns[0] or int(block.messages.log_ns[0]), int(block.messages.log_ns[-1]))
+            first_ns, last_ns = int(block.messages.log_ns[0]), int(block.messages.log_ns[-1])
+            self._log_ns = (self._log_ns[0] if self._log_ns else first_ns, last_ns)
             if progress is not None:
                 progress(self.name, self._counts["messages"], bag.message_count)
 
@@ -347,9 +344,8 @@ class _Run:
             yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
 
     def _picture(self, file: Path, fit: Mapping[str, Any] | None) -> dict[str, str | None]:
-        if importlib.util.find_spec("matplotlib") is None:
+        if note := no_pictures():
             file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
-            note = "no picture: matplotlib is not installed (pip install 'lugre_steering[report]')"
             return {"picture": None, "picture_note": note}
         from lugre_steering.report.replay_figure import draw_replay
 
@@ -367,7 +363,7 @@ def _first_stamp(block: Block, sides: int) -> int | None:
     if not usual.size:
         return None
     # One of them, not the mean of two: half of the stamps may be of another clock.
-    near = np.abs(offset - usual[(usual.size - 1) // 2]) <= STRAY_NS
+    near = (block.stamp_ns > 0) & (np.abs(offset - usual[(usual.size - 1) // 2]) <= STRAY_NS)
     return int(block.stamp_ns[near].min())
 
 

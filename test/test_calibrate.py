@@ -194,6 +194,22 @@ def test_files_of_the_command(commanded):
     assert note["sheet"] == str(sheet)
 
 
+@pytest.mark.parametrize("name", ["calibration.json", "calibrated.yaml", "calibration.png"])
+def test_files_of_others_are_never_replaced(tmp_path, name):
+    (tmp_path / name).write_text("{}", encoding="utf-8")
+    done = CliRunner().invoke(app, ["calibrate", str(BAG), "--vehicle", str(SHEET_FILE), "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert f"{name}: exists and is not part of an earlier result" in done.stderr
+    assert (tmp_path / name).read_text(encoding="utf-8") == "{}"
+
+
+def test_the_vehicle_file_is_never_replaced(commanded):
+    _, out, _ = commanded
+    done = CliRunner().invoke(app, ["calibrate", str(BAG), "--vehicle", str(out / "calibrated.yaml"), "--out", str(out)])
+    assert done.exit_code == 2
+    assert "would be replaced by the result" in done.stderr
+
+
 def test_replay_with_the_calibrated_vehicle_is_better(commanded, tmp_path):
     sheet, out, _ = commanded
     alone = tmp_path / "elsewhere.yaml"
@@ -288,6 +304,9 @@ def test_the_static_ratio_without_the_level():
         (["--prior", "stiffness"], "--prior stiffness"),
         (["--prior", "stiffness=0"], "--prior stiffness"),
         (["--prior", "stiffness=0.1", "--no-prior"], "--no-prior"),
+        (["--prior", "kingpin_arm=0.05"], "--prior kingpin_arm: is not fitted"),
+        (["--prior", "stiffness=0.1", "--fix", "stiffness"], "--prior stiffness: is not fitted"),
+        (["--free", "pressure_gain", "--fix", "pressure_gain"], "--fix pressure_gain: is given to --free too"),
     ],
 )
 def test_wrong_options_end_with_one_line(options, said, tmp_path):

@@ -143,6 +143,13 @@ def test_scalar_of_the_file_start_and_stop(tmp_path: Path) -> None:
     assert result["channels"][0]["outside_start_stop"] == 7
 
 
+def test_a_cell_array_that_nobody_asks_for_is_no_obstacle(tmp_path: Path) -> None:
+    cells = np.empty(2, object)
+    cells[:] = [{"name": "run"}, np.arange(3.0)]
+    savemat(tmp_path / "d.mat", {"t": np.arange(3.0), "a": np.arange(3.0), "notes": cells})
+    assert list(read_table(tmp_path / "d.mat").column("a")) == [0.0, 1.0, 2.0]
+
+
 @pytest.mark.skipif(importlib.util.find_spec("pyarrow") is None, reason="pyarrow is not installed")
 def test_parquet(tmp_path: Path) -> None:
     import pyarrow
@@ -191,6 +198,11 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         (GOOD.replace("}}", "}, rate/left: {column: b, unit: m/s}}"), "rate/left.unit': got 'm/s', expected one of rad/s"),
         (GOOD.replace("angle/left: {column: a, unit: deg}", "rate/left: {column: a, unit: deg/s}"), "expected angle/left beside"),
         (GOOD.replace("column: a, unit: deg", "cylinder: {cap: {column: a, unit: bar, area_m2: 1}}"), "for measured_torque only"),
+        (GOOD.replace("column: a", "of: a, polynomial: []"), "angle/left.polynomial': got \\[\\], expected at least one"),
+        (
+            HEAD + "channels: {rate/left: {column: b, unit: deg/s, time: {column: t}}, angle/left: {column: a, unit: deg}}\n",
+            "key 'time': got nothing, expected this section, or channels.angle/left.time",
+        ),
         ("[1, 2", "is not valid YAML"),
         ("- 1\n", "expected a mapping"),
     ],

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
 import sys
 import tracemalloc
@@ -23,9 +24,10 @@ from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner
 
 import lugre_steering
+from lugre_steering.bag import Bag
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
-from lugre_steering.errors import BagError
+from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
 from lugre_steering.live.table import ParameterError, read_options
@@ -505,6 +507,66 @@ def test_a_result_can_be_replayed_and_its_old_outputs_are_replaced(tmp_path: Pat
     summary = replay([tmp_path / "first" / "run"], VEHICLE, tmp_path / "second")
     assert sorted(read(tmp_path / "second" / "run")) == sorted(read(tmp_path / "first" / "run"))
     assert "replaced_topics" in [finding["finding"] for finding in summary["bags"][0]["findings"]]
+
+
+def test_recorded_results_are_no_inputs(tmp_path: Path) -> None:
+    """Both joints on one topic, recorded while the node ran: its own JointState topics carry the same joints."""
+    both = [(t, angle) for t, angle in ((make.T0 + i * STEP, 0.4 * np.sin(i * 0.04)) for i in range(300))]
+    shared = [("/joint_states", make.JOINT_STATE, t, make.joint_state(t, JOINTS, [a, a])) for t, a in both]
+    make.write(tmp_path / "run", shared)
+    first = replay([tmp_path / "run"], VEHICLE, tmp_path / "first")["bags"][0]
+    assert first["samples"]["angle/left"]["topic"] == "/joint_states"
+    second = replay([tmp_path / "first" / "run"], VEHICLE, tmp_path / "second")["bags"][0]
+    assert second["estimates"] == first["estimates"] == 300
+    assert sorted(read(tmp_path / "second" / "run")) == sorted(read(tmp_path / "first" / "run"))
+
+
+@pytest.mark.parametrize("qos", ["- history: 9", "[1]", "{a: 1}", "- {history: 1, depth: 3}", "\x01"])
+def test_quality_of_service_that_says_nothing_clear_is_left_out(tmp_path: Path, qos: str) -> None:
+    """A flipped byte in it costs nothing else."""
+    bag = make.write(tmp_path / "run", drive(2.0), storage="sqlite3")
+    with sqlite3.connect(next(bag.glob("*.db3"))) as connection:
+        connection.execute("UPDATE topics SET offered_qos_profiles = ?", (qos,))
+    (bag / "metadata.yaml").unlink()
+    assert replay([bag], VEHICLE, tmp_path / "out")["bags"][0]["estimates"] == 100
+    assert len(read(tmp_path / "out" / "run")) > len(drive(2.0))
+
+
+def test_a_horizon_that_is_no_number_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="feed_forward_horizon_s: got nan, expected 0 to 5"):
+        Options(feed_forward_horizon_s=float("nan"))
+    bag = make.write(tmp_path / "run", drive(2.0))
+    command = ["replay", str(bag), "--vehicle", str(VEHICLE), "--out", str(tmp_path / "out"), "--horizon", "nan"]
+    assert CliRunner().invoke(app, command).exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_files_with_dots_in_their_names_do_not_meet(tmp_path: Path) -> None:
+    bags = []
+    for name in ("run_1.0", "run_1.1"):
+        file = next(make.write(tmp_path / name, drive(2.0)).glob("*.mcap"))
+        bags.append(file.rename(tmp_path / f"{name}.mcap"))
+    for bag in bags:
+        replay([bag], VEHICLE, tmp_path / "out")
+    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {"run_1.0", "run_1.1"}
+
+
+def test_a_folder_is_named_as_it_is_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(make.write(tmp_path / "run", drive(2.0)))
+    assert replay([Path(".")], VEHICLE, tmp_path / "out")["bags"][0]["name"] == "run"
+    with Bag(Path(".")) as bag:
+        assert bag.name == "run"
+
+
+def test_a_zero_stamp_is_not_the_start(tmp_path: Path) -> None:
+    """Stamps in simulated time, log times of the wall clock: a message without a stamp must not shift what is told in seconds."""
+    began = 1000 * SECOND
+    messages = [(topic, kind, log + make.T0, data) for topic, kind, log, data in drive(4.0, start=began)]
+    unstamped = pressure("main_a", 0, 1e6, began + make.T0 + 10)
+    bag = make.write(tmp_path / "run", [unstamped, *messages])
+    summary = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]
+    assert summary["samples"]["pressure/main_a"]["rejected"] == {"zero_stamp": 1}
+    assert 0.0 <= summary["fit"]["peaks"]["cylinder_torque"]["max_at_s"] < 4.0
 
 
 def test_without_matplotlib_there_is_no_picture_and_a_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

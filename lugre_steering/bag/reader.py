@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import tempfile
 from collections import Counter
@@ -23,7 +24,7 @@ from lugre_steering.bag import cdr, mcap, sqlite
 from lugre_steering.bag.compression import ZSTD_MAGIC, expand_file
 from lugre_steering.bag.messages import Connection, Messages, inflated, merged, windows
 from lugre_steering.errors import BagError
-from lugre_steering.recording import Array, Channel, Finding, IntArray, Kind
+from lugre_steering.recording import NODE, TRUTH, Array, Channel, Finding, IntArray, Kind
 
 MESSAGE_TYPE = {
     Kind.ANGLE: cdr.JOINT_STATE,
@@ -59,7 +60,7 @@ class Bag:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self.name = self.path.name if self.path.is_dir() else self.path.name.split(".")[0]
+        self.name = bag_name(self.path)
         self.findings: list[Finding] = []
         self.connections: list[Connection] = []
         self.malformed: Counter[str] = Counter()  # messages per topic that do not decode as their type
@@ -268,12 +269,13 @@ class Bag:
                 raise BagError(f"{self.path}: topic {topic!r} is encoded as {connection.encoding!r}, expected 'cdr'")
 
     def _joint_states(self) -> dict[int, str]:
-        """Connections that carry joint states, and their topics."""
+        """Connections that carry measured joint states, and their topics; what this package wrote is no measurement."""
         return {
             k: c.topic
             for k, c in enumerate(self.connections)
             if _full_name(c.msgtype) == cdr.JOINT_STATE and c.encoding == "cdr"
-        }
+            and not {NODE, TRUTH} & set(c.topic.split("/"))
+        }  # fmt: skip
 
     def _empty_topics(self, topics: set[str]) -> set[str]:
         """Those of some JointState topics without a message; looked for only if another topic could replace them."""
@@ -317,6 +319,15 @@ class Bag:
             if topics:
                 result[channel] = topics[0]
         return result
+
+
+def bag_name(path: Path) -> str:
+    """The name of a folder, or of a file without its extension; ``.`` is the folder it stands for."""
+    absolute = Path(os.path.abspath(path))  # not resolved: a link is known by its own name
+    if absolute.is_dir():
+        return absolute.name
+    endings = [ending for ending in _SUFFIXES if absolute.name.endswith(ending)]
+    return absolute.name.removesuffix(endings[0]) if endings else absolute.stem
 
 
 def _full_name(msgtype: str) -> str:

@@ -12,7 +12,7 @@ import sqlite3
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
@@ -129,6 +129,7 @@ class BagWriter:
 
     def add_connection(self, connection: Connection) -> int:
         """Announce a topic as another bag had it, to copy its messages; returns its number."""
+        connection = replace(connection, qos=_clear(connection.qos))
         if connection in self.connections:
             return self.connections.index(connection)
         self.connections.append(connection)
@@ -195,6 +196,16 @@ class BagWriter:
             "ros_distro": "jazzy",
         }
         return yaml.safe_dump({"rosbag2_bagfile_information": content}, sort_keys=False)
+
+
+@lru_cache
+def _clear(qos: str) -> str:
+    """Offered qualities of service as recorded; none where the text says nothing clear, which no reader would open."""
+    try:
+        parse_qos(qos)
+    except Exception:  # flipped bytes may raise anything
+        return ""
+    return qos
 
 
 def copied(messages: Messages, topic: NDArray[np.int32]) -> Iterator[Part]:

@@ -24,7 +24,6 @@ statement           one paragraph
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -45,8 +44,10 @@ from lugre_steering.diagnosis.fitting.apply import apply_calibration
 from lugre_steering.diagnosis.fitting.fit import fit
 from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
 from lugre_steering.diagnosis.fitting.split import split
+from lugre_steering.earlier import earlier_result
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording
+from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load, save
 
 SCHEMA = "lugre_steering/calibration/1"
@@ -135,6 +136,7 @@ def calibrate(
     ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
     """
     vehicle = load(vehicle_file)
+    earlier_result(out, "calibration.json", SCHEMA, ("calibrated.yaml", "calibration.png"), vehicle_file)
     recordings = read_recordings(bags, vehicle.channels, progress)
     calibrations = chosen(vehicle, free, fix, prior or {})
     done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
@@ -174,6 +176,11 @@ def chosen(
     if vehicle.rubber is not None and vehicle.rubber.heat_transfer_W_m2K == 0.0:
         standard.discard("cooling")
     wanted = [c for c in known.values() if (c.name in standard or c.name in free) and c.name not in fix]
+    for name in set(free) & set(fix):
+        raise DataError(f"--fix {name}: is given to --free too; expected one of them")
+    for name in prior or {}:
+        if name not in {calibration.name for calibration in wanted}:
+            raise DataError(f"--prior {name}: is not fitted; expected --free {name} beside it, or no --fix {name}")
     if not wanted:
         raise DataError("--fix: keeps every parameter at the sheet, expected at least one to fit")
     changed = []
@@ -368,9 +375,9 @@ def with_provenance(vehicle: Vehicle, result: Mapping[str, Any]) -> Vehicle:
 
 
 def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
-    if importlib.util.find_spec("matplotlib") is None:
+    if note := no_pictures():
         file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
-        return None, "no picture: matplotlib is not installed (pip install 'lugre_steering[report]')"
+        return None, note
     from lugre_steering.report.calibration_figure import draw_calibration
 
     draw_calibration(done, file)

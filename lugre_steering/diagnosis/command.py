@@ -6,12 +6,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
 from lugre_steering.diagnosis.result import SCHEMA, picture_names
+from lugre_steering.earlier import earlier_result, not_ours
 from lugre_steering.errors import BagError, DataError, LugreSteeringError
 from lugre_steering.vehicle import load, save
 
@@ -37,9 +38,12 @@ def run(
     The report of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
     """
     vehicle = load(vehicle_file)
+    if not 0.0 <= material <= 1.0:
+        raise DataError(f"--material: got {material:g}, expected a share from 0 to 1")
     for bag in bags:
         if not bag.exists():
             raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
+    old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html"), vehicle_file)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -48,7 +52,8 @@ def run(
         ) from error
     result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
     try:
-        _take_away_report(out)
+        if old is not None:
+            _take_away_report(out, old)
         (out / "diagnosis.json").write_text(json.dumps(result.json, indent=2, allow_nan=False) + "\n", encoding="utf-8")
         save(result.vehicle, out / "augmented.yaml")
     except OSError as error:
@@ -63,18 +68,11 @@ def run(
     return result.json
 
 
-def _take_away_report(out: Path) -> None:
-    """Delete the report of the diagnosis whose result lies in ``out``, file by file as it was written; refuse a result not ours."""
-    file = out / "diagnosis.json"
-    if not file.is_file():
-        return
+def _take_away_report(out: Path, old: Mapping[str, Any]) -> None:
+    """Delete the report of the diagnosis whose result ``old`` lies in ``out``, file by file as it was written."""
     try:
-        old = json.loads(file.read_bytes())
         names = [*(f"before_after_{bag}" for bag in old["bags"]), *(f"residual_{effect['id']}" for effect in old["effects"])]
-        ours = old["schema"] == SCHEMA
-    except (ValueError, KeyError, TypeError):
-        ours = False
-    if not ours:
-        raise DataError(f"{file}: exists and is not an earlier result of diagnose; choose another --out")
+    except (KeyError, TypeError):
+        raise not_ours(out / "diagnosis.json", "diagnosis.json") from None
     for name in ("report.html", *picture_names([*names, "evidence", "heldout"])):
         (out / name).unlink(missing_ok=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from lugre_steering.chain.model import build_model
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
+from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import admit
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
 from lugre_steering.estimator.residual import form_residuals
@@ -42,6 +43,12 @@ class Options:
     forward_jump_s: float = quantity(0.1, 1e6, default=10.0)
     max_rate_rad_s: float = quantity(0.01, 1e3, default=10.0)
     feed_forward_horizon_s: float = quantity(0.0, 5.0, default=0.0)
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value, low, high = getattr(self, item.name), item.metadata["low"], item.metadata["high"]
+            if not low <= value <= high:  # nan is refused too
+                raise DataError(f"{item.name}: got {value:g}, expected {low:g} to {high:g}")
 
 
 @njit(nogil=True, cache=True)

@@ -135,6 +135,9 @@ def load_map(path: str | Path) -> ImportMap:
     if not found.channels:
         raise reader.fail("channels", {}, "at least one channel")
     for name, source in found.channels.items():
+        if source.time is None and found.time is None:
+            raise reader.fail("time", None, f"this section, or channels.{name}.time")
+    for name, source in found.channels.items():
         _check_channel(found, reader, name, source)
     if found.time is not None:
         _check_unit(reader, "time.unit", found.time.unit, ("time",))
@@ -174,10 +177,10 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
                 _check_unit(reader, f"{key}.cylinder.{chamber}.unit", pressure.unit, ("pressure",))
     if (source.polynomial is None) != (source.of is None):
         raise reader.fail(f"{key}.of", source.of, "the column of a polynomial, together with 'polynomial'")
+    if source.polynomial is not None and not source.polynomial:
+        raise reader.fail(f"{key}.polynomial", [], "at least one coefficient")
     if source.column is None and (source.scale, source.scale_by, source.offset) != (1.0, None, 0.0):
         raise reader.fail(f"{key}.scale", source.scale, "scale, scale_by and offset beside 'column' only")
-    if source.time is None and found.time is None:
-        raise reader.fail("time", None, f"this section, or {key}.time")
     if source.time is not None:
         _check_unit(reader, f"{key}.time.unit", source.time.unit, ("time",))
     if kind == "rate":

@@ -164,6 +164,8 @@ def _collect(name: str, value: Any, columns: dict[str, Array], scalars: dict[str
         for key, inner in value.items():
             _collect(f"{name}.{key}" if name else key, inner, columns, scalars)
         return
+    if isinstance(value, list):  # a cell array of several kinds
+        return
     array = np.asarray(value)
     if array.dtype.kind not in "iufb":
         return

@@ -26,8 +26,7 @@ from lugre_steering.live.health import Health
 from lugre_steering.live.outputs import Outputs
 from lugre_steering.live.parameters import declare
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.live.table import NODE
-from lugre_steering.recording import Kind
+from lugre_steering.recording import NODE, Kind
 from lugre_steering.vehicle import Vehicle, load
 
 LATENCY_WINDOW = 4096

@@ -11,8 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from lugre_steering.live.table import NODE
-from lugre_steering.recording import Kind
+from lugre_steering.recording import NODE, Kind
 from lugre_steering.vehicle import Vehicle
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR

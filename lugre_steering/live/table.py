@@ -10,9 +10,9 @@ from pathlib import Path
 
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.estimator import Options
+from lugre_steering.recording import NODE
 from lugre_steering.schema import Reader
 
-NODE = "steering_torque_estimator"
 EXECUTORS = ("events", "single")
 BY_ROS = ("use_sim_time", "start_type_description_service")
 """Parameters that rclpy declares on every node."""

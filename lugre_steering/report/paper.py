@@ -11,26 +11,26 @@ from typing import Any
 
 from rich.table import Table
 
-from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure
 from lugre_steering.simulate.paper.outcome import Outcome
-
-_STYLES: dict[str, dict[str, Any]] = {
-    "test": MEASURED,
-    "improved": IMPROVED,
-    "original": ORIGINAL,
-    "points": {"color": "black", "linestyle": "none", "marker": "o", "markersize": 5},
-    "series": {},
-}
 
 
 def draw_outcome(outcome: Outcome, file: Path) -> None:
     """All panels one below the other; what was calibrated, what was checked and where it disagrees stands in the
     picture."""
+    from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure  # needs matplotlib
+
+    styles: dict[str, dict[str, Any]] = {
+        "test": MEASURED,
+        "improved": IMPROVED,
+        "original": ORIGINAL,
+        "points": {"color": "black", "linestyle": "none", "marker": "o", "markersize": 5},
+        "series": {},
+    }
     with figure(len(outcome.panels), 1, outcome.caption, file) as axes:
         for ax, panel in zip(axes[:, 0], outcome.panels, strict=True):
             colours = iter(SERIES)
             for curve in panel.curves:
-                style = _STYLES[curve.style] or {"color": next(colours)}
+                style = styles[curve.style] or {"color": next(colours)}
                 marker = {"marker": "o", "markersize": 4} if 2 < len(curve.x) < 10 and curve.style != "points" else {}
                 ax.plot(curve.x, curve.y, label=curve.label, **style, **marker)
             ax.set_title(panel.title)

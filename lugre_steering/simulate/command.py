@@ -16,8 +16,11 @@ from rich.table import Table
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
+from lugre_steering.bag.reader import bag_name
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Kind
+from lugre_steering.report.available import no_pictures
+from lugre_steering.report.paper import checks_table, draw_outcome, outcome_table, write_table
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
@@ -70,22 +73,25 @@ def run_manoeuvre(
 ) -> dict[str, Any]:
     """Simulate one manoeuvre; write the bag ``out/synthetic_<name>`` and its picture. ``sensing`` overrides fields of
     ``Sensing``; None means the vehicle's own."""
-    from lugre_steering.report.simulation import draw_simulation  # plotting is loaded only where it is used
-
     if storage not in STORAGES:
         raise DataError(f"storage: got '{storage}', expected {' or '.join(STORAGES)}")
     given = {name: value for name, value in sensing.items() if value is not None}
     run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
     make_folder(out)
-    folder = out / f"synthetic_{Path(what).stem.replace('-', '_')}"
+    folder = out / f"synthetic_{bag_name(Path(what)).replace('-', '_')}"
     label = f"{what}, vehicle '{vehicle.name}'"
     write_bag(folder, run, label, storage)
-    draw_simulation(run, label, folder.with_suffix(".png"))
+    picture, note = out / f"{folder.name}.png", no_pictures()
+    if note is None:
+        from lugre_steering.report.simulation import draw_simulation  # plotting is loaded only where it is used
+
+        draw_simulation(run, label, picture)
     truth = run.truth
     return {
         "synthetic": True,
         "bag": str(folder),
-        "picture": str(folder.with_suffix(".png")),
+        "picture": str(picture) if note is None else None,
+        "picture_note": note,
         "duration_s": float(truth.motion.time[-1]),
         "largest_torque_Nm": float(np.abs(truth.torque).max()),
         "largest_angle_deg": float(np.degrees(np.abs(truth.motion.theta).max())),
@@ -104,16 +110,15 @@ def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:
 
 def write_outcomes(what: str, outcomes: list[Outcome], out: Path) -> dict[str, Any]:
     """Table (CSV), result (JSON) and figure (PNG) of each experiment into ``out``; with several also a JSON of all."""
-    from lugre_steering.report.paper import draw_outcome, write_table
-
     make_folder(out)
-    results = []
+    results, note = [], no_pictures()
     for outcome in outcomes:
         results.append(outcome.to_json())
         write_table(outcome, out / f"{outcome.name}.csv")
-        draw_outcome(outcome, out / f"{outcome.name}.png")
+        if note is None:
+            draw_outcome(outcome, out / f"{outcome.name}.png")
         (out / f"{outcome.name}.json").write_text(json.dumps(results[-1], indent=2), encoding="utf-8")
-    result = {"passed": all(outcome.passed for outcome in outcomes), "experiments": results}
+    result = {"passed": all(outcome.passed for outcome in outcomes), "picture_note": note, "experiments": results}
     if what == ALL:
         (out / f"{ALL}.json").write_text(json.dumps(result, indent=2), encoding="utf-8")
     return result
@@ -144,8 +149,6 @@ def show_run(console: Console, result: Mapping[str, Any]) -> None:
 
 def show_outcomes(console: Console, outcomes: Sequence[Outcome], out: Path) -> None:
     """Tables, calibrated parameters, verdicts and disagreements of experiments."""
-    from lugre_steering.report.paper import checks_table, outcome_table
-
     for outcome in outcomes:
         console.print(outcome_table(outcome))
     console.print(checks_table(outcomes))

@@ -14,14 +14,13 @@ from rosbags.typesys import Stores, get_typestore
 from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
 from lugre_steering.errors import BagError
-from lugre_steering.recording import Array, IntArray, Kind
+from lugre_steering.recording import TRUTH, Array, IntArray, Kind
 from lugre_steering.simulate.run import Simulated
 from lugre_steering.simulate.sensors import nanoseconds
 
 START_NS = 1_780_000_000 * 10**9
 """Stamp of the first message: fixed, so that equal simulations give equal bytes."""
 FRAME = "synthetic"
-TRUTH = "/synthetic_truth"
 STRING = "std_msgs/msg/String"
 
 STORAGES = ("mcap", "sqlite3")
@@ -43,9 +42,11 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
         writer.set_custom_data("synthetic", label)
         with writer:
             text = store.types[STRING](data=f"synthetic: {label}")
-            said = writer.add_connection(f"{TRUTH}/label", STRING, typestore=store)
+            said = writer.add_connection(f"/{TRUTH}/label", STRING, typestore=store)
             writer.write(said, START_NS, store.serialize_cdr(text, STRING))
-            connections = [writer.add_connection(name, kind, typestore=store) for name, kind, _, _ in topics]
+            # Both joints may share a topic.
+            by_name = {name: writer.add_connection(name, kind, typestore=store) for name, kind in dict(t[:2] for t in topics).items()}
+            connections = [by_name[name] for name, _, _, _ in topics]
             for i in np.argsort(stamps, kind="stable"):
                 rows = topics[topic[i]][3]
                 writer.write(connections[topic[i]], int(stamps[i]), rows[within[i]].tobytes())
@@ -89,10 +90,10 @@ def _truth(run: Simulated) -> list[_Topic]:
     state = (truth.motion.theta, truth.motion.rate, truth.tracks["torque"])
     joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
     topics: list[_Topic] = [
-        (f"{TRUTH}/torque", cdr.WRENCH_STAMPED, stamp, cdr.encode_wrench(stamp, FRAME, torque)),
-        (f"{TRUTH}/state", cdr.JOINT_STATE, stamp, cdr.encode_joint_state(stamp, FRAME, joints, *map(seen, state))),
+        (f"/{TRUTH}/torque", cdr.WRENCH_STAMPED, stamp, cdr.encode_wrench(stamp, FRAME, torque)),
+        (f"/{TRUTH}/state", cdr.JOINT_STATE, stamp, cdr.encode_joint_state(stamp, FRAME, joints, *map(seen, state))),
     ]
     for side, temperature in zip(vehicle.sides, seen(truth.tracks["temperature"]).T, strict=True):
         rows = cdr.encode_temperature(stamp, FRAME, temperature)
-        topics.append((f"{TRUTH}/rubber_temperature/{side}", cdr.TEMPERATURE, stamp, rows))
+        topics.append((f"/{TRUTH}/rubber_temperature/{side}", cdr.TEMPERATURE, stamp, rows))
     return topics

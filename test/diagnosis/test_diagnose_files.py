@@ -44,9 +44,33 @@ def parked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_file_that_cannot_be_written_is_named(parked: Path, tmp_path: Path) -> None:
-    (tmp_path / "diagnosis.json").mkdir()
-    with pytest.raises(LugreSteeringError, match=r"diagnosis\.json: cannot be written"):
+    run([parked], SHEET, tmp_path, report=False)
+    (tmp_path / "augmented.yaml").unlink()
+    (tmp_path / "augmented.yaml").mkdir()
+    with pytest.raises(LugreSteeringError, match=r"augmented\.yaml: cannot be written"):
         run([parked], SHEET, tmp_path, report=False)
+
+
+@pytest.mark.parametrize("name", ["augmented.yaml", "report.html"])
+def test_a_file_without_an_earlier_result_is_somebody_elses(parked: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine", encoding="utf-8")
+    with pytest.raises(LugreSteeringError, match=f"{name}: exists and is not part of an earlier result"):
+        run([parked], SHEET, tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+
+
+def test_the_vehicle_file_is_never_replaced(parked: Path, tmp_path: Path) -> None:
+    run([parked], SHEET, tmp_path, report=False)
+    before = (tmp_path / "augmented.yaml").read_bytes()
+    with pytest.raises(LugreSteeringError, match="would be replaced by the result"):
+        run([parked], tmp_path / "augmented.yaml", tmp_path, report=False)
+    assert (tmp_path / "augmented.yaml").read_bytes() == before
+
+
+def test_a_share_that_is_no_number_is_refused(parked: Path, tmp_path: Path) -> None:
+    with pytest.raises(LugreSteeringError, match="--material: got nan, expected a share"):
+        run([parked], SHEET, tmp_path / "out", material=float("nan"), report=False)
 
 
 def test_the_report_of_an_earlier_diagnosis_is_taken_away_and_nothing_else(parked: Path, tmp_path: Path) -> None:
@@ -68,7 +92,7 @@ def test_the_report_of_an_earlier_diagnosis_is_taken_away_and_nothing_else(parke
 def test_a_result_of_something_else_is_never_replaced(parked: Path, tmp_path: Path, content: str) -> None:
     for name in ("diagnosis.json", "report.html"):
         (tmp_path / name).write_text(content, encoding="utf-8")
-    with pytest.raises(LugreSteeringError, match="not an earlier result of diagnose"):
+    with pytest.raises(LugreSteeringError, match="not part of an earlier result"):
         run([parked], SHEET, tmp_path, report=False)
     assert (tmp_path / "diagnosis.json").read_text(encoding="utf-8") == content
     assert (tmp_path / "report.html").exists()

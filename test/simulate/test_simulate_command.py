@@ -5,15 +5,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from lugre_steering import cli
+from lugre_steering.bag import read_recording
+from lugre_steering.recording import Kind
+from lugre_steering.resources import config_folder
 from lugre_steering.simulate import command, examples
 from lugre_steering.simulate.paper import EXPERIMENTS
 from lugre_steering.simulate.paper.outcome import Check, Outcome
+from lugre_steering.vehicle import load, save
 
 
 def invoke(*arguments: str) -> tuple[int, str, str]:
@@ -49,6 +55,43 @@ def test_a_manoeuvre_and_the_angles_of_its_own_bag(tmp_path: Path) -> None:
     assert "exists" in err
 
 
+SHORT = "segments: [{sweep: {to_deg: 10, rate_deg_s: 8, hold_s: 1}}]"
+
+
+def test_names_with_dots_do_not_meet(tmp_path: Path) -> None:
+    results = []
+    for name in ("run.1.yaml", "run.2.yaml"):
+        (tmp_path / name).write_text(SHORT, encoding="utf-8")
+        code, out, err = invoke(str(tmp_path / name), "--out", str(tmp_path / "out"), "--json")
+        assert code == 0, err
+        results.append(json.loads(out))
+    assert [Path(result["bag"]).name for result in results] == ["synthetic_run.1", "synthetic_run.2"]
+    assert [Path(result["picture"]).name for result in results] == ["synthetic_run.1.png", "synthetic_run.2.png"]
+
+
+def test_both_joints_on_one_topic(tmp_path: Path) -> None:
+    vehicle = load(config_folder() / "test_vehicle.yaml")
+    shared = replace(vehicle, topics=replace(vehicle.topics, left="/joint_states", right="/joint_states"))
+    save(shared, tmp_path / "shared.yaml")
+    (tmp_path / "mine.yaml").write_text(SHORT, encoding="utf-8")
+    code, out, err = invoke(str(tmp_path / "mine.yaml"), "--out", str(tmp_path), "--vehicle", str(tmp_path / "shared.yaml"), "--json")
+    assert code == 0, err
+    angles = [channel for channel in shared.channels if channel.kind is Kind.ANGLE]
+    read = read_recording(json.loads(out)["bag"], angles)
+    assert max(abs(read.angle["left"].value)) == pytest.approx(np.radians(10.0), rel=0.3)
+    assert read.angle["left"].value.size == read.angle["right"].value.size > 100
+
+
+def test_without_matplotlib_the_numbers_are_written_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lugre_steering.report.available.importlib.util.find_spec", lambda _: None)
+    (tmp_path / "mine.yaml").write_text(SHORT, encoding="utf-8")
+    code, out, err = invoke(str(tmp_path / "mine.yaml"), "--out", str(tmp_path / "out"), "--json")
+    assert code == 0, err
+    assert json.loads(out)["picture"] is None
+    assert "matplotlib" in json.loads(out)["picture_note"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["synthetic_mine"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "wanted"),
     [
@@ -66,6 +109,8 @@ def test_a_manoeuvre_and_the_angles_of_its_own_bag(tmp_path: Path) -> None:
         (("{tmp}/empty", "--out", "{tmp}/x"), "empty"),
         (("paper-rate", "--out", "{tmp}/file"), "file"),
         (("paper-rate", "--out", "{tmp}", "--seed", "3"), "paper-rate"),
+        (("paper-rate", "--out", "{tmp}", "--storage", "sqlite3"), "paper-rate"),
+        (("{tmp}/bad.folder.yaml", "--out", "{tmp}"), "bad.folder.yaml"),
         (("paper-rate", "--out", "{tmp}", "--effect", "slope_bias:torque=100"), "slope_bias"),
         (("paper-rate", "--out", "{tmp}", "--vehicle", "{tmp}/bad.yaml"), "bad.yaml"),
     ],
@@ -75,6 +120,7 @@ def test_bad_input_ends_with_one_line(tmp_path: Path, arguments: tuple[str, ...]
     (tmp_path / "file").write_text("not a folder", encoding="utf-8")
     (tmp_path / "bad.csv").write_text("time_s,angle_deg\n0,a\n1,2\n", encoding="utf-8")
     (tmp_path / "bad.yaml").write_text("segments: 3", encoding="utf-8")
+    (tmp_path / "bad.folder.yaml").mkdir()
     code, _, err = invoke(*(a.format(tmp=tmp_path) for a in arguments))
     assert code == 2
     assert err.count("\n") == 1
