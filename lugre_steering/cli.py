@@ -279,7 +279,7 @@ def diagnose(
     bags: Bags,
     vehicle: VehicleFile,
     out: OutFolder,
-    seed: Annotated[int, typer.Option(help="seed of the noise draws and bootstraps")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the noise draws and bootstraps")] = 1,
     material: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,

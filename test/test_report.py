@@ -54,6 +54,7 @@ def trace(name: str, seed: int) -> BagTrace:
         name=name, time=time, measured=measured, baseline=friction * 1.02, augmented=friction + stop,
         held=(time % 20.0) < 5.0, contributions={"end_stop": stop}, intervals={"end_stop": spans},
         coordinates={"steering angle": angle, "direction": np.sign(np.cos(0.2 * time)), "time": time},
+        heldout_Nm=(2000.0 + seed, 80.0 + seed),
     )  # fmt: skip
 
 
@@ -298,13 +299,18 @@ def test_fitted_law_lies_on_what_the_rest_of_the_model_leaves(vehicle: Vehicle) 
     )
 
 
-def test_heldout_bars_are_the_errors_of_held_out_samples_only(vehicle: Vehicle) -> None:
+def test_heldout_bars_are_the_errors_that_were_judged(vehicle: Vehicle) -> None:
     diagnosis = missing(vehicle)
     rows = plots.heldout_rows(diagnosis)
     assert rows[0] == ("all bags", 2100.0, 84.0, (pytest.approx(63.0), pytest.approx(126.0)))
-    for row, one in zip(rows[1:], diagnosis.traces, strict=True):
-        error = [m - a for m, a, held in zip(one.measured, one.augmented, one.held, strict=True) if held]
-        assert row[2] == pytest.approx(np.sqrt(sum(e * e for e in error) / len(error)))
+    assert rows[1:] == [(one.name, 2000.0 + seed, 80.0 + seed, None) for seed, one in enumerate(diagnosis.traces, 1)]
+    rotated = dataclasses.replace(diagnosis, traces=tuple(dataclasses.replace(one, heldout_Nm=None) for one in diagnosis.traces))
+    assert plots.heldout_rows(rotated) == rows[:1]
+
+
+def test_names_that_are_numbers_stay_names(vehicle: Vehicle) -> None:
+    """Folders called 1 and 2, or by their date, make no axis of numbers."""
+    assert plots.heldout_plot(missing(vehicle, "2026"))["layout"]["xaxis"]["type"] == "category"
 
 
 @given(arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6)), st.integers(2, 50))

@@ -40,7 +40,8 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
         if channel in topics:
             stamp, log, value, rate = _of_channel(blocks, i)
             use, reasons, reordered = _usable(channel, stamp, log, value)
-            rejected.setdefault(topics[channel], Counter()).update(reasons)
+            # Both joints may come in one message, which is lost once.
+            rejected[topics[channel]] = rejected.get(topics[channel], Counter()) | Counter(reasons)
             if reordered:
                 statement = f"{reordered} messages were recorded out of order and put back in order"
                 findings.append(Finding("out_of_order", topics[channel], statement))

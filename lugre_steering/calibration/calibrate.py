@@ -168,13 +168,13 @@ def chosen(
     if vehicle.hydraulics is not None:
         optional.append(GAIN)
     known = {calibration.name: calibration for calibration in (*calibrations_for(vehicle), *optional)}
+    if vehicle.rubber is not None and vehicle.rubber.heat_transfer_W_m2K == 0.0:
+        del known["cooling"]  # a factor of nothing
     for option, names in (("--free", free), ("--fix", fix), ("--prior", list(prior or {}))):
         for name in names:
             if name not in known:
                 raise DataError(f"{option} {name}: this vehicle has no such parameter; expected {', '.join(known)}")
     standard = {calibration.name for calibration in calibrations_for(vehicle)}
-    if vehicle.rubber is not None and vehicle.rubber.heat_transfer_W_m2K == 0.0:
-        standard.discard("cooling")
     wanted = [c for c in known.values() if (c.name in standard or c.name in free) and c.name not in fix]
     for name in set(free) & set(fix):
         raise DataError(f"--fix {name}: is given to --free too; expected one of them")

@@ -69,7 +69,7 @@ def diagnose_recordings(
         problem = Problem(vehicle, [prepare(quality.recording, vehicle) for quality in qualities])
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
-    travel = max(float(np.ptp(run.theta)) for run in problem.runs) / problem.presliding
+    travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
     roles = split(problem)
     if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
         if travel < MIN_SLIDING:

@@ -38,6 +38,8 @@ class BagTrace:
     contributions: Mapping[str, Array]
     intervals: Mapping[str, tuple[tuple[float, float], ...]]
     coordinates: Mapping[str, Array]
+    heldout_Nm: tuple[float, float] | None = None
+    """Held-out errors of the baseline and with the named effects, where one fit that saw none of these data was judged."""
 
 
 @dataclass(frozen=True)

@@ -214,12 +214,7 @@ def heldout_rows(diagnosis: Diagnosis) -> list[tuple[str, float, float, tuple[fl
             spread = (before * (1.0 - ends[1]), before * (1.0 - ends[0]))
         rows.append(("all bags" if len(diagnosis.traces) > 1 else "held-out data", before, after, spread))
     if len(diagnosis.traces) > 1:
-        for trace in diagnosis.traces:
-            held = np.asarray(trace.held).astype(bool)
-            if held.any():
-                errors = [trace.measured - trace.baseline, trace.measured - trace.augmented]
-                first, second = (float(np.sqrt(np.mean(error[held] ** 2))) for error in errors)
-                rows.append((trace.name, first, second, None))
+        rows += [(trace.name, *trace.heldout_Nm, None) for trace in diagnosis.traces if trace.heldout_Nm is not None]
     return rows
 
 
@@ -254,7 +249,7 @@ def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
             "line": {"color": MEASURED, "width": 1.3, "dash": "dot"}}  # fmt: skip
     words = f"noise floor<br>{shown.number(floor, 3)} {html.escape(unit)}"
     note = _note(words, yref="y", x=1.01, y=floor, xanchor="left", yanchor="middle")
-    layout = _layout(xaxis=_axis("", range=[-0.6, max(len(rows) - 0.4, 1.6)]), yaxis=_axis(f"held-out RMSE [{unit}]",
+    layout = _layout(xaxis=_axis("", type="category", range=[-0.6, max(len(rows) - 0.4, 1.6)]), yaxis=_axis(f"held-out RMSE [{unit}]",
                      rangemode="tozero"), height=360, shapes=[line], annotations=[note], bargap=0.35,
                      margin={"l": 78, "r": 100, "t": 34, "b": 48})  # fmt: skip
     return {"data": data, "layout": layout}

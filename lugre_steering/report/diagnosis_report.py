@@ -269,7 +269,7 @@ def _next_steps(diagnosis: Diagnosis) -> str:
                 f"Do not rely on the name <code>{_text(effect['id'])}</code> alone: with these data {rivals} would "
                 "explain the same. The augmented model predicts well either way."
             )
-    if result["effects"]:
+    if {effect["id"] for effect in result["effects"]} & {entry.id for entry in diagnosis.vehicle.effects}:
         steps.append(
             "Use the found physics: <code>augmented.yaml</code> beside this page is the vehicle file with it. "
             "<code>lugre-steering replay BAG --vehicle augmented.yaml --out DIR</code> shows the smaller residual, and "

@@ -15,8 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lugre_steering import vehicle as vehicle_file
-from lugre_steering.chain.hydraulics import line_gains
-from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
 from lugre_steering.diagnosis.result import finite
 from lugre_steering.diagnosis.search import locate
@@ -27,7 +26,6 @@ from lugre_steering.recording import Array
 from lugre_steering.report import shown
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.simulate.command import make_folder
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
 from lugre_steering.vehicle import Vehicle
@@ -104,16 +102,8 @@ def _ideal_run(vehicle: Vehicle, manoeuvre: Manoeuvre) -> Run:
     motion = motion_of(manoeuvre, vehicle)
     keep = slice(None, None, round(SAMPLE_S / float(motion.time[1] - motion.time[0])))
     torque = plant.run(vehicle, motion).torque
-    pressure = line_pressures(torque, total_gains(vehicle, motion.theta))[:, keep]
-    theta, count = motion.theta[:, keep], motion.time[keep].size
-    gains, turned = line_gains(vehicle, theta), line_gains(vehicle, theta + 1e-4)
-    return Run(
-        name=manoeuvre.name, time=motion.time[keep], theta=theta, omega=motion.rate[:, keep],
-        alpha=motion.acceleration[:, keep], gains=gains, pressure=pressure,
-        side_torque=np.einsum("slt,lt->st", gains, pressure),
-        side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure),
-        measured=torque[keep], sigma=np.ones(count), valid=np.ones(count, bool),
-    )  # fmt: skip
+    rates = motion.rate[:, keep], motion.acceleration[:, keep]
+    return ideal_run(vehicle, manoeuvre.name, motion.time[keep], motion.theta[:, keep], rates, torque[keep], 1.0)
 
 
 def describe(effect: Effect) -> dict[str, Any]:

@@ -47,6 +47,7 @@ RC: Any = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "lines.linewidth": 1.3,
+    "text.parse_math": False,  # names may hold any character
 }
 
 _CAPTION_SIZE = 8.5

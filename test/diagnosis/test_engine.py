@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from lugre_steering.bag import read_recording
+from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.diagnosis.search import fingerprint
@@ -21,6 +22,7 @@ from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import BagError
 from lugre_steering.proof.simulator import Case, CaseData, Concealed, load_sheet, simulate_case, write_case
 from lugre_steering.recording import Recording, Signal
+from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
 from lugre_steering.vehicle import load
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -113,11 +115,11 @@ def test_physics_outside_the_catalogue_is_unlisted(tmp_path: Path) -> None:
     assert result.json["next_experiment"] is not None
 
 
-def cut(recording: Recording, until_s: float) -> Recording:
-    """The first seconds of a recording only."""
+def cut(recording: Recording, until_s: float, since_s: float = 0.0) -> Recording:
+    """Some seconds of a recording only."""
 
     def short(signal: Signal) -> Signal:
-        keep = signal.time_s < until_s
+        keep = (signal.time_s < until_s) & (signal.time_s >= since_s)
         return Signal(signal.time_s[keep], signal.value[keep])
 
     return Recording(
@@ -147,3 +149,13 @@ def test_too_short_a_recording_is_insufficient_and_says_what_to_drive(tmp_path: 
     assert result.json["verdict"] == "insufficient_data"
     assert "double-cycle" in result.json["next_experiment"]["manoeuvre"]
     assert result.vehicle == vehicle
+
+
+def test_the_angle_between_the_tracks_is_no_motion() -> None:
+    """A wiggle at full lock: inner and outer track stand far apart, and neither moves."""
+    vehicle = load(VEHICLE)
+    parts = (Sweep(30.0, 10.0, 1.0), Hold(4.0), *(Sweep(end, 2.0, 1.0) for end in (26.0, 30.0) * 10))
+    whole = coverage.record(vehicle, [Manoeuvre("wiggle", "", parts)], 3)[0]
+    result = diagnose_recordings([cut(whole, np.inf, since_s=6.0)], vehicle)
+    assert result.json["verdict"] == "insufficient_data"
+    assert "presliding lengths" in result.json["statement"]

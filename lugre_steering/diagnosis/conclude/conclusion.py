@@ -47,6 +47,8 @@ def conclude(
         verdict = "consistent"
     effects = named_effects(done, whole, material) if named else []
     vehicle = augmented_vehicle(done, whole, effects)
+    kept = {entry.id for entry in vehicle.effects}
+    ended = [effect["id"] for effect in effects if effect["id"] not in kept]
     baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": judged.before}
     augmented: dict[str, Any] = {
         "rmse_Nm": verify.rmse(problem, final, problem.valid),
@@ -59,7 +61,7 @@ def conclude(
         "schema": SCHEMA,
         "bags": [run.name for run in problem.runs],
         "verdict": verdict,
-        "statement": statement(done, verdict, effects, baseline, augmented, left.text, judged.rotated),
+        "statement": statement(done, verdict, effects, baseline, augmented, left.text, judged.rotated, ended),
         "noise_floor_Nm": done.noise.floor,
         "baseline": baseline,
         "augmented": augmented,
@@ -72,7 +74,7 @@ def conclude(
     return Diagnosis(
         units.in_words(vehicle, finite(json)),
         vehicle,
-        traces(done, whole, final),
+        traces(done, whole, final, None if judged.rotated else found.final if named else found.baseline),
         evidence(done, effects),
         {effect["id"]: CATALOGUE[effect["id"]].coordinate for effect in effects},
     )

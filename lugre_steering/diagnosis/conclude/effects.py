@@ -107,7 +107,7 @@ def _lines(done: Finished, whole: Fit, index: int, item: Found) -> str:
 def _since(done: Finished, candidate: Candidate) -> str:
     """When an effect began that was not there from the start."""
     begun = [
-        f"{run.name} from {since - run.time[0]:.0f} s on" if since <= run.time[-1] else f"not in {run.name}"
+        f"{run.name} from {since:.0f} s on" if since <= run.time[-1] else f"not in {run.name}"
         for run, since in zip(done.problem.runs, candidate.since, strict=False)
         if since > run.time[0]
     ]

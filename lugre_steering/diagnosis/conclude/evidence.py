@@ -10,19 +10,26 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.fitting.fit import Fit
 from lugre_steering.diagnosis.result import BagTrace, Evidence
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.build_up import FALSE_DISCOVERY_RATE
 from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.diagnosis.search.trial import Trial, cost
+from lugre_steering.effects.catalogue import CATALOGUE
 
 
 def evidence(done: Finished, effects: Sequence[dict[str, Any]]) -> tuple[Evidence, ...]:
     """One row per candidate that was screened, from its best variant; ``effects``: the entries that are named."""
     problem, found = done.problem, done.found
     before = cost(problem, found.baseline, done.held)
-    named = {effect["id"] for effect in effects}
+    named = {
+        f"{effect['id']}[{line}]"
+        for effect in effects
+        for line in effect["parameters"]
+        if CATALOGUE[effect["id"]].per_line
+    } | {effect["id"] for effect in effects if not CATALOGUE[effect["id"]].per_line}
     ties = {rival for effect in effects for rival in effect["indistinguishable_from"]}
     trials: dict[str, Trial] = {}
     alone = len(found.baseline.effects) + 1
@@ -40,7 +47,7 @@ def evidence(done: Finished, effects: Sequence[dict[str, Any]]) -> tuple[Evidenc
         if tried is not None and before > 0.0:
             gain = 1.0 - float(np.sqrt(cost(problem, tried.fit, done.held) / before))
         effect_id = score.candidate.effect.id
-        if effect_id in named:
+        if label in named:
             verdict = "named"
         elif effect_id in ties:
             verdict = "cannot be told from the named effect"
@@ -56,8 +63,11 @@ def evidence(done: Finished, effects: Sequence[dict[str, Any]]) -> tuple[Evidenc
     return tuple(rows)
 
 
-def traces(done: Finished, whole: Fit, final: Fit) -> tuple[BagTrace, ...]:
-    """Torques of each bag: measured, recalibrated, by ``final``, and what each effect of ``whole`` contributes."""
+def traces(done: Finished, whole: Fit, final: Fit, judged: Fit | None) -> tuple[BagTrace, ...]:
+    """Torques of each bag: measured, recalibrated, by ``final``, and what each effect of ``whole`` contributes.
+
+    ``judged``: the fit whose held-out errors were judged; None where no single one was.
+    """
     problem = done.problem
     parts = {
         candidate.effect.id: locate.contribution(problem, whole, i) for i, (candidate, _) in enumerate(whole.effects)
@@ -65,9 +75,14 @@ def traces(done: Finished, whole: Fit, final: Fit) -> tuple[BagTrace, ...]:
     found = []
     for bag, run in enumerate(problem.runs):
         piece = slice(problem.edges[bag], problem.edges[bag + 1])
+        held = done.roles.held & (problem.bag == bag)
+        errors = None
+        if judged is not None and held.any():
+            errors = rmse(problem, done.found.baseline, held), rmse(problem, judged, held)
         found.append(BagTrace(
             run.name, run.time, run.measured, done.found.baseline.prediction[piece], final.prediction[piece],
             done.roles.held[piece].astype(float), {key: part[piece] for key, part in parts.items()},
             {key: locate.intervals(run.time, part[piece]) for key, part in parts.items()}, locate.coordinates(run, run.measured),
+            errors,
         ))  # fmt: skip
     return tuple(found)

@@ -13,9 +13,10 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.fitting.fit import Fit
 from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
+from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
 
@@ -56,33 +57,34 @@ def _scaled(manoeuvre: Manoeuvre, factor: float, unit: str) -> Manoeuvre:
     return replace(manoeuvre, description=description, segments=tuple(part(s) for s in manoeuvre.segments))
 
 
-def _run(problem: Problem, manoeuvre: Manoeuvre, sigma: float) -> Run:
-    """The manoeuvre as a run with ideal sensors (nothing measured yet)."""
+def _run(problem: Problem, manoeuvre: Manoeuvre, x: Array, sigma: float) -> Run:
+    """The manoeuvre as a run whose ideal sensors see the baseline at ``x``: effects of sensors and arms act on that."""
     motion = motion_of(manoeuvre, problem.vehicle)
     keep = slice(None, None, max(1, round(SAMPLE_S / (motion.time[1] - motion.time[0]))))
     time, theta = motion.time[keep], motion.theta[:, keep]
     if units.is_linear(problem.vehicle):
         theta = theta + 0.5 * sum(_reach(problem))
     omega = np.gradient(theta, time, axis=1)
-    sides, lines = problem.runs[0].gains.shape[:2]
-    empty = np.zeros((sides, time.size))
-    return Run(
-        name=manoeuvre.name, time=time, theta=theta, omega=omega, alpha=np.gradient(omega, time, axis=1),
-        gains=np.zeros((sides, lines, time.size)), pressure=np.zeros((lines, time.size)), side_torque=empty, side_slope=empty,
-        measured=np.zeros(time.size), sigma=np.full(time.size, sigma), valid=np.ones(time.size, bool),
-    )  # fmt: skip
+    rates = omega, np.gradient(omega, time, axis=1)
+    at_rest = ideal_run(problem.vehicle, manoeuvre.name, time, theta, rates, np.zeros(time.size), sigma)
+    torque = Problem(problem.vehicle, [at_rest], problem.calibrations).predict(0, x)
+    return ideal_run(problem.vehicle, manoeuvre.name, time, theta, rates, torque, sigma)
 
 
 def separation(
     problem: Problem, fit: Fit, first: Sequence[Named], second: Sequence[Named], sigma: float
 ) -> dict[str, float]:
-    """Energy per manoeuvre by which two explanations would differ there, after recalibration, in noise variances."""
+    """Energy per manoeuvre that the cylinders can drive, by which two explanations would differ there, after recalibration, in noise
+    variances."""
     found = {}
     # Where and when they began belongs to the recordings, not to what is driven next.
     first, second = ([(replace(candidate, since=(), bags=None), values) for candidate, values in side] for side in (first, second))
     for manoeuvre in manoeuvres(problem).values():
-        trial = Problem(problem.vehicle, [_run(problem, manoeuvre, sigma)], problem.calibrations)
         x = np.append(fit.x[: len(problem.calibrations)], 0.0)
+        try:
+            trial = Problem(problem.vehicle, [_run(problem, manoeuvre, x, sigma)], problem.calibrations)
+        except DataError:  # these cylinders cannot drive it
+            continue
         difference = trial.predict(0, x, first) - trial.predict(0, x, second)
         base = trial.predict(0, x, first)
         tangent = np.column_stack([_moved(trial, x, j, first) - base for j in range(len(problem.calibrations))])
@@ -111,6 +113,8 @@ def next_experiment(done: Finished, verdict: str, whole: Fit) -> dict[str, Any] 
         if rivals:
             chosen = whole.effects[index]
             energies = separation(done.problem, whole, [chosen], [rivals[0].fit.effects[-1]], done.noise.floor)
+            if not energies:
+                continue
             best, description, energy = recommend(done.problem, energies)
             others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
             return {

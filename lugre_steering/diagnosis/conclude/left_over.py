@@ -27,8 +27,8 @@ TELLING = 0.5
 """Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
 FORMULA = 0.02
 """Share of the held-out energy that a formula must explain to be proposed."""
-LOCATED_SIGMA, LOCATED_SHARE = 2.0, 0.2
-"""Unlisted structure is located where its level over half a second exceeds both: noise levels, and a share of its peak."""
+LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
+"""Unlisted structure is located where its level over so many seconds exceeds both: noise levels, and a share of its peak."""
 
 
 class LeftOver(NamedTuple):
@@ -68,8 +68,9 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     if proposal is not None:
         law = units.law(done.problem.vehicle, proposal.text)
         formula = f"{law} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
+    more = max(excess, slow - nothing)  # the level of the noise may be overstated
     text = (
-        f"{100 * excess / (1.0 + excess):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
+        f"{100 * more / (1.0 + more):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
         f"({100 * share:.0f} % of the residual energy follows it)"
         if loud
         else f"a pattern outside the catalogue foretells {100 * gain:.0f} % of the held-out residual energy"
@@ -96,7 +97,8 @@ def _where(
     for bag, (run, values) in enumerate(zip(problem.runs, axes, strict=True)):
         part = slice(problem.edges[bag], problem.edges[bag + 1])
         if shape is None:
-            smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(50) / 50.0, mode="same"))
+            width = int(np.clip(round(LOCATED_S / (run.time[1] - run.time[0])), 1, run.time.size))
+            smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
             limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
             spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
             piece = residual[part] * (smooth > limit)

@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.fitting.fit import Fit
 from lugre_steering.diagnosis.fitting.problem import Problem, in_threads
-from lugre_steering.diagnosis.search.fingerprint import Score, signature
+from lugre_steering.diagnosis.search.fingerprint import Score, candidates, signature
 from lugre_steering.effects.entry import Parameter
 from lugre_steering.recording import Array
 
@@ -58,7 +58,13 @@ def smallest(
         return parameter, min((size for size in sizes if size is not None), default=None)
 
     names = sorted(variants)
-    return dict(zip(names, in_threads(least, names), strict=True))
+    found = dict(zip(names, in_threads(least, names), strict=True))
+    # What leaves no trace in this recording at all has no score either.
+    known = {*without, *(candidate.effect.id for candidate, _ in baseline.effects)}
+    for candidate in candidates(problem, sorted(known)):
+        if candidate.free:
+            found.setdefault(candidate.effect.id, (candidate.parameter(candidate.free[0]), None))
+    return found
 
 
 def _size(shown: Callable[[float], float], guess: float, bound: float) -> float | None:

@@ -12,9 +12,10 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 
 def statement(
     done: Finished, verdict: str, effects: Sequence[Mapping[str, Any]], baseline: Mapping[str, float],
-    augmented: Mapping[str, Any], left: str, rotated: bool,
+    augmented: Mapping[str, Any], left: str, rotated: bool, ended: Sequence[str],
 ) -> str:
-    """The verdict for a reader who sees nothing else; ``left``: what remains, ``rotated``: see ``verify.Verdict``."""
+    """The verdict for a reader who sees nothing else; ``left``: what remains, ``rotated``: see ``verify.Verdict``,
+    ``ended``: effects that do not act in the last bag."""
     floor, torque = done.torque(done.noise.floor), done.torque
     if verdict == "consistent":
         return (
@@ -33,6 +34,7 @@ def statement(
         for effect in effects
         if effect["indistinguishable_from"]
     ]
+    last = done.problem.runs[-1].name
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
         f"from {torque(baseline['heldout_rmse_Nm'])} to {torque(augmented['heldout_rmse_Nm'])} "
@@ -40,5 +42,6 @@ def statement(
         f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
         + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
+        + (f" {' and '.join(ended)} does not act in {last}, the last recording: augmented.yaml is without." if ended else "")
         + (f" Structure is left: {left}." if left else "")
     )

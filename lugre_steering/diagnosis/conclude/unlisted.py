@@ -58,10 +58,14 @@ def terms(c: Mapping[str, Array], linear: bool = False) -> dict[str, Array]:
 
 
 def _low_pass(value: Array, time: Array, tau: float) -> Array:
+    """First-order low-pass of (n,) values, each recording (its time [s] starts anew) from rest."""
     from scipy.signal import lfilter
 
-    decay = np.exp(-(time[1] - time[0]) / tau)
-    return np.asarray(lfilter([1.0 - decay], [1.0, -decay], value))
+    pieces = []
+    for piece in np.split(np.arange(time.size), np.flatnonzero(np.diff(time) <= 0.0) + 1):
+        decay = np.exp(-(time[piece[1]] - time[piece[0]]) / tau)
+        pieces.append(lfilter([1.0 - decay], [1.0, -decay], value[piece]))
+    return np.concatenate(pieces)
 
 
 def propose(

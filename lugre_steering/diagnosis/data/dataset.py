@@ -12,6 +12,7 @@ from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.diagnosis.data.smoother import smooth_angle
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording, Signal
+from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
 
 MAX_RATE_HZ = 125.0
@@ -103,6 +104,23 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     return Run(
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
+    )  # fmt: skip
+
+
+def ideal_run(vehicle: Vehicle, name: str, time: Array, theta: Array, rates: tuple[Array, Array], torque: Array, sigma: float) -> Run:
+    """A run (n samples) whose perfect sensors see ``torque`` at ``theta`` (sides, n); ``rates``: its first two derivatives."""
+    if vehicle.hydraulics is not None:
+        gains, turned = line_gains(vehicle, theta), line_gains(vehicle, theta + 1e-4)
+        pressure = line_pressures(torque, total_gains(vehicle, theta))
+    else:
+        gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
+        pressure = torque[None, :]
+    omega, alpha = rates
+    return Run(
+        name=name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
+        side_torque=np.einsum("slt,lt->st", gains, pressure),
+        side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure),
+        measured=torque, sigma=np.full(time.size, sigma), valid=np.ones(time.size, bool),
     )  # fmt: skip
 
 

@@ -79,7 +79,8 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
             if channel.kind is not Kind.ANGLE:
                 clean[channel] = _without(signal, finding.intervals_s)
     usable = _with_signals(recording, clean)
-    return Quality((*findings, *inspect_wiring(usable, vehicle)), usable)
+    # One angle sensor for both tracks would say everything twice.
+    return Quality(tuple(dict.fromkeys((*findings, *inspect_wiring(usable, vehicle)))), usable)
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:

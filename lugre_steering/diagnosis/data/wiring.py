@@ -107,7 +107,7 @@ def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
             run = prepare(recording, vehicle)
         except DataError:
             return ()
-        if float(np.ptp(run.theta)) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
+        if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
             return ()
         found = _wrong(recording, vehicle, run)
     if found:

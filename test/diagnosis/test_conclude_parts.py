@@ -1,0 +1,106 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of the conclusion on a small problem whose answer is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_problem import SIGMA, effect, small_problem, weight, with_torque
+
+from lugre_steering.diagnosis.conclude import experiment, left_over, limits, unlisted
+from lugre_steering.diagnosis.conclude.evidence import evidence, traces
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.verify import rmse
+from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.diagnosis.fitting import split
+from lugre_steering.diagnosis.fitting.fit import Fit, fit
+from lugre_steering.diagnosis.fitting.noise import Noise
+from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
+from lugre_steering.diagnosis.search import fingerprint, locate
+from lugre_steering.diagnosis.search.build_up import Search
+from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.effects.catalogue import CATALOGUE
+
+OFFSET = (Candidate(CATALOGUE["pressure_offset"], line="main_a", free=("offset",)), {"offset": 3e5})
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return small_problem()
+
+
+def finished(problem: Problem, baseline: Fit, scores: tuple[Score, ...] = ()) -> Finished:
+    noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(4).standard_normal((4, problem.valid.size)), 0.0)
+    found = Search(baseline, baseline, (), 0.0, 0.0, True, scores, (), None)
+    return Finished(problem, noise, split.split(problem), found)
+
+
+def beginning(run: Run, count: int) -> Run:
+    """Its first samples."""
+    parts = {name: value[..., :count] for name, value in vars(run).items() if isinstance(value, np.ndarray)}
+    return replace(run, name="short", **parts)
+
+
+def test_the_line_that_is_named_stands_alone_in_the_evidence(problem: Problem) -> None:
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [OFFSET]))
+    baseline = fit(hidden, weight(hidden))
+    draws = SIGMA * np.random.default_rng(4).standard_normal((8, hidden.measured.size))
+    scores = fingerprint.screen(hidden, baseline, weight(hidden), draws)
+    entry = {"id": "pressure_offset", "indistinguishable_from": [], "parameters": {"main_a": {"value": 3e5}}}
+    rows = {row.label: row.verdict for row in evidence(finished(hidden, baseline, tuple(scores)), [entry])}
+    assert {label for label, verdict in rows.items() if verdict == "named"} == {"pressure_offset[main_a]"}
+    assert {f"pressure_offset[{line}]" for line in ("main_a", "main_b", "aux_a", "aux_b")} <= set(rows)
+
+
+def test_the_next_experiment_compares_what_the_sensors_would_show(problem: Problem) -> None:
+    """An offset of one line acts through its arm, a slope does not: the difference is neither nothing nor the whole of either."""
+    result = fit(problem, weight(problem))
+    slope = effect("slope_bias", torque=1000.0)
+    assert max(experiment.separation(problem, result, [OFFSET], [], SIGMA).values()) > 1.0
+    arm = effect("moment_arm_error", linear=0.1, quadratic=0.0)
+    apart = experiment.separation(problem, result, [arm], [slope], SIGMA)
+    alone = experiment.separation(problem, result, [arm], [], SIGMA)
+    assert set(apart) == set(alone) == set(experiment.manoeuvres(problem))
+    assert any(abs(apart[name] - alone[name]) > 0.01 * alone[name] for name in apart)
+    assert min(alone.values()) > 0.0
+
+
+def test_what_leaves_no_trace_has_no_limit_and_is_told(problem: Problem) -> None:
+    result, draws = fit(problem, weight(problem)), SIGMA * np.random.default_rng(4).standard_normal((8, problem.measured.size))
+    scores = [score for score in fingerprint.screen(problem, result, weight(problem), draws) if score.candidate.effect.id != "end_stop"]
+    found = limits.smallest(problem, result, weight(problem), scores, ["slope_bias"])
+    assert found["end_stop"][1] is None
+    assert found["viscous_friction"][1] is not None
+    assert not {"slope_bias", "relief_saturation"} & set(found)  # named; without an amplitude of its own
+
+
+@pytest.mark.parametrize("count", [20, 45])
+def test_structure_is_located_in_a_recording_shorter_than_the_window(problem: Problem, count: int) -> None:
+    runs = [problem.runs[0], beginning(problem.runs[1], count)]
+    both = Problem(problem.vehicle, runs)
+    residual = np.where(both.bag == 1, 10.0 * SIGMA, 0.0)
+    done = finished(both, fit(both, weight(both)))
+    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual, None)
+    assert entry["bag"] == "short"
+    assert entry["intervals_s"][0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
+
+
+def test_held_out_errors_of_a_bag_are_those_of_the_fit_that_was_judged(problem: Problem) -> None:
+    baseline = fit(problem, weight(problem))
+    done = finished(problem, baseline)
+    other = replace(baseline, prediction=baseline.prediction + 500.0)  # fitted to all data, say
+    for bag, trace in enumerate(traces(done, other, other, baseline)):
+        own = rmse(problem, baseline, done.roles.held & (problem.bag == bag))
+        assert trace.heldout_Nm == (own, own)
+    assert {trace.heldout_Nm for trace in traces(done, other, other, None)} == {None}
+
+
+def test_each_recording_is_filtered_from_rest() -> None:
+    time = np.concatenate([0.01 * np.arange(400), 0.02 * np.arange(200)])
+    value = np.concatenate([np.ones(400), np.zeros(200)])
+    filtered = unlisted._low_pass(value, time, 1.0)
+    assert filtered[399] == pytest.approx(1.0 - np.exp(-4.0), abs=0.01)
+    assert np.all(filtered[400:] == 0.0)
+    ramp = unlisted._low_pass(np.ones(200), time[400:], 1.0)
+    assert ramp[49] == pytest.approx(1.0 - np.exp(-1.0), abs=0.01)
