@@ -19,6 +19,8 @@ from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
+from lugre_steering.vehicle.effects import WINDOWS
+from lugre_steering.vehicle.sections import Initial
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FILE = CONFIG / "test_vehicle.yaml"
@@ -99,6 +101,8 @@ def with_effects(*entries: tuple[str, dict[str, float]]) -> dict[str, Any]:
         ("carcass_heat_sink", {"conductance": 10.0}, "parameters", "values of capacity"),
         ("static_ageing", {"rate": 0.1}, "parameters", "values of dwell, slip_scale"),
         ("load_transfer", {}, "id", "needs an attitude sensor"),
+        ("surface_patch", {"change": 0.2, "angle_low": 0.2}, "parameters.angle_high", "more than angle_low (0.2), both"),
+        ("surface_patch", {"change": 0.2, "time_start": 9.0, "time_end": 8.0}, "parameters.time_end", "more than time_start (9)"),
     ],
 )
 def test_wrong_effects_are_refused(name: str, values: dict[str, float], key: str, expectation: str) -> None:
@@ -141,12 +145,33 @@ def test_thermal_effects_need_rubber() -> None:
         from_mapping(sheet, FILE)
 
 
+def test_an_arm_needs_a_cylinder() -> None:
+    sheet = changed(JOINT, "effects", [{"id": "moment_arm_error", "parameters": {"linear": 0.1}}])
+    with pytest.raises(VehicleFileError, match="section 'hydraulics', whose cylinders have arms"):
+        from_mapping(sheet, FILE)
+
+
+def test_gravity_along_an_axis_is_refused() -> None:
+    sheet = {**JOINT, "gravity": {"cos_Nm": 5.0, "sin_Nm": 0.0}}
+    assert from_mapping(sheet, FILE).gravity is not None
+    linear = {"name": "position", "unit": "m", "force_unit": "N"}
+    with pytest.raises(VehicleFileError, match=r"key 'gravity'.*effect slope_bias"):
+        from_mapping({**sheet, "coordinate": linear}, FILE)
+
+
+def test_rubber_starts_at_the_reference_temperature_if_nothing_is_said() -> None:
+    vehicle = from_mapping(changed(changed(SHEET, "initial", REMOVE), "friction.reference_temperature_degC", 17.0), FILE)
+    assert vehicle.initial == Initial(17.0, 17.0)
+
+
 def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
     for effect in CATALOGUE.values():
         for bound in ("low", "high"):
             values = {p.name: p.unscaled(p.scaled(getattr(p, bound))) for p in effect.parameters}
             if effect.per_line:
                 values = {"main_a": next(iter(values.values()))}
+            for low, high in WINDOWS.get(effect.id, ()):  # the ends of a range are not equal
+                values |= {high: values[low] + 0.1} if bound == "low" else {low: values[high] - 0.1}
             if effect.observable:
                 from_mapping(with_effects((effect.id, values)), FILE)
 
@@ -206,7 +231,6 @@ MISTAKES = [
     ("rubber.dma_csv", REMOVE, "exactly one of dma_csv"),
     ("rubber.dma", {"temperature_degC": [1.0]}, "not both"),
     ("rubber.density_kg_m3", 0.0, "above 0"),
-    ("initial", REMOVE, "this section"),
     ("hydraulics", REMOVE, "exactly one of 'hydraulics' and 'torque_sensor'"),
     ("torque_sensor", {}, "exactly one of 'hydraulics' and 'torque_sensor'"),
     ("hydraulics.lines", ["main_a", "main_a"], "distinct"),

@@ -6,6 +6,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +26,23 @@ def _keep_compiled_code() -> None:
     package = Path(__file__).resolve().parent.parent
     sources = [*sorted((package / "chain").glob("*.py")), *sorted((package / "estimator").glob("*.py"))]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
-    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    numba.config.CACHE_DIR = str(base / "lugre_steering" / digest)  # type: ignore[attr-defined]
+    for folder in _cache_folders():
+        try:
+            (folder / digest).mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder / digest, os.W_OK | os.X_OK):
+            numba.config.CACHE_DIR = str(folder / digest)  # type: ignore[attr-defined]
+            return
+
+
+def _cache_folders() -> Iterator[Path]:
+    """Where compiled code may be kept: the user's cache, or without one (a service, a container) the temporary folder."""
+    if given := os.environ.get("XDG_CACHE_HOME"):
+        yield Path(given) / "lugre_steering"
+    with suppress(RuntimeError):  # a user without a home
+        yield Path.home() / ".cache" / "lugre_steering"
+    yield Path(tempfile.gettempdir()) / f"lugre_steering-{os.getuid()}"
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):

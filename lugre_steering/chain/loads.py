@@ -19,7 +19,7 @@ def roller_loads(axle: Axle, track: Track) -> Array:
     """Load of each roller [N] (n,): given shares, or two levels of balance levers (R; Liang et al. 2022, eq. 16-20).
 
     P1 = alpha1 F + alpha2 G, P2 = (1 - alpha1) F + (1 - alpha2) G, alpha1 = l2 / (l1 + l2), alpha2 = l4 / (l3 + l4);
-    F1 = beta1 P1, F2 = (1 - beta1) P1, F3 = beta2 P2, F4 = (1 - beta2) P2 in the same way.
+    F1 = beta1 P1, F2 = (1 - beta1) P1, F3 = beta2 P2, F4 = (1 - beta2) P2 in the same way, F1 on the foremost roller.
     """
     rollers = track.rollers
     if rollers.load_share is not None:
@@ -32,7 +32,10 @@ def roller_loads(axle: Axle, track: Track) -> Array:
     axle_load = 0.5 * axle.load_N
     front = alpha_1 * axle_load + alpha_2 * track.weight_N
     rear = (1.0 - alpha_1) * axle_load + (1.0 - alpha_2) * track.weight_N
-    return np.array([beta_1 * front, (1.0 - beta_1) * front, beta_2 * rear, (1.0 - beta_2) * rear])
+    loads = np.empty(4)
+    foremost_first = np.argsort(-np.array(rollers.x_m))
+    loads[foremost_first] = beta_1 * front, (1.0 - beta_1) * front, beta_2 * rear, (1.0 - beta_2) * rear
+    return loads
 
 
 def roller_radii(track: Track) -> Array:

@@ -253,11 +253,13 @@ def torque_in_phases(
 
 
 def _begin_late(before: Records, p: Records, state: Records) -> None:
-    """Effects that are new in ``p`` count time and path from now on, and elements take over what the bristle carries."""
+    """The air takes its new temperature; effects that are new in ``p`` count time and path from now on, and elements take
+    over what the bristle carries."""
 
     def new(field: str) -> bool:
         return bool(before[field][0] == 0.0 != p[field][0])
 
+    state["air_temperature"] += p["air_temperature"] - before["air_temperature"]
     if new("wear_polishing_amount"):
         state["slip"] = 0.0
     if new("ambient_drift_rate"):

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
 
@@ -21,6 +22,13 @@ class SensorCorrection:
     lag_s: float = 0.0
     arm_linear: float = 0.0
     arm_quadratic: float = 0.0
+
+
+def true_angle(vehicle: Vehicle, theta: Array) -> Array:
+    """True angles of what the sensors show (..., n) [rad], with angle_offset and angle_scale: (theta - offset) / (1 + scale)."""
+    found = {effect.id: effect.parameters for effect in vehicle.effects}
+    offset, scale = found.get("angle_offset", {}).get("offset", 0.0), found.get("angle_scale", {}).get("scale", 0.0)
+    return (theta - offset) / (1.0 + scale)
 
 
 def sensor_correction(vehicle: Vehicle) -> SensorCorrection:

@@ -55,6 +55,7 @@ CONFIG = np.dtype(
         ("horizon", np.float64),
         ("start_ns", np.int64),
         ("lagged", np.float64),
+        ("lag_input", np.float64),  # the total that it followed last
         ("lagged_ns", np.int64),
         ("pending_first", np.int64),
         ("pending_count", np.int64),

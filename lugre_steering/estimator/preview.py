@@ -33,7 +33,8 @@ def _planned(core, side, stamp_ns):
 def preview(core, side, stamp_ns):
     """Torque [N m] that this side will need one horizon ahead: along the plan, or at the present rate without one.
 
-    A plan that has run out says nothing about what is ahead, and is not used any more.
+    A plan that has run out says nothing about what is ahead, and is not used any more. Accelerations of a plan are not
+    foreseen: yaw_inertia adds nothing ahead.
     """
     c, motion = core.config[0], core.motion[side]
     if c.horizon <= 0.0:

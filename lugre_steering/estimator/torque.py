@@ -8,6 +8,7 @@ import math
 
 from numba import njit
 
+from lugre_steering.chain.lag import lag_weights
 from lugre_steering.chain.rates import follow
 from lugre_steering.chain.step import step
 from lugre_steering.estimator.admission import restart
@@ -65,10 +66,12 @@ def _complete(core, k, stamp_ns, e):
         e.predicted = e.total
         restart(core, k)
         return
-    if c.lag > 0.0 and c.lagged_ns != 0:
-        c.lagged = e.total + (c.lagged - e.total) * math.exp(-(stamp_ns - c.lagged_ns) * 1e-9 / c.lag)
+    if c.lagged_ns != 0:
+        decay, present, last = lag_weights((stamp_ns - c.lagged_ns) * 1e-9, c.lag)
+        c.lagged = decay * c.lagged + present * e.total + last * c.lag_input
     else:
         c.lagged = e.total
+    c.lag_input = e.total
     c.lagged_ns = stamp_ns
     e.predicted = c.lagged
     if c.pending_count == core.pending.size:

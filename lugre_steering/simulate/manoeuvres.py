@@ -30,7 +30,7 @@ motion."""
 SMOOTHING_S = 0.2
 """Width of each of the two running means that round the corners: rates rise over 0.4 s, accelerations are
 continuous."""
-LONGEST_S = 7200.0
+SHORTEST_S, LONGEST_S = 0.05, 7200.0
 LARGEST_DEG = 60.0
 
 
@@ -183,12 +183,16 @@ def _motion(time: Array, mean: Array, vehicle: Vehicle) -> Motion:
     grid, (smooth,) = _on_grid(time, mean[None, :])
     if vehicle.axle is None:
         return Motion(grid, np.repeat(smooth[None, :], len(vehicle.sides), axis=0))
+    if (largest := float(np.degrees(np.abs(smooth).max()))) > LARGEST_DEG:
+        raise DataError(f"the mean steering angle reaches {largest:.3g} deg, expected at most {LARGEST_DEG:g} deg")
     both = dict(zip(("left", "right"), ackermann(smooth, vehicle.axle), strict=True))
     return Motion(grid, np.stack([both[side] for side in vehicle.sides]))
 
 
 def _on_grid(time: Array, value: Array) -> tuple[Array, Array]:
     """Uniform grid (n,) and the rows of ``value`` on it, corners rounded."""
+    if time[-1] - time[0] < SHORTEST_S:
+        raise DataError(f"the motion lasts {time[-1] - time[0]:g} s, expected at least {SHORTEST_S:g} s")
     grid = np.arange(0.0, time[-1] - time[0] + 0.5 * STEP_S, STEP_S)
     rows = np.stack([np.interp(grid, time - time[0], row) for row in value])
     width = round(SMOOTHING_S / STEP_S)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lugre_steering.effects.sensors import true_angle
 from lugre_steering.recording import Array, Channel, Kind, Signal
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.actuation import line_pressures, total_gains
@@ -45,7 +46,7 @@ def simulate(vehicle: Vehicle, motion: Motion, sensing: Sensing) -> Simulated:
     truth = plant.run(vehicle, motion)
     pressures = np.zeros((0, motion.time.size))
     if vehicle.hydraulics is not None:
-        pressures = line_pressures(truth.torque, total_gains(vehicle, motion.theta))
+        pressures = line_pressures(truth.torque, total_gains(vehicle, true_angle(vehicle, motion.theta)))
     rng = np.random.default_rng(sensing.seed)
     signals: dict[Channel, Signal] = {}
     for channel in vehicle.channels:
@@ -59,8 +60,7 @@ def simulate(vehicle: Vehicle, motion: Motion, sensing: Sensing) -> Simulated:
             row = pressures[vehicle.hydraulics.lines.index(channel.name)]
             signals[channel] = sense_pressure(motion.time, row, channel.name, vehicle, sensing, rng)
         elif channel.kind is Kind.TORQUE:
-            assert vehicle.torque_sensor is not None
-            signals[channel] = sense_torque(motion.time, truth.torque, vehicle.torque_sensor.noise_Nm, sensing, rng)
+            signals[channel] = sense_torque(motion.time, truth.torque, vehicle, sensing, rng)
         elif vehicle.initial is not None:
             at = np.arange(0.0, motion.time[-1], 1.0 / AIR_RATE_HZ)
             signals[channel] = Signal(at, np.full(at.size, vehicle.initial.air_temperature_degC))

@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from lugre_steering.chain.hydraulics import gauge_offset
+from lugre_steering.chain.lag import lagged
 from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, IntArray, Signal
@@ -76,7 +76,7 @@ def sense_pressure(
     the vehicle
     has these effects, then noise and quantisation."""
     correction = sensor_correction(vehicle)
-    seen = lagged(pressure, correction.lag_s)
+    seen = lagged(pressure, STEP_S, correction.lag_s)
     at = instants(float(time[-1]), sensing.pressure_rate_Hz, sensing.jitter_s, rng)
     value = np.interp(at - correction.delay_s, time, seen) + gauge_offset(vehicle)
     value += correction.offset_Pa.get(line, 0.0) + correction.drift_Pa_s.get(line, 0.0) * at
@@ -90,19 +90,14 @@ def sense_pressure(
     return Signal(at, quantised(value, sensing.pressure_resolution_Pa))
 
 
-def sense_torque(time: Array, torque: Array, noise_Nm: float, sensing: Sensing, rng: np.random.Generator) -> Signal:
-    """What a torque sensor records of the true torque (n,) [N m]."""
+def sense_torque(time: Array, torque: Array, vehicle: Vehicle, sensing: Sensing, rng: np.random.Generator) -> Signal:
+    """What the torque sensor records of the true torque (n,) [N m]: lag and late stamps if the vehicle has them, noise."""
+    assert vehicle.torque_sensor is not None
+    correction = sensor_correction(vehicle)
+    seen = lagged(torque, STEP_S, correction.lag_s)
     at = instants(float(time[-1]), sensing.pressure_rate_Hz, sensing.jitter_s, rng)
-    return Signal(at, np.interp(at, time, torque) + noise_Nm * rng.standard_normal(at.size))
-
-
-def lagged(value: Array, tau_s: float) -> Array:
-    """First-order lag on the simulation grid, at rest in the first value."""
-    if tau_s <= 0.0:
-        return value
-    keep = math.exp(-STEP_S / tau_s)
-    out, _ = lfilter([1.0 - keep], [1.0, -keep], value, zi=[keep * value[0]])
-    return np.asarray(out)
+    value = np.interp(at - correction.delay_s, time, seen)
+    return Signal(at, value + vehicle.torque_sensor.noise_Nm * rng.standard_normal(at.size))
 
 
 def nanoseconds(time_s: Array, start_ns: int) -> IntArray:

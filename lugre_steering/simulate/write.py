@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
+from lugre_steering.effects.sensors import true_angle
 from lugre_steering.errors import BagError
 from lugre_steering.recording import TRUTH, Array, IntArray, Kind
 from lugre_steering.simulate.run import Simulated
@@ -87,7 +88,7 @@ def _truth(run: Simulated) -> list[_Topic]:
         return np.stack([np.interp(at, truth.motion.time, row) for row in rows], axis=-1)
 
     torque = seen(truth.torque[None, :])[:, 0]
-    state = (truth.motion.theta, truth.motion.rate, truth.tracks["torque"])
+    state = (true_angle(vehicle, truth.motion.theta), truth.motion.rate, truth.tracks["torque"])
     joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
     topics: list[_Topic] = [
         (f"/{TRUTH}/torque", cdr.WRENCH_STAMPED, stamp, cdr.encode_wrench(stamp, FRAME, torque)),

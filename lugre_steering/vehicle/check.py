@@ -27,6 +27,7 @@ def check(vehicle: Vehicle, reader: Reader) -> None:
     if vehicle.rubber is not None:
         _check_rubber(vehicle, vehicle.rubber, reader)
     _check_sensors(vehicle, reader)
+    _check_gravity(vehicle, reader)
     if vehicle.hydraulics is not None:
         _check_hydraulics(vehicle, vehicle.hydraulics, reader)
     _check_topics(vehicle, reader)
@@ -68,6 +69,12 @@ def _check_sensors(vehicle: Vehicle, reader: Reader) -> None:
     if coordinate.force_unit != UNITS[coordinate.unit]:
         expected = f"'{UNITS[coordinate.unit]}', as the coordinate is in {coordinate.unit}"
         raise fail("coordinate.force_unit", coordinate.force_unit, expected)
+
+
+def _check_gravity(vehicle: Vehicle, reader: Reader) -> None:
+    if vehicle.gravity is not None and vehicle.coordinate.unit != "rad":
+        expected = "no such section for a linear axis, along which a weight is constant (effect slope_bias)"
+        raise reader.fail("gravity", "a section", expected)
 
 
 def _check_topics(vehicle: Vehicle, reader: Reader) -> None:
@@ -138,10 +145,9 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: Reader) -> None:
         raise fail(section, [len(column) for column in columns], "three columns of equal length, at least 3 rows")
     if not all(a < b for a, b in zip(columns[0], columns[0][1:], strict=False)):
         raise fail(f"{section}.{axis}", list(columns[0]), "strictly increasing values")
-    if vehicle.initial is None:
-        raise fail("initial", None, "this section (rubber needs its temperature at the start)")
     law = vehicle.friction or vehicle.contact
     law_section = "friction" if vehicle.friction else "contact"
+    assert vehicle.initial is not None
     for key, value in (
         ("initial.rubber_temperature_degC", vehicle.initial.rubber_temperature_degC),
         (f"{law_section}.reference_temperature_degC", law.reference_temperature_degC if law else math.nan),

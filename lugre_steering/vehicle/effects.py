@@ -13,6 +13,9 @@ from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
 
+WINDOWS = {"surface_patch": (("angle_low", "angle_high"), ("time_start", "time_end"))}
+"""Parameters that are the ends of a range; neither given: everywhere."""
+
 
 def add_effect(
     vehicle: Vehicle, added: EffectEntry, fail: Callable[[str, object, str], LugreSteeringError]
@@ -28,6 +31,8 @@ def add_effect(
         raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.needs}")
     if effect.stage == "thermal" and vehicle.rubber is None:
         raise fail("id", added.id, "a vehicle with the section 'rubber' for a thermal effect")
+    if added.id == "moment_arm_error" and vehicle.hydraulics is None:
+        raise fail("id", added.id, "a vehicle with the section 'hydraulics', whose cylinders have arms")
     before = next((entry for entry in vehicle.effects if entry.id == added.id), None)
     ranges = {p.name: (p.low, p.high) for p in effect.parameters}
     if effect.per_line:
@@ -46,6 +51,10 @@ def add_effect(
     missing = [key for key, (low, high) in ranges.items() if key not in added.parameters and not low <= 0.0 <= high]
     if missing or not added.parameters:
         raise fail("parameters", added.parameters, f"values of {', '.join(missing or ranges) or 'a pressure line'}")
+    for low_key, high_key in WINDOWS.get(added.id, ()):
+        low, high = added.parameters.get(low_key, 0.0), added.parameters.get(high_key, 0.0)
+        if (low, high) != (0.0, 0.0) and not low < high:
+            raise fail(f"parameters.{high_key}", added.parameters.get(high_key), f"more than {low_key} ({low:g}), both of a window given")
     if before is None:
         return vehicle.replace(effects=(*vehicle.effects, added))
     joined = EffectEntry(added.id, {**before.parameters, **added.parameters})

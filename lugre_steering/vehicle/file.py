@@ -16,7 +16,7 @@ from lugre_steering.errors import VehicleFileError
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
 from lugre_steering.vehicle.effects import each_once, with_effects
-from lugre_steering.vehicle.sections import Vehicle
+from lugre_steering.vehicle.sections import Initial, Vehicle
 from lugre_steering.vehicle.tables import embed_tables, with_pavement
 
 SCHEMA = "lugre_steering/vehicle/1"
@@ -35,9 +35,17 @@ def from_mapping(data: object, file: Path) -> Vehicle:
         raise reader.fail("(top level)", data, "a mapping with the keys of a vehicle file")
     if data.get("schema") != SCHEMA:
         raise reader.fail("schema", data.get("schema"), f"'{SCHEMA}'")
-    vehicle = reader.build(Vehicle, embed_tables(data, reader), "")
+    vehicle = _with_initial(reader.build(Vehicle, embed_tables(data, reader), ""))
     check(vehicle, reader)
     return with_pavement(with_effects(vehicle, reader), reader)
+
+
+def _with_initial(vehicle: Vehicle) -> Vehicle:
+    """Rubber and air start at the reference temperature of friction where the file says nothing."""
+    law = vehicle.friction or vehicle.contact
+    if vehicle.initial is not None or vehicle.rubber is None or law is None:
+        return vehicle
+    return vehicle.replace(initial=Initial(law.reference_temperature_degC, law.reference_temperature_degC))
 
 
 def save(vehicle: Vehicle, path: str | Path) -> None:

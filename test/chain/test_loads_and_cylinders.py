@@ -29,6 +29,12 @@ def test_levers_by_hand() -> None:
     np.testing.assert_allclose(loads, [12_800.0, 19_200.0, 7_000.0, 7_000.0])
 
 
+def test_levers_load_the_rollers_from_the_foremost_on_in_whatever_order_they_are_given() -> None:
+    levers = Levers(axle_m=(1.0, 3.0), weight_m=(2.0, 1.0), front_m=(0.3, 0.2), rear_m=(0.25, 0.25))
+    loads = roller_loads(AXLE, track(Rollers(x_m=(-0.6, -0.2, 0.2, 0.6), levers=levers)))
+    np.testing.assert_allclose(loads, [7_000.0, 7_000.0, 19_200.0, 12_800.0])
+
+
 def test_levers_balance_moments() -> None:
     levers = Levers(axle_m=(0.4, 0.5), weight_m=(0.45, 0.45), front_m=(0.2, 0.24), rear_m=(0.22, 0.2))
     front, second, third, rear = roller_loads(AXLE, track(Rollers(x_m=(0.6, 0.2, -0.2, -0.6), levers=levers)))

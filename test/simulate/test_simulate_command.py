@@ -111,6 +111,8 @@ def test_without_matplotlib_the_numbers_are_written_all_the_same(tmp_path: Path,
         (("paper-rate", "--out", "{tmp}", "--seed", "3"), "paper-rate"),
         (("paper-rate", "--out", "{tmp}", "--storage", "sqlite3"), "paper-rate"),
         (("{tmp}/bad.folder.yaml", "--out", "{tmp}"), "bad.folder.yaml"),
+        (("{tmp}/still.yaml", "--out", "{tmp}"), "at least 0.05 s"),
+        (("{tmp}/wide.yaml", "--out", "{tmp}"), "at most 60 deg"),
         (("paper-rate", "--out", "{tmp}", "--effect", "slope_bias:torque=100"), "slope_bias"),
         (("paper-rate", "--out", "{tmp}", "--vehicle", "{tmp}/bad.yaml"), "bad.yaml"),
     ],
@@ -121,6 +123,9 @@ def test_bad_input_ends_with_one_line(tmp_path: Path, arguments: tuple[str, ...]
     (tmp_path / "bad.csv").write_text("time_s,angle_deg\n0,a\n1,2\n", encoding="utf-8")
     (tmp_path / "bad.yaml").write_text("segments: 3", encoding="utf-8")
     (tmp_path / "bad.folder.yaml").mkdir()
+    (tmp_path / "still.yaml").write_text("segments: [{sweep: {to_deg: 0, rate_deg_s: 5}}]", encoding="utf-8")
+    chirp = "{chirp: {amplitude_deg: 60, from_Hz: 0.1, to_Hz: 0.2, duration_s: 10}}"
+    (tmp_path / "wide.yaml").write_text(f"segments: [{{sweep: {{to_deg: 60, rate_deg_s: 20}}}}, {chirp}]", encoding="utf-8")
     code, _, err = invoke(*(a.format(tmp=tmp_path) for a in arguments))
     assert code == 2
     assert err.count("\n") == 1

@@ -26,7 +26,7 @@ from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.actuation import RETURN_PRESSURE_PA, line_pressures, total_gains
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
-from lugre_steering.simulate.write import TRUTH, write_bag
+from lugre_steering.simulate.write import write_bag
 from lugre_steering.vehicle import TorqueSensor, Vehicle
 
 VEHICLE = vehicle_file.load(config_folder() / "test_vehicle.yaml")
@@ -185,9 +185,9 @@ def test_bags_are_labelled_complete_and_equal_in_bytes(tmp_path: Path, storage: 
     with AnyReader([first]) as reader:
         for connection, _, raw in reader.messages():
             messages.setdefault(connection.topic, []).append(reader.deserialize(raw, connection.msgtype))
-    assert [m.data for m in messages.pop(f"{TRUTH}/label")] == ["synthetic: a test"]
+    assert [m.data for m in messages.pop("/synthetic_truth/label")] == ["synthetic: a test"]
     assert {m.header.frame_id for rows in messages.values() for m in rows} == {"synthetic"}
-    torque = messages[f"{TRUTH}/torque"]
+    torque = messages["/synthetic_truth/torque"]
     stamps = np.array([m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec for m in torque])
     value = np.array([m.wrench.torque.z for m in torque])
     true = np.interp(stamps - stamps[0], recorded.truth.motion.time, recorded.truth.torque)

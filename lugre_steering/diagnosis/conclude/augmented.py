@@ -13,6 +13,7 @@ from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.fitting.apply import apply_calibration
 from lugre_steering.diagnosis.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
+from lugre_steering.vehicle.effects import WINDOWS
 
 
 def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]]) -> Vehicle:
@@ -24,6 +25,10 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, An
         if not candidate.active_in(last) or candidate.start(last) > problem.runs[last].time[-1]:
             continue
         keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
+        for low, high in WINDOWS.get(candidate.effect.id, ()):
+            ends = {key: keep.pop(key, 0.0) for key in (low, high)}
+            if ends[low] < ends[high]:  # else everywhere
+                keep |= ends
         if candidate.effect.per_line:
             keep = {candidate.line: float(values[candidate.free[0]])}
         else:  # found again: nothing of its old values stays

@@ -17,6 +17,8 @@ from lugre_steering.vehicle import Vehicle
 
 MAX_RATE_HZ = 125.0
 GAP_S = 0.25
+AIR_S, AIR_STEP_K = 10.0, 0.25
+"""Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Run:
     measured: Array
     sigma: Array
     valid: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    air: tuple[tuple[float, float], ...] = ()
+    """Instants [s] from which the recorded air has another temperature [degC]; before the first, that of the vehicle file."""
 
     @property
     def torque_per_line(self) -> Array:
@@ -104,7 +108,21 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     return Run(
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
+        air=_air(recording.air_temperature, vehicle),
     )  # fmt: skip
+
+
+def _air(recorded: Signal | None, vehicle: Vehicle) -> tuple[tuple[float, float], ...]:
+    """Where the recorded air temperature, averaged over a while, leaves the last one that counts."""
+    if recorded is None or vehicle.initial is None or not recorded.time_s.size:
+        return ()
+    steps, now = [], vehicle.initial.air_temperature_degC
+    edges = np.searchsorted(recorded.time_s, np.arange(recorded.time_s[0], recorded.time_s[-1], AIR_S))
+    for value, time in zip(np.split(recorded.value, edges[1:]), np.split(recorded.time_s, edges[1:]), strict=True):
+        if value.size and abs(float(np.mean(value)) - now) > AIR_STEP_K:
+            now = float(np.mean(value))
+            steps.append((float(time[0]), now))
+    return tuple(steps)
 
 
 def ideal_run(vehicle: Vehicle, name: str, time: Array, theta: Array, rates: tuple[Array, Array], torque: Array, sigma: float) -> Run:
@@ -158,15 +176,3 @@ def _at(time: Array, signal: Signal) -> Array:
             kernel[[0, -1]] *= 0.5
         value = np.convolve(np.pad(value, kernel.size // 2, mode="edge"), kernel, mode="valid")
     return np.interp(time, signal.time_s, value)
-
-
-def lagged(torque: Array, dt: float, tau: float) -> Array:
-    """First-order lag of a uniformly sampled signal, exact for piecewise linear input between samples."""
-    if tau < 0.02 * dt:
-        return torque
-    from scipy.signal import lfilter
-
-    decay = np.exp(-dt / tau)
-    ramp = (1.0 - decay) * tau / dt  # response at the end of a unit ramp is 1 - ramp
-    filtered, _ = lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], torque, zi=[torque[0] * (1.0 - (1.0 - ramp))])
-    return np.asarray(filtered)

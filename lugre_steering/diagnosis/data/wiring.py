@@ -19,9 +19,10 @@ from scipy.signal import correlate
 from scipy.stats import theilslopes
 
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
+from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_side
-from lugre_steering.diagnosis.data.dataset import Run, angle_noise, lagged, prepare
+from lugre_steering.diagnosis.data.dataset import Run, angle_noise, prepare
 from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal

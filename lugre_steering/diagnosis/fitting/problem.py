@@ -13,10 +13,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_in_phases
-from lugre_steering.diagnosis.data.dataset import Run, lagged
+from lugre_steering.diagnosis.data.dataset import Run
 from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
@@ -183,8 +184,11 @@ class Problem:
             record[field] = value
         record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
         phases = []
-        for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects)}):
+        for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)}):
             acting = record.copy()
+            for since, air in run.air:
+                if since <= start:
+                    acting["air_temperature"] = air
             for candidate, values in effects:
                 for name, value in values.items() if candidate.start(bag) <= start else ():
                     field = f"{candidate.effect.id}_{name}"
