@@ -82,19 +82,18 @@ def begin(p, s, theta):
 def distributed(s, d_theta, stiffness, g):
     """distributed_contact: parallel elements of log-normally graded stiffness, each carrying an equal share of g.
 
-    Returns elastic torque [N m], its mean deflection [rad] and its work [J] (Maxwell slip; Iwan 1966).
+    Returns elastic torque [N m], its mean deflection [rad] and what sliding dissipates [J] (Maxwell slip; Iwan 1966).
     """
-    torque, work = 0.0, 0.0
+    torque, dissipated = 0.0, 0.0
     share = g / ELEMENTS
     for i in range(ELEMENTS):
         k = stiffness * s.element_shares[i]
         z = s.elements[i]
         z_next = bristle(z, d_theta, k, share)
         s.elements[i] = z_next
-        work += bristle_work(z, z_next, d_theta, share) - 0.5 * k * (z_next * z_next - z * z)
+        dissipated += bristle_work(z, z_next, d_theta, share) - 0.5 * k * (z_next * z_next - z * z)
         torque += k * z_next
-    mean = torque / stiffness
-    return torque, mean, work + 0.5 * stiffness * (mean * mean - s.z * s.z)
+    return torque, torque / stiffness, dissipated
 
 
 @law
@@ -133,7 +132,8 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     g = level * (g + p.coulomb_torque * aged)
     z = s.z
     if effects and p.distributed_contact_spread != 0.0:
-        elastic, z_next, work = distributed(s, d_theta, stiffness, g)
+        elastic, z_next, work = distributed(s, faster * d_theta, stiffness, g)
+        work = (work + 0.5 * stiffness * (z_next * z_next - z * z)) / faster
     else:
         z_next = bristle(z, faster * d_theta, stiffness, g)
         work = bristle_work(z, z_next, faster * d_theta, g) / faster

@@ -69,6 +69,32 @@ def test_every_effect_parameter_acts(field: str) -> None:
     assert change(torque_side(base, rubber, *motion), torque_side(other, rubber, *motion)) > 1e-6
 
 
+@pytest.mark.parametrize("beside", CHAIN_EFFECTS)
+def test_every_effect_acts_beside_every_other(beside: str) -> None:
+    _, rubber = baseline()
+    motion = cycle()
+    alone = with_effect(beside)
+    torque = torque_side(alone, rubber, *motion)
+    for effect in CHAIN_EFFECTS:
+        if effect != beside:
+            both = alone.copy()
+            for field, value in every_effect().items():
+                if field.startswith(f"{effect}_"):
+                    both[field] = value
+            assert change(torque, torque_side(both, rubber, *motion)) > 1e-6, effect
+
+
+@pytest.mark.parametrize("softening", ["payne_softening", "mullins_softening"])
+def test_softening_stiffens_graded_elements_as_it_does_one_bristle(softening: str) -> None:
+    """Elements that are all alike are the bristle: torque, work and heat are those of it."""
+    _, rubber = baseline()
+    one, graded = with_effect(softening), with_effect(softening)
+    graded["distributed_contact_spread"] = 1e-9
+    outputs = [run_side(p, rubber, *cycle()) for p in (one, graded)]
+    for name in ("torque", "temperature"):
+        np.testing.assert_allclose(outputs[1][name], outputs[0][name], rtol=1e-6, atol=1e-6 * np.abs(outputs[0][name]).max())
+
+
 @pytest.mark.parametrize("field", [f for f in BASELINE_FIELDS if f != "angle_noise"])  # acts in the motion estimate
 def test_every_baseline_parameter_acts(field: str) -> None:
     _, rubber = baseline()
