@@ -159,6 +159,16 @@ def test_gravity_along_an_axis_is_refused() -> None:
         from_mapping({**sheet, "coordinate": linear}, FILE)
 
 
+def test_a_master_curve_must_reach_the_temperatures_of_the_file() -> None:
+    curve = {"frequency_Hz": [1.0, 1e3, 1e6], "storage_modulus_Pa": [1e7, 1e8, 1e9], "loss_modulus_Pa": [1e6, 1e7, 1e8]}
+    wlf = {"c1": 10.0, "c2_K": 50.0, "reference_degC": 20.0}
+    sheet = changed(changed(changed(SHEET, "rubber.dma_csv", REMOVE), "rubber.wlf", wlf), "rubber.master_curve", curve)
+    # 1 Hz at 20 degC is what 10 Hz sees where the shift is 0.1: 20 + 50 / 9 degC.
+    assert from_mapping(changed(sheet, "initial.rubber_temperature_degC", 25.5), FILE).rubber is not None
+    with pytest.raises(VehicleFileError, match=r"initial.rubber_temperature_degC': got 25\.6, expected .*inside .* to 25\.56 degC"):
+        from_mapping(changed(sheet, "initial.rubber_temperature_degC", 25.6), FILE)
+
+
 def test_rubber_starts_at_the_reference_temperature_if_nothing_is_said() -> None:
     vehicle = from_mapping(changed(changed(SHEET, "initial", REMOVE), "friction.reference_temperature_degC", 17.0), FILE)
     assert vehicle.initial == Initial(17.0, 17.0)

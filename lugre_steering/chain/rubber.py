@@ -17,6 +17,8 @@ from lugre_steering.recording import Array
 from lugre_steering.vehicle import Rubber, Wlf
 
 TABLE_STEP_K = 0.1
+WORKING_DEGC = (-40.0, 150.0)
+"""Range of the table where a master curve reaches further."""
 
 ComplexArray = NDArray[np.complex128]
 
@@ -60,11 +62,25 @@ def _equivalent_temperature(rubber: Rubber, temperature: Array, frequency: float
     wlf = rubber.wlf
     if wlf is None:
         raise ValueError("another frequency than the DMA table's needs rubber.wlf")
-    wanted = np.log10(frequency / rubber.dma_frequency_Hz * wlf_shift(temperature, wlf))
-    # Inverse of the WLF law: delta = -c2 s / (c1 + s) for the log shift s, which must stay above -c1.
-    wanted = np.maximum(wanted, 1e-6 - wlf.c1)
-    result: Array = wlf.reference_degC - wlf.c2_K * wanted / (wlf.c1 + wanted)
+    return _shifted_by(np.log10(frequency / rubber.dma_frequency_Hz * wlf_shift(temperature, wlf)), wlf)
+
+
+def _shifted_by(log_shift: Array, wlf: Wlf) -> Array:
+    """Temperature [degC] of a shift: inverse of the WLF law, delta = -c2 s / (c1 + s) for s = log10 aT, which must exceed -c1."""
+    s = np.maximum(log_shift, 1e-6 - wlf.c1)
+    result: Array = wlf.reference_degC - wlf.c2_K * s / (wlf.c1 + s)
     return result
+
+
+def known_range(rubber: Rubber) -> tuple[float, float]:
+    """Temperatures [degC] that the rubber's data cover: those of the DMA table, or that the shift brings onto the master curve."""
+    if rubber.dma is not None:
+        return rubber.dma.temperature_degC[0], rubber.dma.temperature_degC[-1]
+    assert rubber.master_curve is not None
+    assert rubber.wlf is not None
+    ends = np.log10(np.array(rubber.master_curve.frequency_Hz)[[-1, 0]] / rubber.dma_frequency_Hz)
+    low, high = _shifted_by(ends, rubber.wlf)
+    return max(float(low), WORKING_DEGC[0]), min(float(high), WORKING_DEGC[1])
 
 
 def friction_measure(modulus: ComplexArray, law: str) -> Array:
@@ -84,10 +100,7 @@ def ratio_table(rubber: Rubber | None, reference_degC: float, law: str) -> tuple
     """
     if rubber is None:
         return np.ones((2, 2)), -1e6, 2e6
-    if rubber.dma is not None:
-        low, high = rubber.dma.temperature_degC[0], rubber.dma.temperature_degC[-1]
-    else:
-        low, high = min(-40.0, reference_degC), max(150.0, reference_degC)
+    low, high = known_range(rubber)
     temperature = low + TABLE_STEP_K * np.arange(round((high - low) / TABLE_STEP_K) + 1)
     modulus = moduli(rubber, np.asarray(temperature, np.float64))
     reference = moduli(rubber, np.array([reference_degC]))

@@ -145,6 +145,10 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: Reader) -> None:
         raise fail(section, [len(column) for column in columns], "three columns of equal length, at least 3 rows")
     if not all(a < b for a, b in zip(columns[0], columns[0][1:], strict=False)):
         raise fail(f"{section}.{axis}", list(columns[0]), "strictly increasing values")
+    # Imported late because the moduli are those of a vehicle's rubber.
+    from lugre_steering.chain.rubber import known_range
+
+    low, high = known_range(rubber)
     law = vehicle.friction or vehicle.contact
     law_section = "friction" if vehicle.friction else "contact"
     assert vehicle.initial is not None
@@ -152,10 +156,8 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: Reader) -> None:
         ("initial.rubber_temperature_degC", vehicle.initial.rubber_temperature_degC),
         (f"{law_section}.reference_temperature_degC", law.reference_temperature_degC if law else math.nan),
     ):
-        if rubber.dma is not None and not columns[0][0] <= value <= columns[0][-1]:
-            raise fail(
-                key, value, f"a temperature inside the rubber table ({columns[0][0]:g} to {columns[0][-1]:g} degC)"
-            )
+        if not low <= value <= high:
+            raise fail(key, value, f"a temperature inside the rubber table ({low:.4g} to {high:.4g} degC)")
 
 
 def _check_hydraulics(vehicle: Vehicle, hydraulics: Hydraulics, reader: Reader) -> None:

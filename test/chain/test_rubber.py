@@ -11,7 +11,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from reference_model import ReferenceTrack
 
-from lugre_steering.chain.rubber import _equivalent_temperature, friction_measure, moduli, ratio_table, wlf_shift
+from lugre_steering.chain.rubber import (
+    _equivalent_temperature,
+    friction_measure,
+    known_range,
+    moduli,
+    ratio_table,
+    wlf_shift,
+)
 from lugre_steering.vehicle import DmaTable, MasterCurve, Rubber, Wlf
 
 WLF = Wlf(c1=10.17, c2_K=42.01, reference_degC=-61.0)
@@ -66,6 +73,22 @@ def test_table_and_master_curve_agree_with_the_material(frequency: float) -> Non
         np.testing.assert_allclose(found.imag[where], truth.imag[where], rtol=5e-3)
     # Beyond the hottest row the table's last value is held.
     np.testing.assert_allclose(moduli(dma(), T, frequency)[~inside], exact(10.0, np.array(120.0)), rtol=1e-9)
+
+
+def test_a_master_curve_is_known_as_far_as_its_frequencies_reach() -> None:
+    """A shorter curve makes a shorter table, so that a temperature beyond it counts as outside, as with a DMA table."""
+    shortened = master().master_curve
+    kept = slice(50, 181)  # 10**-7 to 10**6 Hz
+    columns = [column[kept] for column in (shortened.frequency_Hz, shortened.storage_modulus_Pa, shortened.loss_modulus_Pa)]
+    short = Rubber(**HEAT, wlf=WLF, master_curve=MasterCurve(*columns))
+    low, high = known_range(short)
+    assert low == -40.0  # the shift reaches further, the table does not
+    assert 10.0 * wlf_shift(np.array([high]), WLF)[0] == pytest.approx(1e-7, rel=1e-6)
+    table, first, step = ratio_table(short, -20.0, "loss_tangent")
+    assert first == low
+    assert first + step * (len(table) - 1) == pytest.approx(high, abs=step)
+    whole, _, _ = ratio_table(master(), -20.0, "loss_tangent")
+    np.testing.assert_allclose(table, whole[: len(table)], rtol=1e-3)
 
 
 def test_another_frequency_needs_wlf() -> None:
