@@ -74,11 +74,6 @@ EFFECTS = (
         per_line=True,
     ),
     Effect(
-        "time_delay", "measurement", 1, "Pressures stamped late or early",
-        "p(t) recorded at t + delay", "clock skew of acquisition devices", "proportional to dM/dt, both signs", "torque rate",
-        (Parameter("delay", "s", "positive: pressures stamped late", 0.01, -0.5, 0.5),), ("pressure_lag", "yaw_inertia"),
-    ),
-    Effect(
         "pressure_lag", "measurement", 1, "Slow pressure sensors or filters",
         "tau dp_m/dt + p_m = p", "first-order lag", "proportional to dM/dt, in transients", "torque rate",
         (Parameter("tau", "s", "time constant", 0.01, 0.0, 2.0),), ("time_delay",),

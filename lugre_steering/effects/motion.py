@@ -41,4 +41,9 @@ EFFECTS = (
         ),
         ("distributed_contact", "backlash"),
     ),
+    Effect(
+        "time_delay", "motion", 1, "Pressures stamped late or early",
+        "p(t) recorded at t + delay", "clock skew of acquisition devices", "proportional to dM/dt, both signs", "torque rate",
+        (Parameter("delay", "s", "positive: pressures stamped late", 0.01, -0.5, 0.5),), ("pressure_lag", "yaw_inertia"),
+    ),
 )  # fmt: skip

@@ -31,9 +31,10 @@ HYDRAULIC = (
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
 REMEMBERED = ("thermal", "motion")
+AT_ONCE = ("time_delay",)
 COUNTING = ("wear_polishing", "pressure_drift", "soil_shear", "static_ageing")
 """Stages and further effects that, begun late, leave another trace than the end of the same always there: heat is remembered for
-minutes, an angle that shifts turns the contact, and path, time, berm and age count from the beginning."""
+minutes, an angle that shifts turns the contact (stamps do not), and path, time, berm and age count from the beginning."""
 NEVER_LATE = ("surface_patch", "mullins_softening")
 """Has its own time window; acts on the first sweep."""
 CEILINGS = (0.8, 0.88, 0.92, 0.95, 0.975, 1.0, 1.02, 1.04, 1.07)
@@ -106,6 +107,10 @@ def _applies(problem: Problem, effect: Effect) -> bool:
     if effect.stage == "thermal" and problem.vehicle.rubber is None:
         return False
     return not (effect.id in HYDRAULIC and problem.vehicle.hydraulics is None)
+
+
+def _remembered(effect: Effect) -> bool:
+    return (effect.stage in REMEMBERED and effect.id not in AT_ONCE) or effect.id in COUNTING
 
 
 def _unit(problem: Problem, relative_to: str) -> float:
@@ -201,7 +206,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
         if candidate.bags is None and candidate.effect.id not in NEVER_LATE:
             for start, after in zip(starts, begun, strict=True):
                 late = replace(candidate, since=start)
-                if candidate.effect.stage in REMEMBERED or candidate.effect.id in COUNTING:
+                if _remembered(candidate.effect):
                     changed = signature(problem, fit, base, late) * weight[:, None]
                 else:
                     changed = columns * after[:, None]
