@@ -35,6 +35,7 @@ from lugre_steering.proof.simulator import (
     recalibrated_variance,
     removable_variance,
     simulate_case,
+    variances_beside,
     write_case,
 )
 from lugre_steering.proof.vehicle_draw import Sheet
@@ -81,6 +82,11 @@ def noise_of(data: CaseData) -> float:
 
 def removable_of(data: CaseData) -> float:
     return float(np.average([removable_variance(bag) for bag in data.bags], weights=[bag.time.size for bag in data.bags]))
+
+
+def ratios_beside(data: CaseData) -> dict[str, float]:
+    """Of each of several effects: the variance that neither recalibration nor the others can imitate, over that of the noise."""
+    return {id_: value / noise_of(data) for id_, value in variances_beside(data).items()} if len(data.hidden) > 1 else {}
 
 
 def seen_noise_variance(data: CaseData, bag: BagData) -> float:
@@ -146,6 +152,7 @@ def run(job: Job) -> Row:
             "name": hiding.name, "kind": hiding.kind, "noise": hiding.noise, "seed": hiding.seed, "version": job.version,
             "wanted_ratio": hiding.ratio, "ratio": recalibrated_variance(data) / noise_of(data) if hiding.effects else 0.0,
             "masked": 1.0 - recalibrated_variance(data) / removable_of(data) if hiding.effects else 0.0,
+            "ratio_beside": ratios_beside(data),
             "strengths": [effect.strength for effect in data.case.effects],
             "truth": truth(data, [bag.name for bag in bags]), "diagnosis": diagnosis, "error": error,
             "seconds": {"making": made - started, "diagnosis": time.perf_counter() - made},

@@ -289,7 +289,10 @@ def board(rows: Sequence[Row], made: Mapping[str, Any]) -> Row:
             "from_0.3": summary(removed(row) for row in clear),
             "by_ratio": {f"{ratio:g}": summary(removed(row) for row in singles if ratio_of(row) == ratio) for ratio in RATIOS},
         },
-        "pairs": {"both": proportion(both(row) == 2 for row in pairs), "one_or_more": proportion(both(row) > 0 for row in pairs)},
+        "pairs": {
+            "both": proportion(both(row) == 2 for row in pairs), "one_or_more": proportion(both(row) > 0 for row in pairs),
+            "both_from_0.3": proportion(both(row) == 2 for row in pairs if min(row["ratio_beside"].values()) >= CLEAR_RATIO),
+        },
         "unlisted": {
             "called_unlisted": proportion(outcome(row) == "unlisted" for row in unlisted_clear),
             "by_ratio": [

@@ -258,7 +258,27 @@ def recalibrated_variance(data: CaseData) -> float:
 
     Linear: the added torque is projected off the tangents of this simulator's own baseline (finite differences of 1 %).
     """
-    added = np.concatenate([bag.torque - bag.torque_without for bag in data.bags])
+    return _off(np.concatenate([bag.torque - bag.torque_without for bag in data.bags]), _tangents(data))
+
+
+def variances_beside(data: CaseData) -> dict[str, float]:
+    """Of each hidden effect, what neither recalibration nor the other effects at any size can imitate of its torque [N2 m2]."""
+    torque = {effect.id: np.concatenate([bag.effect_torque[effect.id] for bag in data.bags]) for effect in data.hidden}
+    tangents = _tangents(data)
+    return {
+        own: _off(row, np.column_stack([tangents, *(other / np.linalg.norm(other) for name, other in torque.items() if name != own)]))
+        for own, row in torque.items()
+    }
+
+
+def _off(torque: Array, columns: Array) -> float:
+    """Mean square of what least squares on the columns leaves."""
+    left = torque - columns @ np.linalg.lstsq(columns, torque, rcond=1e-9)[0]
+    return float(np.mean(left**2))
+
+
+def _tangents(data: CaseData) -> Array:
+    """Changes of the baseline's torque with each of its calibrated parameters, as unit columns (n, parameters)."""
     nothing_moved = _baseline(data, data.vehicle)
     columns = []
     for name in _CALIBRATED:
@@ -266,8 +286,7 @@ def recalibrated_variance(data: CaseData) -> float:
         columns.append(_baseline(data, moved) - nothing_moved)
     tangents = np.stack(columns, axis=1)
     tangents /= np.linalg.norm(tangents, axis=0)
-    left = added - tangents @ np.linalg.lstsq(tangents, added, rcond=1e-9)[0]
-    return float(np.mean(left**2))
+    return tangents
 
 
 def _baseline(data: CaseData, vehicle: TrueVehicle) -> Array:

@@ -55,6 +55,7 @@ def show_board(console: Console, board: Row) -> None:
     for band in board["masked"]:
         scores.add_row(f"right name or tie, masked share {band['masked']}", share(band))
     scores.add_row("both of two effects", share(board["pairs"]["both"]))
+    scores.add_row("  each 0.3 and above beside the other", share(board["pairs"]["both_from_0.3"]))
     scores.add_row("unlisted called unlisted", share(board["unlisted"]["called_unlisted"]))
     scores.add_row("location IoU", median(board["location"]["listed"]))
     scores.add_row("location IoU, unlisted", median(board["location"]["unlisted"]))
@@ -105,6 +106,7 @@ def readme_lines(board: Row) -> list[str]:
         "parameters within 10 %": share(board["parameters"]["within_10_percent"]),
         "95 % interval covers the true parameter": share(board["parameters"]["interval_covers"]),
         "places of local effects with an IoU above 0.7": share(board["location"]["above_0.7"]),
+        "both of two effects, each 0.3 and above beside the other": share(board["pairs"]["both_from_0.3"]),
         **{f"right name or tie, {kind}": share(score) for kind, score in board["disguises"].items()},
         "seconds per diagnosis on one thread": median(board["seconds_per_case"]),
     }

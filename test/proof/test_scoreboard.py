@@ -49,6 +49,7 @@ def row(
     return {
         "name": f"{kind}/{'+'.join(hidden)}/{verdict}/{len(reported)}", "kind": kind, "noise": "white", "seed": 3, "version": "v",
         "wanted_ratio": ratio, "ratio": ratio if hidden else 0.0, "masked": 0.2, "strengths": [1.0] * len(hidden), "error": None,
+        "ratio_beside": dict.fromkeys(hidden, ratio) if len(hidden) > 1 else {},
         "seconds": {"making": 1.0, "diagnosis": 5.0},
         "truth": {
             "effects": [{"id": name, "only_bag": None, "parameters": parameters} for name in hidden],
@@ -154,6 +155,7 @@ def test_board_counts_and_serialises() -> None:
         row(["slope_bias"], FOUND, effect("slope_bias", torque=(410.0, 20.0))), row(["slope_bias"], "consistent", ratio=0.1),
         row(["backlash"], FOUND, effect("end_stop")),
         row(["end_stop", "backlash"], FOUND, effect("end_stop"), effect("backlash"), kind="pair"),
+        row(["end_stop", "slope_bias"], FOUND, effect("end_stop"), kind="pair") | {"ratio_beside": {"end_stop": 1.0, "slope_bias": 0.02}},
         row(["body_mode"], "unlisted_physics", kind="unlisted"), row(["body_mode"], FOUND, effect("backlash"), kind="unlisted"),
     ]  # fmt: skip
     board = scoreboard.board(rows, {"seed": 3})
@@ -165,7 +167,8 @@ def test_board_counts_and_serialises() -> None:
     assert board["naming"]["confusion"] == {
         "slope_bias": {"slope_bias": 1}, "backlash": {"end_stop": 1}, "body_mode": {"unlisted": 1, "backlash": 1},
     }  # fmt: skip
-    assert board["pairs"]["both"]["share"] == 1.0
+    assert board["pairs"]["both"]["share"] == 0.5
+    assert board["pairs"]["both_from_0.3"] == {"share": 1.0, "hits": 1, "of": 1, "ci95": list(scoreboard.interval(1, 1))}
     assert board["unlisted"]["called_unlisted"]["share"] == 0.5
     assert board["effects"]["backlash"]["taken_for"] == {"end_stop": 1}
     met = {target["id"]: target["met"] for target in board["targets"]}

@@ -31,6 +31,7 @@ from lugre_steering.proof.simulator import (
     recalibrated_variance,
     removable_variance,
     simulate_case,
+    variances_beside,
     write_case,
 )
 from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle, draw_vehicle, load_sheet
@@ -296,6 +297,15 @@ def test_recalibration_hides_some_effects_more_than_others(sheet: Sheet) -> None
         left[effect] = recalibrated_variance(data) / np.mean([removable_variance(bag) for bag in data.bags])
     assert left["heat_partition"] < 0.05
     assert 0.1 < left["end_stop"] < 1.0
+
+
+def test_an_effect_beside_another_keeps_only_what_the_other_cannot_imitate(sheet: Sheet) -> None:
+    """Two constants differ by nothing but their arms; an end stop and a constant have little in common."""
+    alike = simulate_case(short_case(Concealed("slope_bias"), Concealed("pressure_offset")), sheet)
+    apart = simulate_case(short_case(Concealed("slope_bias"), Concealed("end_stop")), sheet)
+    alone = recalibrated_variance(simulate_case(short_case(Concealed("slope_bias")), sheet))
+    assert variances_beside(alike)["slope_bias"] < 0.3 * alone
+    assert variances_beside(apart)["slope_bias"] == pytest.approx(alone, rel=0.4)
 
 
 @pytest.mark.parametrize(("seed", "suffix"), [(3, ".db3"), (4, ".mcap")])
