@@ -191,6 +191,8 @@ def test_a_freer_shape_takes_what_a_wrong_law_leaves_and_no_more(problem: Proble
         gain = trial.cost(hidden, wrong, weight(hidden)) - trial.cost(hidden, right, weight(hidden))
         share = flexible.explained(hidden, wrong, weight(hidden), 0) / gain
         assert share > build_up.FREER if taken else share < 0.3
+        left = flexible.beyond(hidden, wrong, weight(hidden), 0, right.prediction - wrong.prediction) / gain
+        assert left < 0.5 * build_up.BEYOND if taken else left > 0.9
 
 
 def test_the_jackknife_widens_where_the_law_is_wrong(problem: Problem) -> None:

@@ -45,8 +45,8 @@ LAST = 0.5
 SLIGHT, SURE = 0.02, 0.3
 """Share of the whole excess that a further effect must explain (no law of the first is truer than that), unless its energy
 is so large against the noise."""
-FREER = 0.7
-"""Share of a further effect's gain that a freer shape of an earlier one may have at most."""
+FREER, BEYOND = 0.7, 0.5
+"""Share of a further effect's gain that a freer shape of an earlier one may have at most, unless it leaves so much of that gain."""
 AGAIN, AGAIN_EFFECTS, AGAIN_EXCESS = 2, 2, 0.3
 """How many other first effects to build up from where none stands, up to how many effects, and the excess from which."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
@@ -189,8 +189,7 @@ def _build_up(
         all_trials += trials
         if before - best.cost < (_slight(start_cost, samples) if steps else OWN_ERROR * samples):
             break
-        freer = max((flexible.explained(problem, current, weight, i) for i in range(len(current.effects))), default=0.0)
-        if freer > FREER * (before - best.cost):
+        if any(_is_shape(problem, weight, current, best, i) for i in range(len(current.effects))):
             break
         rivals = tied(problem, weight, split, best, trials[1:], before, samples)
         best, rivals = simplest(best, rivals, before)
@@ -202,6 +201,14 @@ def _build_up(
         if best.cost - samples < OWN_ERROR * samples:
             break
     return _Built(baseline, first, steps, all_trials)
+
+
+def _is_shape(problem: Problem, weight: Array, current: Fit, best: Trial, index: int) -> bool:
+    """Whether a further effect only makes good the shape of an earlier one."""
+    gain = cost(problem, current, weight) - best.cost
+    if flexible.explained(problem, current, weight, index) <= FREER * gain:
+        return False
+    return flexible.beyond(problem, current, weight, index, best.fit.prediction - current.prediction) < BEYOND * gain
 
 
 def _tried(
