@@ -180,9 +180,9 @@ def test_a_build_up_that_leads_nowhere_begins_again_from_the_best_fingerprint(
 
 
 def test_a_freer_shape_takes_what_a_wrong_law_leaves_and_no_more(problem: Problem) -> None:
-    """A quadratic loss fitted by a linear one is only its shape; an offset beside it is not."""
+    """A quadratic loss fitted by a linear one is only its shape; an inertia beside it is not."""
     x = problem.start()
-    for id_, values, taken in (("line_loss_quadratic", {"c": 3e4}, True), ("slope_bias", {"torque": 300.0}, False)):
+    for id_, values, taken in (("line_loss_quadratic", {"c": 3e4}, True), ("yaw_inertia", {"inertia": 3e3}, False)):
         linear = effect("line_loss_linear", b=2e4)
         truth = [effect(id_, **values)] if taken else [linear, effect(id_, **values)]
         hidden = with_torque(problem, problem.predict_all(x, truth))
