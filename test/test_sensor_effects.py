@@ -95,7 +95,6 @@ def test_the_recorded_air_is_followed_as_by_replay(tmp_path: Path) -> None:
     signals[air] = Signal(at, np.where(at < 60.0, -5.0, 45.0))
     bag = tmp_path / "run"
     write_bag(bag, replace(made, signals=signals), "test")
-    save(sheet, tmp_path / "sheet.yaml")
     windy = sheet.replace(rubber=replace(sheet.rubber, heat_transfer_W_m2K=2000.0))
     save(windy, tmp_path / "windy.yaml")
     recording = read_recording(bag, windy.channels)

@@ -46,7 +46,8 @@ SLIGHT, SURE = 0.02, 0.3
 """Share of the whole excess that a further effect must explain (no law of the first is truer than that), unless its energy
 is so large against the noise."""
 FREER, BEYOND = 0.7, 0.5
-"""Share of a further effect's gain that a freer shape of an earlier one may have at most, unless it leaves so much of that gain."""
+"""Share of a further effect's gain that a freer shape of an earlier one (or recalibration alone, of any gain) may have at most; for a
+shape, unless it leaves so much of that gain."""
 AGAIN, AGAIN_EFFECTS, AGAIN_EXCESS = 2, 2, 0.3
 """How many other first effects to build up from where none stands, up to how many effects, and the excess from which."""
 PATTERN_EXCESS, PATTERN_MARGIN = 0.1, 0.1
