@@ -42,7 +42,11 @@ def _cache_folders() -> Iterator[Path]:
         yield Path(given) / "lugre_steering"
     with suppress(RuntimeError):  # a user without a home
         yield Path.home() / ".cache" / "lugre_steering"
-    yield Path(tempfile.gettempdir()) / f"lugre_steering-{os.getuid()}"
+    shared = Path(tempfile.gettempdir()) / f"lugre_steering-{os.getuid()}"
+    with suppress(OSError):
+        shared.mkdir(mode=0o700, exist_ok=True)
+        if shared.stat().st_uid == os.getuid():  # code that somebody else has put there is never run
+            yield shared
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
