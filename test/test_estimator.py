@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
-from lugre_steering.recording import RATE_LIMIT, Array
+from lugre_steering.recording import Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
@@ -197,15 +197,56 @@ def test_single_bad_angles_are_rejected(value: float, reason: str) -> None:
     assert abs(estimates["total"][-1] - clean["total"][-1]) < 5.0
 
 
-@pytest.mark.parametrize("rate", [math.inf, -math.inf, 1e300, RATE_LIMIT])
-def test_a_rate_that_no_steering_has_counts_as_not_given(rate: float) -> None:
-    absurd, without = Estimator(VEHICLE), Estimator(VEHICLE)
-    for i, m in enumerate(messages(3.0)):
-        e, _ = absurd.push(*m, rate if i % 100 == 50 and m[0] == LEFT else math.nan)
-        expected, _ = without.push(*m)
-        np.testing.assert_array_equal(e["total"], expected["total"])
-    assert list(rejected(absurd)) == ["angle/left"]
-    assert rejected(absurd)["angle/left"]["absurd_rate"] > 0
+def rate_of(message: Message, lag_s: float = 0.0) -> float:
+    """The rate of an angle message [rad/s], as a sensor would give it that is late by ``lag_s``."""
+    share = 1.0 if message[0] == LEFT else 0.95
+    return share * 0.3 * 0.7 * math.cos(((message[1] - T0) * 1e-9 - lag_s) * 0.7)
+
+
+def with_rates(give, duration_s: float = 6.0):  # type: ignore[no-untyped-def]
+    """The estimator and its torques with the rates that ``give`` makes of the number of a message and the message."""
+    estimator, totals = Estimator(VEHICLE), []
+    for i, message in enumerate(messages(duration_s)):
+        rate = give(i, message) if message[0] in (LEFT, RIGHT) else math.nan
+        totals += [float(e["total"]) for e in estimator.push(*message, rate)[0]]
+    return estimator, np.array(totals)
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 0.02])
+@pytest.mark.parametrize("share", [1.0, 1.1, 0.9])
+def test_rates_that_go_with_the_angle_are_used(lag_s: float, share: float) -> None:
+    noise = np.random.default_rng(3).normal(0.0, 0.02, 4000)
+    estimator, totals = with_rates(lambda i, m: share * rate_of(m, lag_s) + noise[i])
+    assert rejected(estimator) == {}
+    _, without = with_rates(lambda i, m: math.nan)
+    assert not np.array_equal(totals, without)
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0, 5.0, 9.9, 11.0, -50.0, math.inf, -math.inf, 1e300])
+def test_single_rates_that_the_angle_contradicts_are_left_out(rate: float) -> None:
+    stream = messages()
+    bad = {i for i, m in enumerate(stream) if m[0] == LEFT and i % 500 > 490}
+    absurd, totals = with_rates(lambda i, m: rate if i in bad else rate_of(m))
+    _, expected = with_rates(lambda i, m: math.nan if i in bad else rate_of(m))
+    np.testing.assert_array_equal(totals, expected)
+    assert rejected(absurd) == {"angle/left": {"absurd_rate": len(bad)}}
+
+
+@pytest.mark.parametrize("give", [
+    pytest.param(lambda i, m: 0.0, id="zeros"),
+    pytest.param(lambda i, m: math.degrees(rate_of(m)), id="degrees"),
+    pytest.param(lambda i, m: -rate_of(m), id="sign"),
+    pytest.param(lambda i, m: 0.5 * rate_of(m), id="half"),
+    pytest.param(lambda i, m: rate_of(m) + 0.1, id="offset"),
+    pytest.param(lambda i, m: rate_of(m, 1.0), id="late"),
+])  # fmt: skip
+def test_rates_that_the_angles_refute_are_no_longer_used(give) -> None:  # type: ignore[no-untyped-def]
+    estimator, totals = with_rates(give)
+    _, without = with_rates(lambda i, m: math.nan)
+    counts = rejected(estimator)
+    assert sorted(counts) == ["angle/left", "angle/right"]
+    assert all(row["absurd_rate"] > 400 for row in counts.values())
+    assert np.sqrt(np.mean((totals - without)[200:] ** 2)) < 0.01 * np.ptp(without)
 
 
 def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:

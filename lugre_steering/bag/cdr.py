@@ -110,8 +110,9 @@ def _layout(raw: bytes, msgtype: str, joints: Sequence[str]) -> _Layout:
     sequences = (cursor.doubles(), cursor.doubles())
     cursor.doubles()  # effort: read only to be sure that the message is whole
     fields: list[tuple[int, int] | None] = []
+    ambiguous = not names and len(set(joints)) > 1  # positions without names cannot be told apart
     for joint in joints:
-        if names and joint and joint not in names:
+        if ambiguous or (names and joint and joint not in names):
             fields.append(None)
             continue
         i = names.index(joint) if joint in names else 0

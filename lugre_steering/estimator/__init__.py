@@ -15,7 +15,7 @@ Rules of time (header stamps only, never arrival times):
   believed when the next sample of the same channel confirms it and, for an angle, the other side is there or jumps as
   well. A jump of both sides back in time starts the estimator anew; a side or line that jumps back alone loses its own
   samples in waiting, nothing else. So does a torque that is no finite number start it anew; ``restart`` counts them.
-* A rate that no steering has, or none that is a number, counts as not given.
+* A rate that is no number counts as not given; so does one that the angles contradict, which is counted (``absurd_rate``).
 """
 
 from lugre_steering.estimator.estimator import PLAN_POINTS, WAITING_RING, Estimator, Options

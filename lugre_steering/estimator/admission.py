@@ -34,6 +34,10 @@ def _clear(ch):
     ch.period_ns = 0
     ch.head = 0
     ch.cursor = 0
+    ch.last_rate = 0.0
+    ch.rate_astray = 0.0
+    ch.travel = 0.0
+    ch.rate_refuted = False
 
 
 @njit

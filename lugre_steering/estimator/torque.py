@@ -12,9 +12,9 @@ from lugre_steering.chain.lag import lag_weights
 from lugre_steering.chain.rates import follow
 from lugre_steering.chain.step import step
 from lugre_steering.estimator.admission import restart
-from lugre_steering.estimator.layout import OVERRUN, RATE, UNPAIRED
+from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
-from lugre_steering.recording import RATE_LIMIT
+from lugre_steering.estimator.rate import believed
 
 MAX_PAIR_TOLERANCE_NS = 50_000_000
 
@@ -87,9 +87,6 @@ def advance(core, k, stamp_ns, value, rate, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
     c, ch = core.config[0], core.channels[k]
     side = ch.index
-    if abs(rate) >= RATE_LIMIT:
-        ch.reasons[RATE] += 1
-        rate = math.nan
     if c.start_ns == 0 or stamp_ns < c.start_ns:
         c.start_ns = stamp_ns
     dt = 0.0
@@ -98,10 +95,13 @@ def advance(core, k, stamp_ns, value, rate, estimates, count):
     else:
         ch.period_ns = stamp_ns - ch.last_ns
         dt = ch.period_ns * 1e-9
+    rate = believed(ch, c, dt, value, rate)
     ch.last_ns = stamp_ns
     ch.last_value = value
     motion = core.motion[side]
+    before = motion.theta if motion.started != 0.0 else value
     follow(motion, dt, value, rate, c.angle_noise)
+    ch.travel += abs(motion.theta - before)
     step(
         core.parameters[side],
         core.state[side],

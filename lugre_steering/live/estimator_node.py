@@ -105,6 +105,8 @@ class SteeringTorqueEstimator(Node):
         self.get_logger().error(f"{type(error).__name__}: {error}", throttle_duration_sec=1.0)
 
     def _joint_state(self, topic: str, wanted: list[tuple[int, str]]) -> Callable[[Any], None]:
+        told_apart = len({joint for _, joint in wanted}) == 1  # without names
+
         def handle(message: Any) -> None:
             names, position, velocity = message.name, message.position, message.velocity
             stamp_ns = _nanoseconds(message.header.stamp)
@@ -112,7 +114,7 @@ class SteeringTorqueEstimator(Node):
             for channel, joint in wanted:
                 if joint in names:
                     i = names.index(joint)
-                elif names:
+                elif names or not told_apart:
                     continue
                 else:
                     i = 0

@@ -179,8 +179,9 @@ def test_namespace_and_shared_joint_states(tmp_path: Path) -> None:
         for i in range(1, 4)
     ]
     wheels = [("/vehicle/joint_states", make.JOINT_STATE, T0 + 9, make.joint_state(T0 + 9, ["wheel"], [7.0]))]
+    nameless = [("/vehicle/joint_states", make.JOINT_STATE, T0 + 8, make.joint_state(T0 + 8, [], [8.0, -8.0]))]
     lines = [("/tractor/steering/pressure/main_a", make.FLUID_PRESSURE, T0 + 5, make.pressure(T0 + 5, 3e5))]
-    folder = make.write(tmp_path / "run", state + wheels + lines)
+    folder = make.write(tmp_path / "run", state + nameless + wheels + lines)
     with Bag(folder) as bag:
         assert bag.match(CHANNELS) == {
             LEFT: "/vehicle/joint_states",

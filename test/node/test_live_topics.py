@@ -98,18 +98,20 @@ def test_both_joints_on_one_topic_in_a_namespace() -> None:
         for i in range(100):
             stamp_ns = T0 + i * 10_000_000
             left, right = 0.1 * math.sin(0.03 * i), 0.09 * math.sin(0.03 * i)
+            rates = [0.3 * math.cos(0.03 * i), 0.27 * math.cos(0.03 * i)]
             names = ["boom", "right_track_steer_joint", "left_track_steer_joint"]
-            world.publish(0, stamp_ns, JointState(name=names, position=[9.0, right, left], velocity=[9.0, 0.2, 0.3]))
-            if i % 10 == 0:  # others may publish joints there too
+            world.publish(0, stamp_ns, JointState(name=names, position=[9.0, right, left], velocity=[9.0, *rates[::-1]]))
+            if i % 10 == 0:  # others may publish joints there too, or forget the names
                 world.publish(0, stamp_ns, JointState(name=["boom"], position=[9.0]))
-            for channel, value, rate in ((0, left, 0.3), (1, right, 0.2)):
+                world.publish(0, stamp_ns + 5_000_000, JointState(position=[left, right]))
+            for channel, value, rate in zip((0, 1), (left, right), rates, strict=True):
                 expected += [float(row["total"]) for row in estimator.push(channel, stamp_ns, value, rate)[0]]
         world.wait(lambda: len(world.heard["torque"]) >= 100)
         np.testing.assert_allclose(column(world.heard["torque"], "wrench.torque.z"), expected, **EXACT)
         _, _, inputs = world.status("rejected")
         levels = [s.level for d in world.heard["diagnostics"] for s in d.status if s.name.endswith("rejected")]
         assert set(levels) == {b"\x00"}
-        assert inputs["/joint_states without a wanted joint"] == "10"
+        assert inputs["/joint_states without a wanted joint"] == "20"
 
 
 def test_late_pressures_give_the_residual_later_in_stamp_order() -> None:
