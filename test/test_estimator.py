@@ -203,11 +203,11 @@ def rate_of(message: Message, lag_s: float = 0.0) -> float:
     return share * 0.3 * 0.7 * math.cos(((message[1] - T0) * 1e-9 - lag_s) * 0.7)
 
 
-def with_rates(give, duration_s: float = 6.0):  # type: ignore[no-untyped-def]
-    """The estimator and its torques with the rates that ``give`` makes of the number of a message and the message."""
+def with_rates(give):  # type: ignore[no-untyped-def]
+    """The estimator and its torques with the rates that ``give`` makes of an angle message."""
     estimator, totals = Estimator(VEHICLE), []
-    for i, message in enumerate(messages(duration_s)):
-        rate = give(i, message) if message[0] in (LEFT, RIGHT) else math.nan
+    for message in messages():
+        rate = give(message) if message[0] in (LEFT, RIGHT) else math.nan
         totals += [float(e["total"]) for e in estimator.push(*message, rate)[0]]
     return estimator, np.array(totals)
 
@@ -215,34 +215,33 @@ def with_rates(give, duration_s: float = 6.0):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("lag_s", [0.0, 0.02])
 @pytest.mark.parametrize("share", [1.0, 1.1, 0.9])
 def test_rates_that_go_with_the_angle_are_used(lag_s: float, share: float) -> None:
-    noise = np.random.default_rng(3).normal(0.0, 0.02, 4000)
-    estimator, totals = with_rates(lambda i, m: share * rate_of(m, lag_s) + noise[i])
+    noise = np.random.default_rng(3).normal(0.0, 0.02, (2, 600))
+    estimator, totals = with_rates(lambda m: share * rate_of(m, lag_s) + noise[m[0], (m[1] - T0) // (10 * MS)])
     assert rejected(estimator) == {}
-    _, without = with_rates(lambda i, m: math.nan)
+    _, without = with_rates(lambda _: math.nan)
     assert not np.array_equal(totals, without)
 
 
 @pytest.mark.parametrize("rate", [1.0, -1.0, 5.0, 9.9, 11.0, -50.0, math.inf, -math.inf, 1e300])
 def test_single_rates_that_the_angle_contradicts_are_left_out(rate: float) -> None:
-    stream = messages()
-    bad = {i for i, m in enumerate(stream) if m[0] == LEFT and i % 500 > 490}
-    absurd, totals = with_rates(lambda i, m: rate if i in bad else rate_of(m))
-    _, expected = with_rates(lambda i, m: math.nan if i in bad else rate_of(m))
+    bad = {(LEFT, T0 + i * 10 * MS) for i in (150, 152, 300, 450)}
+    absurd, totals = with_rates(lambda m: rate if m[:2] in bad else rate_of(m))
+    _, expected = with_rates(lambda m: math.nan if m[:2] in bad else rate_of(m))
     np.testing.assert_array_equal(totals, expected)
-    assert rejected(absurd) == {"angle/left": {"absurd_rate": len(bad)}}
+    assert rejected(absurd) == {"angle/left": {"absurd_rate": 4}}
 
 
 @pytest.mark.parametrize("give", [
-    pytest.param(lambda i, m: 0.0, id="zeros"),
-    pytest.param(lambda i, m: math.degrees(rate_of(m)), id="degrees"),
-    pytest.param(lambda i, m: -rate_of(m), id="sign"),
-    pytest.param(lambda i, m: 0.5 * rate_of(m), id="half"),
-    pytest.param(lambda i, m: rate_of(m) + 0.1, id="offset"),
-    pytest.param(lambda i, m: rate_of(m, 1.0), id="late"),
+    pytest.param(lambda _: 0.0, id="zeros"),
+    pytest.param(lambda m: math.degrees(rate_of(m)), id="degrees"),
+    pytest.param(lambda m: -rate_of(m), id="sign"),
+    pytest.param(lambda m: 0.5 * rate_of(m), id="half"),
+    pytest.param(lambda m: rate_of(m) + 0.1, id="offset"),
+    pytest.param(lambda m: rate_of(m, 1.0), id="late"),
 ])  # fmt: skip
 def test_rates_that_the_angles_refute_are_no_longer_used(give) -> None:  # type: ignore[no-untyped-def]
     estimator, totals = with_rates(give)
-    _, without = with_rates(lambda i, m: math.nan)
+    _, without = with_rates(lambda _: math.nan)
     counts = rejected(estimator)
     assert sorted(counts) == ["angle/left", "angle/right"]
     assert all(row["absurd_rate"] > 400 for row in counts.values())

@@ -294,6 +294,9 @@ def test_a_parameter_file_of_the_node_sets_the_options(tmp_path: Path) -> None:
     (tmp_path / "node.yaml").write_text(PARAMETER_FILE)
     options = read_options(tmp_path / "node.yaml")
     assert options == Options(max_gap_s=1.5, max_rate_rad_s=0.2)
+    nested = PARAMETER_FILE.replace("/front/", "/front:\n  ").replace("  ros__parameters: {ex", "    ros__parameters: {ex")
+    (tmp_path / "nested.yaml").write_text(nested)
+    assert read_options(tmp_path / "nested.yaml") == options
     assert read_options(ROOT / "config" / "estimator_parameters.yaml") == Options()
     bag = make.write(tmp_path / "run", drive())
     command = ["replay", str(bag), "--vehicle", str(VEHICLE), "--out", str(tmp_path / "out"), "--json"]
@@ -313,6 +316,10 @@ def test_a_parameter_file_of_the_node_sets_the_options(tmp_path: Path) -> None:
         ("/**: {ros__parameters: {max_gap_s: 0.0}}", "key '/**.ros__parameters.max_gap_s': got 0.0, expected"),
         ("/**: {ros__parameters: {max_gap_s: soon}}", "key '/**.ros__parameters.max_gap_s': got 'soon', expected a plain number"),
         ("steering_torque_estimator: {ros__parameters: {max_gap: 1.0}}", "no such key; did you mean 'max_gap_s'?"),
+        (
+            f"/a{NODE}: {{ros__parameters: {{max_gap_s: 1.0}}}}\n/b{NODE}: {{ros__parameters: {{max_gap_s: 2.0}}}}",
+            "expected one section of the node 'steering_torque_estimator', not /a/steering_torque_estimator and /b/steer",
+        ),
         ("/**: {ros__parameters: {max_gap_s: 1.0, max_gap_s: 2.0}}", "the key 'max_gap_s' stands twice"),
     ],
 )

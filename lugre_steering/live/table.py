@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -76,14 +76,18 @@ OPTION_TABLE = tuple(
 def read_options(file: Path) -> Options:
     """The estimator's options in a parameter file of the node, as ``ros2 run ... --params-file`` would set them.
 
-    Sections of other nodes, and what concerns the node alone, are left aside. ``ParameterError`` if no section is the node's.
+    Sections of other nodes, and what concerns the node alone, are left aside. ``ParameterError`` if no section is the
+    node's, or several are: which of them was in force, the namespace of the node decided.
     """
     reader = Reader(file, ParameterError)
     content = reader.load()
-    sections = content if isinstance(content, Mapping) else {}
-    own = [key for key in sections if str(key) == "/**" or str(key).split("/")[-1] == NODE]
+    sections = dict(_sections("", content)) if isinstance(content, Mapping) else {}
+    named = [key for key in sections if key.split("/")[-1] == NODE]
+    own = [key for key in sections if key in named or key == "/**"]
     if not own:
-        raise reader.fail("(top level)", ", ".join(map(str, sections)) or content, f"a section '/**' or '{NODE}'")
+        raise reader.fail("(top level)", ", ".join(sections) or content, f"a section '/**' or '{NODE}'")
+    if len(named) > 1:
+        raise reader.fail("(top level)", len(named), f"one section of the node '{NODE}', not {' and '.join(named)}")
     names = {parameter.name for parameter in OPTION_TABLE}
     others = {parameter.name for parameter in TABLE} | set(BY_ROS)
     values: dict[str, object] = {}
@@ -91,9 +95,20 @@ def read_options(file: Path) -> Options:
         section = sections[key]
         given = section.get("ros__parameters") if isinstance(section, Mapping) else None
         if not isinstance(given, Mapping):
-            raise reader.fail(str(key), section, "a mapping 'ros__parameters' in it")
+            raise reader.fail(key, section, "a mapping 'ros__parameters' in it")
         # Under /** a file may set parameters of several nodes at once.
-        kept = {k: v for k, v in given.items() if k in names or (str(key) != "/**" and k not in others)}
+        kept = {k: v for k, v in given.items() if k in names or (key != "/**" and k not in others)}
         reader.build(Options, kept, f"{key}.ros__parameters")
         values |= kept
     return reader.build(Options, values, "ros__parameters")
+
+
+def _sections(prefix: str, content: Mapping[object, object]) -> Iterator[tuple[str, object]]:
+    """Name and content of the sections; a namespace may be a key of its own, with the sections of its nodes in it."""
+    for key, section in content.items():
+        name = prefix + str(key)
+        inside = section if isinstance(section, Mapping) and "ros__parameters" not in section else {}
+        if inside and all(isinstance(inner, Mapping) for inner in inside.values()):
+            yield from _sections(f"{name}/", inside)
+        else:
+            yield name, section
