@@ -15,12 +15,15 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
 from typer.testing import CliRunner
 
+from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import import_table, load_map, read_table
 from lugre_steering.importing.map import UNITS, Csv, to_si
 from lugre_steering.importing.write import outliers
+from lugre_steering.vehicle import load
 
+VEHICLE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
 HEAD = "schema: lugre_steering/import/1\n"
 
 
@@ -270,6 +273,22 @@ def test_the_command_prints_json_and_finds_gaps_and_outliers(tmp_path: Path) -> 
     assert row["gaps_s"] == [[pytest.approx(1.99), pytest.approx(3.0)]]
     assert row["outliers_s"] == pytest.approx([time[50], time[300]])
     assert row["samples"] == 400
+
+
+def test_two_runs_in_one_table_are_not_mixed_into_one(tmp_path: Path) -> None:
+    """Where the time of the table runs back, a reader of the bag sees a clock that was set back."""
+    once = np.arange(0.0, 5.0, 0.01)
+    time, value = np.concatenate([once, once + 0.005]), np.concatenate([0.1 * once, 0.5 - 0.1 * once])
+    rows = "".join(f"{t:.3f},{a:.6f}\n" for t, a in zip(time, value, strict=True))
+    log, map_file = write(tmp_path, "log.csv", "t,a\n" + rows), write(tmp_path, "map.yaml", GOOD)
+    (row,) = import_table(log, map_file, tmp_path / "bag")["channels"]
+    assert row["not_increasing"] == 1
+    found = messages(tmp_path / "bag")["/steering/left/joint_state"]
+    assert [m.position[0] for m in found] == pytest.approx(np.radians(value).tolist(), abs=1e-7)
+    channels = [channel for channel in load(VEHICLE).channels if channel.name == "left"]
+    recording = read_recording(tmp_path / "bag", channels)
+    assert recording.angle["left"].value[:499] == pytest.approx(np.radians(0.1 * once[:499]), abs=1e-7)
+    assert recording.rejected["/steering/left/joint_state"]["backward_stamp"] >= once.size - 2
 
 
 def test_outliers_are_not_found_in_clean_data() -> None:

@@ -146,7 +146,24 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
         ahead = s > following + LATE_NS
         behind = s < reached - LATE_NS
         reject("backward_stamp", ahead | behind)
-    reordered = int((stamp[use] < np.maximum.accumulate(stamp[use])).sum()) if len(use) else 0
+    if len(use):
+        reject("backward_stamp", _doubled(stamp[use]))
+    reordered = int(_late(stamp[use]).sum()) if len(use) else 0
     use = use[np.argsort(stamp[use], kind="stable")]
     reject("duplicate_stamp", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
     return use, reasons, reordered
+
+
+def _late(stamp: IntArray) -> NDArray[np.bool_]:
+    return np.asarray(stamp < np.maximum.accumulate(stamp))
+
+
+def _doubled(stamp: IntArray) -> NDArray[np.bool_]:
+    """Which late messages fill no hole but come between others, as after a clock was set back by less than ``LATE_NS``."""
+    late = _late(stamp)
+    on_time = stamp[~late]
+    if not late.any() or on_time.size < 2:
+        return np.zeros(stamp.size, np.bool_)
+    after = np.clip(np.searchsorted(on_time, stamp), 1, on_time.size - 1)
+    apart = np.minimum(np.abs(stamp - on_time[after - 1]), np.abs(on_time[after] - stamp))
+    return late & (apart > 0) & (apart < 0.6 * float(np.median(np.diff(on_time))))

@@ -255,6 +255,21 @@ def test_a_joint_state_without_names_gives_its_first_position(tmp_path: Path) ->
 # ------------------------------------------------------------------- cleaning
 
 
+def test_a_clock_set_back_a_little_does_not_mix_two_times(tmp_path: Path) -> None:
+    """Half a second back: what then comes between samples that are there already is left out; a late message fills a hole."""
+    stamps = [T0 + i * 10**7 for i in range(100)] + [T0 + i * 10**7 - 5 * 10**8 + 4 * 10**6 for i in range(100, 300)]
+    late = stamps.pop(30)
+    stamps.insert(35, late)
+    messages = [
+        ("/" + LEFT.topic, make.JOINT_STATE, T0 + i * 10**7, make.joint_state(stamp, [LEFT.joint], [1e-3 * i]))
+        for i, stamp in enumerate(stamps)
+    ]
+    recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
+    assert recording.rejected == {"/" + LEFT.topic: {"backward_stamp": 49}}
+    assert recording.angle["left"].value.size == 251
+    assert [f.statement for f in recording.findings] == ["1 messages were recorded out of order and put back in order"]
+
+
 def test_late_messages_are_sorted_and_bad_ones_counted(tmp_path: Path) -> None:
     """Ten good samples at 10 Hz, recorded among every kind of bad one."""
     t = [T0 + i * 10**8 for i in range(10)]
