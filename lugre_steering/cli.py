@@ -17,6 +17,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress, TaskID
 
 from lugre_steering.errors import DataError, LugreSteeringError
@@ -42,7 +43,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def console() -> Console:
     """Where progress and messages go: stderr, so that stdout carries results only."""
-    return Console(stderr=True)
+    return Console(stderr=True, markup=False)
+
+
+def output() -> Console:
+    """Where tables go: stdout. Names of files and vehicles are shown as they are, brackets and all."""
+    return Console(markup=False)
 
 
 @contextmanager
@@ -53,7 +59,7 @@ def progress_bar() -> Iterator[Callable[[str, int, int | None], None]]:
 
         def show(name: str, done: int, total: int | None) -> None:
             if name not in tasks:
-                tasks[name] = bar.add_task(name)
+                tasks[name] = bar.add_task(escape(name))
             bar.update(tasks[name], completed=done, total=total)
 
         yield show
@@ -79,7 +85,7 @@ def step_bar(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
         def show(text: str) -> None:
             nonlocal reached
             reached = max([reached, *(i for i, step in enumerate(steps) if text.startswith(step))])
-            bar.update(task, description=text, completed=reached)
+            bar.update(task, description=escape(text), completed=reached)
 
         yield show
         bar.update(task, completed=len(steps))
@@ -175,7 +181,7 @@ def simulate(
 
     if show_list:
         rows = [dict(zip(("kind", "name", "description"), row, strict=True)) for row in simulation.catalogue()]
-        print_json(rows) if as_json else simulation.show_catalogue(Console())
+        print_json(rows) if as_json else simulation.show_catalogue(output())
         return
     if not what or out is None:
         raise DataError(
@@ -197,10 +203,10 @@ def simulate(
             raise DataError(f"simulate {what}: has its own sampling and noise and writes no bag; expected no such option")
         outcomes = simulation.run_experiments(what, chosen)
         result = simulation.write_outcomes(what, outcomes, out)
-        print_json(result) if as_json else simulation.show_outcomes(Console(), outcomes, out)
+        print_json(result) if as_json else simulation.show_outcomes(output(), outcomes, out)
         raise typer.Exit(0 if result["passed"] else 1)
     result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap")
-    print_json(result) if as_json else simulation.show_run(Console(), result)
+    print_json(result) if as_json else simulation.show_run(output(), result)
 
 
 @command("vehicle")
@@ -217,7 +223,7 @@ def vehicle_(
     read = load(file)
     picture = draw_footprint(read, out) if out is not None else None
     result = {**derive(read), "picture": picture and str(picture)}
-    print_json(result) if as_json else show_vehicle(Console(), result)
+    print_json(result) if as_json else show_vehicle(output(), result)
 
 
 @command("import")
@@ -233,7 +239,7 @@ def import_(
     from lugre_steering.report.imported import show_import
 
     result = import_table(table, map_file, out, storage)
-    print_json(result) if as_json else show_import(Console(), result)
+    print_json(result) if as_json else show_import(output(), result)
 
 
 @command()
@@ -270,7 +276,7 @@ def calibrate(
     if as_json:
         print_json(result)
     else:
-        show_calibration(Console(), result)
+        show_calibration(output(), result)
         print(f"results in {out}")
 
 
@@ -310,12 +316,12 @@ def effects(
     if not effect_id:
         if out is not None:
             raise DataError("effects --out: needs the id of one effect; 'lugre-steering effects' lists them")
-        print_json([card.describe(e) for e in catalogue.CATALOGUE.values()]) if as_json else card.show_list(Console())
+        print_json([card.describe(e) for e in catalogue.CATALOGUE.values()]) if as_json else card.show_list(output())
         return
     effect = catalogue.effect(effect_id)
     traces = card.traces(effect)
     result = card.explain(effect, traces, card.draw(traces, out) if out is not None and traces else None)
-    print_json(result) if as_json else card.show_effect(Console(), effect, result)
+    print_json(result) if as_json else card.show_effect(output(), effect, result)
 
 
 @command()
@@ -339,7 +345,7 @@ def prove(
     if as_json:
         print_json(result)
     else:
-        show_board(Console(), result)
+        show_board(output(), result)
         print(f"results in {out}")
 
 

@@ -31,6 +31,9 @@ IntArray = NDArray[np.int64]
 RATE_LIMIT = 100.0  # rad/s, far beyond any steering: such a rate counts as not given
 
 
+AIR_LIMIT_DEGC = 100.0  # no air is warmer or colder: kelvin, or no temperature at all
+
+
 class Kind(IntEnum):
     """What a channel carries; the number is the code used inside the compiled loop."""
 

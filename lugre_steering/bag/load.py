@@ -14,12 +14,23 @@ from numpy.typing import NDArray
 
 from lugre_steering.bag.reader import Bag, Block
 from lugre_steering.errors import BagError
-from lugre_steering.recording import RATE_LIMIT, Array, Channel, Finding, IntArray, Kind, Recording, Signal, unused_name
+from lugre_steering.recording import (
+    AIR_LIMIT_DEGC,
+    RATE_LIMIT,
+    Array,
+    Channel,
+    Finding,
+    IntArray,
+    Kind,
+    Recording,
+    Signal,
+    unused_name,
+)
 
 LIMITS = {
     Kind.ANGLE: (-np.pi, np.pi),
     Kind.PRESSURE: (-1e9, 1e9),
-    Kind.AIR_TEMPERATURE: (-100.0, 300.0),
+    Kind.AIR_TEMPERATURE: (-AIR_LIMIT_DEGC, AIR_LIMIT_DEGC),
     Kind.TORQUE: (-1e9, 1e9),
 }
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
@@ -166,4 +177,4 @@ def _doubled(stamp: IntArray) -> NDArray[np.bool_]:
         return np.zeros(stamp.size, np.bool_)
     after = np.clip(np.searchsorted(on_time, stamp), 1, on_time.size - 1)
     apart = np.minimum(np.abs(stamp - on_time[after - 1]), np.abs(on_time[after] - stamp))
-    return late & (apart > 0) & (apart < 0.6 * float(np.median(np.diff(on_time))))
+    return np.asarray(late & (apart > 0) & (apart < 0.6 * float(np.median(np.diff(on_time)))))

@@ -8,6 +8,7 @@ about ten times faster, which keeps a replay from spending most of its time on i
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 import struct
 import zlib
@@ -88,7 +89,7 @@ class _Storage(Protocol):
 
 
 class BagWriter:
-    """Writes one rosbag2 folder with metadata.yaml; use as a context manager."""
+    """Writes one rosbag2 folder with metadata.yaml; use as a context manager, which leaves nothing behind if it fails."""
 
     def __init__(
         self,
@@ -121,6 +122,7 @@ class BagWriter:
             self.close()
         else:
             self._storage.abort()
+            shutil.rmtree(self.folder, ignore_errors=True)  # half a recording would stand in the way of the next attempt
 
     def add_topic(self, topic: str, msgtype: str) -> int:
         """Announce a topic of a stock type; returns its number."""

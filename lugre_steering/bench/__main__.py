@@ -12,6 +12,9 @@ NAMES = ("kernel", "replay", "live", "own_error")
 
 def main(arguments: list[str]) -> int:
     """Run the named benchmark with the remaining arguments; without a name, all of them."""
+    if arguments[:1] in (["-h"], ["--help"]):
+        print(f"usage: python -m lugre_steering.bench [{'|'.join(NAMES)}] [--json] [options of the named one: its --help]\n\n{__doc__}")
+        return 0
     if arguments and arguments[0] in NAMES:
         chosen, rest = arguments[:1], arguments[1:]
     elif arguments and not arguments[0].startswith("-"):

@@ -124,7 +124,7 @@ def _run(node: Any, executor: str, results: Connection) -> float:
     gc.freeze()
     used = time.process_time()
     results.send(None)
-    spin(node, executor, fault)
+    spin(node, executor, fault, lambda: 0)
     return time.process_time() - used
 
 
@@ -254,7 +254,7 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--seconds", type=float, default=5.0, help="of each run")
     parser.add_argument("--rounds", type=int, default=2, help="runs of node and echo, by turns, taken together")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    options, _ = parser.parse_known_args(argv)
+    options = parser.parse_args(argv)
     # Alone on a DDS domain of its own.
     os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
     results = []

@@ -151,10 +151,11 @@ def calibrate(
     progress("writing")
     try:
         out.mkdir(parents=True, exist_ok=True)
+        # The record comes first: if the rest is interrupted, it tells the next attempt that all this is ours.
+        _write(result, out / "calibration.json")
         save(with_provenance(done.vehicle, result), out / "calibrated.yaml")
         result["picture"], result["picture_note"] = _picture(done, out / "calibration.png")
-        text = json.dumps(result, indent=2, allow_nan=False)
-        (out / "calibration.json").write_text(text + "\n", encoding="utf-8")
+        _write(result, out / "calibration.json")
     except OSError as error:
         raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     return result
@@ -372,6 +373,10 @@ def with_provenance(vehicle: Vehicle, result: Mapping[str, Any]) -> Vehicle:
         "sheet_values": {row["key"]: row["sheet"] for row in result["parameters"]},
     }
     return vehicle.replace(provenance={**vehicle.provenance, "calibration": note})
+
+
+def _write(result: Mapping[str, Any], file: Path) -> None:
+    file.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:

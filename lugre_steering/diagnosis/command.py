@@ -23,6 +23,9 @@ STEPS = (
 """The words with which the steps of a diagnosis announce themselves, in order."""
 
 
+PICTURES = ("before_after_*.png", "residual_*.png", "evidence.png", "heldout.png")
+
+
 def run(
     bags: Sequence[Path],
     vehicle_file: Path,
@@ -43,7 +46,8 @@ def run(
     for bag in bags:
         if not bag.exists():
             raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
-    old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html"), vehicle_file)
+    pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
+    old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -21,7 +21,7 @@ from lugre_steering.estimator.layout import (
     SPIKE,
     ZERO,
 )
-from lugre_steering.recording import Kind
+from lugre_steering.recording import AIR_LIMIT_DEGC, Kind
 
 CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
 
@@ -100,7 +100,7 @@ def admit(core, k, stamp_ns, value):
     if (ch.kind == Kind.ANGLE and abs(value) > c.max_angle) or (ch.kind == Kind.PRESSURE and abs(value) > c.max_pressure):
         ch.reasons[ABSURD] += 1
         return False
-    if (ch.kind == Kind.AIR_TEMPERATURE and not -100.0 < value < 100.0) or abs(value) > 1e12:
+    if (ch.kind == Kind.AIR_TEMPERATURE and abs(value) > AIR_LIMIT_DEGC) or abs(value) > 1e12:
         ch.reasons[ABSURD] += 1
         return False
     if ch.last_ns == 0:

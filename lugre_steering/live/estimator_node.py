@@ -91,6 +91,7 @@ class SteeringTorqueEstimator(Node):
         """``handle``, made unable to end the node: an exception would escape spin."""
 
         def callback(*message: Any) -> None:
+            self.health.callbacks += 1
             try:
                 handle(*message)
             except Exception as error:
@@ -160,7 +161,7 @@ class SteeringTorqueEstimator(Node):
             self._publish(estimates[0], begin_ns)
         for residual in residuals:
             if self.outputs.residual(residual):
-                health.add_residual(float(residual["residual"]))
+                health.add_residual(float(residual["residual"]), float(residual["measured_torque"]))
             else:
                 health.withheld["residual is not a finite number"] += 1
 

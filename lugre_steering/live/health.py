@@ -11,12 +11,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from lugre_steering.recording import NODE, Kind
+from lugre_steering.chain.model import baseline_parameters
+from lugre_steering.recording import NODE, Array, Kind
 from lugre_steering.vehicle import Vehicle
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 FAULT_HOLD_NS = 1_000_000_000
 RESIDUAL_SECONDS = 10
+LARGE_SHARE = 0.7
+"""A residual of this share of the torque (both root mean square) is rather a fault of the wiring than missing physics."""
+NOTABLE_SHARE = 0.05
+"""Of the static friction: below, the torque is too small to compare with."""
 
 
 class Window:
@@ -55,6 +60,7 @@ class Health:
         self.behind_ns = [0] * len(self._kinds)  # ROS time minus stamp of the last message
         self.arrival_to_publish = Window(window)
         self.stamp_to_publish = Window(window)
+        self.callbacks = 0
         self.estimates = 0
         self.residuals = 0
         self.withheld: Counter[str] = Counter()  # outputs not published, by reason
@@ -63,8 +69,9 @@ class Health:
         self.exceptions = 0
         self.last_exception = ""
         self._fault_ns = -FAULT_HOLD_NS
-        self._squares = 0.0
-        self._levels: deque[tuple[float, int]] = deque(maxlen=RESIDUAL_SECONDS)
+        self._notable_Nm = NOTABLE_SHARE * len(vehicle.sides) * baseline_parameters(vehicle)["static_torque"]
+        self._squares = np.zeros(2)  # of residual and of estimate
+        self._levels: deque[tuple[Array, int]] = deque(maxlen=RESIDUAL_SECONDS)
         self._then: Mapping[str, int] = {}
         self._then_arrivals = list(self.arrivals)
         self._then_residuals = 0
@@ -86,9 +93,9 @@ class Health:
     def faulty(self, monotonic_ns: int) -> bool:
         return self.exceptions > 0 and monotonic_ns - self._fault_ns < FAULT_HOLD_NS
 
-    def add_residual(self, residual: float) -> None:
+    def add_residual(self, residual: float, measured: float) -> None:
         self.residuals += 1
-        self._squares += residual * residual
+        self._squares += residual * residual, (measured - residual) ** 2
 
     def statuses(
         self,
@@ -159,19 +166,22 @@ class Health:
 
     def _residual(self, saturated_steps: int) -> DiagnosticStatus:
         self._levels.append((self._squares, self.residuals - self._then_residuals))
-        self._squares, self._then_residuals = 0.0, self.residuals
+        self._squares, self._then_residuals = np.zeros(2), self.residuals
         count = sum(n for _, n in self._levels)
-        rms = math.sqrt(sum(squares for squares, _ in self._levels) / count) if count else math.nan
+        rms, estimate = (np.sqrt(sum(s for s, _ in self._levels) / count) if count else np.full(2, math.nan)).tolist()
+        large = estimate > self._notable_Nm and rms > LARGE_SHARE * estimate
         saturated = saturated_steps > self._then_saturated
         self._then_saturated = saturated_steps
         message = "rubber temperature outside the rubber table" if saturated else ""
+        if large:
+            message = "; ".join(filter(None, [message, "residual as large as the torque: check units, signs, plugs; then diagnose"]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
         values: dict[str, object] = {
             f"RMS over {RESIDUAL_SECONDS} s [N m]": rms,
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
-        return self._status("residual", WARN if saturated or not count else OK, message, values)
+        return self._status("residual", WARN if saturated or large or not count else OK, message, values)
 
     def _outputs(self, monotonic_ns: int) -> DiagnosticStatus:
         faulty = self.faulty(monotonic_ns) or self.exceptions > self._then_exceptions  # every exception is told once

@@ -29,7 +29,7 @@ def planned_angles(message: JointTrajectory, joints: Sequence[str], latest_ns: i
     if missing:
         raise DataError(f"no joint {', '.join(missing)} in it")
     if len(message.points) > PLAN_POINTS:
-        raise DataError(f"{len(message.points)} points, more than {PLAN_POINTS}")
+        raise DataError(f"more than {PLAN_POINTS} points")
     start_ns = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec or latest_ns
     if not start_ns:
         raise DataError("no stamp, and no angle before it to count from")
@@ -37,7 +37,7 @@ def planned_angles(message: JointTrajectory, joints: Sequence[str], latest_ns: i
     times, angles = [], []
     for point in message.points:
         if len(point.positions) != len(message.joint_names):
-            raise DataError(f"{len(point.positions)} positions for {len(message.joint_names)} joints")
+            raise DataError("a point without a position for each joint")
         times.append(start_ns + point.time_from_start.sec * 1_000_000_000 + point.time_from_start.nanosec)
         angles.append([point.positions[column] for column in columns])
     if any(not math.isfinite(angle) or abs(angle) > math.pi for row in angles for angle in row):

@@ -7,6 +7,7 @@ from __future__ import annotations
 import gc
 import signal
 import sys
+import time
 from collections.abc import Callable
 
 import rclpy
@@ -21,6 +22,8 @@ from lugre_steering.errors import LugreSteeringError
 from lugre_steering.live.estimator_node import SteeringTorqueEstimator
 
 _SLICE_S = 0.5  # how long a shutdown that came between check and spin may go unnoticed
+_FAULTS = 100  # of the middleware in a row, and no callback between: a supervisor must know
+_BREATH_S = 0.05  # after such a fault
 
 
 def run(args: list[str]) -> int:
@@ -35,7 +38,8 @@ def run(args: list[str]) -> int:
         # What exists now lives until the end: a collection during a callback need not look at it.
         gc.collect()
         gc.freeze()
-        spin(node, node.settings.executor, node.fault)
+        if not spin(node, node.settings.executor, node.fault, lambda: node.health.callbacks):
+            return _refused(RuntimeError(f"no callback runs any more; the last of {_FAULTS} faults: {node.health.last_exception}"))
     except (LugreSteeringError, ParameterException, RCLError) as error:  # rclpy's: its own parameters, names of topics
         return _refused(error)
     finally:
@@ -48,23 +52,35 @@ def _refused(error: BaseException) -> int:
     return 2
 
 
-def spin(node: Node, executor_kind: str, fault: Callable[[Exception], None]) -> None:
-    """Run callbacks until shutdown; what the middleware raises between them goes to ``fault``, not out of the node."""
+def spin(node: Node, executor_kind: str, fault: Callable[[Exception], None], callbacks: Callable[[], int]) -> bool:
+    """Run callbacks until shutdown; what the middleware raises between them goes to ``fault``, not out of the node.
+
+    False if it raises again and again and no callback runs any more, as the count of ``callbacks`` tells.
+    """
     executor = make_executor(executor_kind)
     executor.add_node(node)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: None)  # rclpy's handlers, put before these, shut the context down
     install_signal_handlers(SignalHandlerOptions.ALL)
     try:
-        while rclpy.ok():
-            _spin_some(executor, fault)
+        faults = 0
+        while rclpy.ok() and faults < _FAULTS:
+            before = callbacks()
+            sound = _spin_some(executor, fault)
+            if sound or callbacks() > before:
+                faults = 0
+            else:
+                faults += 1
+                time.sleep(_BREATH_S)
     except ExternalShutdownException:
-        pass
+        return True
     finally:
         executor.shutdown()
+    return faults < _FAULTS
 
 
-def _spin_some(executor: Executor, fault: Callable[[Exception], None]) -> None:
+def _spin_some(executor: Executor, fault: Callable[[Exception], None]) -> bool:
+    """Whether nothing was raised."""
     try:
         # Not spin(): the one of EventsExecutor in rclpy 7.1 keeps a core busy and ignores SIGTERM.
         executor.spin_until_future_complete(Future(), timeout_sec=_SLICE_S)
@@ -72,6 +88,8 @@ def _spin_some(executor: Executor, fault: Callable[[Exception], None]) -> None:
         raise
     except Exception as error:
         fault(error)
+        return False
+    return True
 
 
 def make_executor(kind: str) -> Executor:

@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from lugre_steering.proof.campaign import RATIOS
 
@@ -39,7 +40,7 @@ def show_board(console: Console, board: Row) -> None:
         targets.add_column(name, justify="left" if name == "score" else "right")
     for target in board["targets"]:
         reached = "-" if target["reached"] is None else f"{target['reached']:.2f}"
-        met = {None: "", True: "[green]met[/green]", False: "[red]not met[/red]"}[target["met"]]
+        met = {None: Text(), True: Text("met", "green"), False: Text("not met", "red")}[target["met"]]
         targets.add_row(target["what"], reached, f"{target['target']:.2f}", met)
     console.print(targets)
     scores = Table("score", "share (count, 95 % interval) or median (quartiles, count)")

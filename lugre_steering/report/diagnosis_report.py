@@ -441,7 +441,9 @@ def _left(diagnosis: Diagnosis) -> str:
 def _experiment(diagnosis: Diagnosis) -> str:
     advice = diagnosis.json["next_experiment"]
     if not advice:
-        return '<p class="note">None is needed to settle what was found.</p>'
+        insufficient = diagnosis.json["verdict"] == "insufficient_data"
+        words = "The data come first: put right what is told above." if insufficient else "None is needed to settle what was found."
+        return f'<p class="note">{words}</p>'
     return _pairs(
         [
             ("manoeuvre", f"<strong>{_text(advice['manoeuvre'])}</strong>"),
@@ -487,9 +489,14 @@ def _baseline(diagnosis: Diagnosis) -> str:
             unit = units.label(vehicle, key.unit)
             rows.append([f"<code>{_text(key.key)}</code>", shown.number(value), "" if unit == "1" else _text(unit)])
     made = [(_text(name.replace("_", " ")), _plain(value)) for name, value in vehicle.provenance.items()]
+    words = (
+        "Nothing was fitted: these are the values of the vehicle file, as they were."
+        if diagnosis.json["verdict"] == "insufficient_data"
+        else "The published model with these values is what missing physics was judged against, so that a wrong friction "
+        "level is never reported as physics. They stand in <code>augmented.yaml</code>."
+    )
     return (
-        "<p>The published model with these values is what missing physics was judged against, so that a wrong friction "
-        "level is never reported as physics. They stand in <code>augmented.yaml</code>.</p>\n"
+        f"<p>{words}</p>\n"
         + (_table(["key of the vehicle file", "value", "unit"], rows, (1,), narrow=True) if rows else "")
         + (_pairs(made) if made else "")
     )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.diagnosis.data.dataset import Run, ideal_run
@@ -196,7 +197,7 @@ def show_list(console: Console) -> None:
         if stage and effect.stage != stage:
             table.add_section()
         stage = effect.stage
-        shows = effect.trace if effect.observable else f"[yellow]not observable: needs {effect.needs}[/yellow]"
+        shows = effect.trace if effect.observable else Text(f"not observable: needs {effect.needs}", "yellow")
         table.add_row(effect.id, effect.stage, str(effect.tier), effect.title, shows)
     console.print(table)
     console.print("'lugre-steering effects ID' explains one; with --out DIR it draws its signature.", highlight=False)
@@ -204,7 +205,7 @@ def show_list(console: Console) -> None:
 
 def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> None:
     """One entry in full."""
-    console.print(f"[bold]{effect.title}[/bold] ({effect.id})", highlight=False)
+    console.print(Text.assemble((effect.title, "bold"), f" ({effect.id})"), highlight=False)
     facts = Table.grid(padding=(0, 2))
     facts.add_column(no_wrap=True, style="dim")
     facts.add_column(overflow="fold")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.table import Table
+from rich.text import Text
 
 from lugre_steering.simulate.paper.outcome import Outcome
 
@@ -67,7 +68,7 @@ def checks_table(outcomes: Sequence[Outcome]) -> Table:
     table.add_column("", no_wrap=True)
     for outcome in outcomes:
         for check in outcome.checks:
-            verdict = "[green]pass[/green]" if check.passed else "[red]FAIL[/red]"
+            verdict = Text("pass", "green") if check.passed else Text("FAIL", "red")
             table.add_row(outcome.name.removeprefix("paper-"), check.claim, check.published, check.ours, verdict)
     return table
 

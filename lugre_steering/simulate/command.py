@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
@@ -156,6 +157,6 @@ def show_outcomes(console: Console, outcomes: Sequence[Outcome], out: Path) -> N
     console.print(f"Calibrated to the four published extremes: {fitted}")
     for outcome in outcomes:
         for note in outcome.notes:
-            console.print(f"[bold]{outcome.name}[/bold] differs or assumes: {note}")
+            console.print(Text.assemble((outcome.name, "bold"), f" differs or assumes: {note}"))
     passed = sum(check.passed for outcome in outcomes for check in outcome.checks)
     console.print(f"{passed} of {sum(len(o.checks) for o in outcomes)} statements pass; tables and figures in {out}")

@@ -336,7 +336,7 @@ def test_one_wild_stamp_does_not_outdate_the_rest(tmp_path: Path) -> None:
 
 def test_absurd_values_of_every_kind(tmp_path: Path) -> None:
     messages = []
-    for i, (p, c, n) in enumerate([(1e5, 20.0, 5.0), (2e9, -101.0, np.nan), (-2e9, 301.0, 1e10)], start=1):
+    for i, (p, c, n) in enumerate([(1e5, 20.0, 5.0), (2e9, -101.0, np.nan), (-2e9, 288.15, 1e10)], start=1):
         t = T0 + i * 10**8
         messages.append(("/" + MAIN_A.topic, make.FLUID_PRESSURE, t, make.pressure(t, p)))
         messages.append(("/" + AIR.topic, make.TEMPERATURE, t, make.temperature(t, c)))

@@ -122,7 +122,7 @@ def test_nothing_written_is_still_a_bag(tmp_path: Path, storage: str) -> None:
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_a_failed_replay_leaves_what_was_written(tmp_path: Path, storage: str) -> None:
+def test_a_failed_writer_leaves_nothing_behind(tmp_path: Path, storage: str) -> None:
     def failing() -> None:
         with BagWriter(tmp_path / "out", storage) as writer:
             topic = writer.add_topic("/a", make.TEMPERATURE)
@@ -131,7 +131,7 @@ def test_a_failed_replay_leaves_what_was_written(tmp_path: Path, storage: str) -
 
     with pytest.raises(RuntimeError, match="stopped"):
         failing()
-    assert not (tmp_path / "out" / "metadata.yaml").exists()
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_existing_folder_is_never_overwritten(tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ SHEET = load_sheet(SHEET_FILE)
 LINES = ("main_a", "main_b", "aux_a", "aux_b")
 CONFORMANCE = Path(__file__).resolve().parents[3] / "shared" / "conformance"
 LEFT, RIGHT = "steering/left/joint_state", "steering/right/joint_state"
+AIR = "steering/ambient_temperature"
 PRESSURE = {line: f"steering/pressure/{line}" for line in LINES}
 EVERY_LINE = ", ".join(PRESSURE.values())
 RIG = Vehicle(
@@ -370,6 +371,12 @@ def test_one_angle_in_degrees_that_reading_refused(prefix: str, sound: Recording
     quality = inspect(bad, VEHICLE)
     assert ("unit_suspect", LEFT) in names(quality.blocking)
     assert ("rejected_samples", LEFT) in names(quality.findings)
+
+
+def test_air_in_kelvin_that_reading_refused(sound: Recording) -> None:
+    (found,) = inspect(replace(sound, rejected={"/" + AIR: {"absurd_value": 54}}), VEHICLE).findings
+    assert (found.finding, found.topic) == ("rejected_samples", AIR)
+    assert "kelvin" in found.statement
 
 
 def test_small_angles_in_degrees() -> None:

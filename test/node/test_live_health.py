@@ -74,6 +74,22 @@ def test_stale_pressures_stop_the_residual_and_a_missing_angle_the_torque() -> N
         assert len(torque) == 300
 
 
+@pytest.mark.parametrize(
+    ("estimate", "residual", "level"),
+    [(40_000.0, -40_000.0, WARN), (40_000.0, 1000.0, OK), (40_000.0, -20_000.0, OK), (10.0, 70.0, OK), (0.0, 1e5, OK)],
+)
+def test_a_residual_as_large_as_the_torque_is_told(estimate: float, residual: float, level: bytes) -> None:
+    """As pressures in bar make it; missing physics leaves less, and where there is hardly any torque it means nothing."""
+    health = Health(load(VEHICLE), 0.2, 0.5, 10)
+    for i in range(100):
+        sign = (-1.0) ** i
+        health.add_residual(sign * residual, sign * (estimate + residual))
+    labels = {f"input {i}": {"accepted": 0} for i in range(len(load(VEHICLE).channels))}
+    (status,) = (s for s in health.statuses(1, 1, 1.0, labels, 0) if s.name.endswith("residual"))
+    assert status.level == level
+    assert ("as large as the torque" in status.message) == (level == WARN)
+
+
 def test_every_rejection_is_counted_by_channel_and_reason() -> None:
     vehicle = load(VEHICLE)
     ms = 1_000_000

@@ -47,6 +47,32 @@ def test_bad_parameters_are_refused(argument: str, said: tuple[str, ...]) -> Non
     assert all(text in message for text in said), message
 
 
+BROKEN_EXECUTOR = """
+import sys
+from lugre_steering.live import run
+
+class Broken:
+    add_node = lambda self, node: None
+    shutdown = lambda self: None
+    def spin_until_future_complete(self, *_, **__):
+        raise RuntimeError("the middleware is gone")
+
+run._BREATH_S = 0.001
+run.make_executor = lambda kind: Broken()
+sys.exit(run.run(sys.argv))
+"""
+
+
+def test_a_middleware_that_only_fails_ends_the_node(tmp_path: Path) -> None:
+    """A supervisor must learn of it; the executor is the one thing that is not real here."""
+    (tmp_path / "broken.py").write_text(BROKEN_EXECUTOR)
+    command = [sys.executable, str(tmp_path / "broken.py"), "--ros-args", "-p", f"vehicle_file:={VEHICLE}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment(), check=False)
+    assert done.returncode == 2
+    assert "estimator: no callback runs any more" in done.stderr
+    assert "the middleware is gone" in done.stderr
+
+
 def test_bad_vehicle_files_are_refused(tmp_path: Path) -> None:
     assert "vehicle_file" in start_refused()
     missing = tmp_path / "none.yaml"

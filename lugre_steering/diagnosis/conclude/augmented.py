@@ -9,15 +9,15 @@ from dataclasses import replace
 from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.fitting.apply import apply_calibration
 from lugre_steering.diagnosis.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
 from lugre_steering.vehicle.effects import WINDOWS
 
 
-def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]]) -> Vehicle:
-    """Recalibrated vehicle with the named effects that act in the last bag."""
+def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]], heldout_rmse: float) -> Vehicle:
+    """Recalibrated vehicle with the named effects that act in the last bag; ``heldout_rmse`` [N m] was found before all
+    data were fitted."""
     problem = done.problem
     entries = list(problem.vehicle.effects)
     last = len(problem.runs) - 1
@@ -37,7 +37,7 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, An
             entries.append(EffectEntry(candidate.effect.id, keep))
     provenance = {
         "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
-        "heldout_rmse_Nm": round(rmse(problem, whole, done.roles.held), 3),
+        "heldout_rmse_Nm": round(heldout_rmse, 3),
         "recalibrated": {
             field: {"sheet": float(problem.model.parameters[0][0][field]), "now": round(value, 6)}
             for field, value in problem.fields(whole.x).items()

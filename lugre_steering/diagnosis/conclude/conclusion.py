@@ -46,13 +46,14 @@ def conclude(
     else:
         verdict = "consistent"
     effects = named_effects(done, whole, material) if named else []
-    vehicle = augmented_vehicle(done, whole, effects)
+    after = judged.after if named else judged.before
+    vehicle = augmented_vehicle(done, whole, effects, after)
     kept = {entry.id for entry in vehicle.effects}
     ended = [effect["id"] for effect in effects if effect["id"] not in kept]
     baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": judged.before}
     augmented: dict[str, Any] = {
         "rmse_Nm": verify.rmse(problem, final, problem.valid),
-        "heldout_rmse_Nm": judged.after if named else judged.before,
+        "heldout_rmse_Nm": after,
         "improvement": judged.gain if named else 0.0,
         "improvement_ci95": list(judged.interval) if named else [0.0, 0.0],
     }

@@ -64,7 +64,7 @@ class Quality:
 def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
     """All findings about one recording of ``vehicle``, and what diagnosis may use of it."""
     recording = _with_known_topics(recording, vehicle)
-    findings = list(recording.findings) + _rejected(recording)
+    findings = list(recording.findings) + _rejected(recording, vehicle)
     signals = {c: s for c in vehicle.channels if (s := _signal(recording, c)) is not None and s.time_s.size >= 20}
     looks = {c: _Look.of(s, _sheet_noise(vehicle, c)) for c, s in signals.items() if c.kind is not Kind.AIR_TEMPERATURE}
     clean: dict[Channel, Signal] = {}
@@ -116,12 +116,15 @@ def _with_known_topics(recording: Recording, vehicle: Vehicle) -> Recording:
     )  # fmt: skip
 
 
-def _rejected(recording: Recording) -> list[Finding]:
+def _rejected(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     """One finding per topic of which reading left something out."""
+    air = {channel.topic for channel in vehicle.channels if channel.kind is Kind.AIR_TEMPERATURE}
     found = []
     for topic, reasons in recording.rejected.items():
         count = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in reasons.items())
         statement = f"{topic}: {sum(reasons.values())} messages cannot be used ({count}); look at the driver and its clock"
+        if topic in air and "absurd_value" in reasons:
+            statement += ", and at the unit: degC is expected, kelvin is more by 273.15"
         found.append(Finding("rejected_samples", topic, statement))
     return found
 
