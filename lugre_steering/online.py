@@ -101,6 +101,13 @@ class Fit:
         }
 
 
+def r2_words(r2: float | None, name: str = "R2") -> str:
+    """R2 after a comma; beyond -1 its size says nothing more."""
+    if r2 is None:
+        return ""
+    return f", {name} {r2:.5f}" if r2 >= -1.0 else f", {name} below -1"
+
+
 class Timeline:
     """Stamps as seconds since a start that never run backward: where a clock was set back, time goes on."""
 

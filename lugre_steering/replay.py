@@ -26,11 +26,12 @@ from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
 from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.bag.writer import copied
+from lugre_steering.chain.model import baseline_parameters
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.online import Curves, Fit, Timeline
+from lugre_steering.online import Curves, Fit, Timeline, r2_words
 from lugre_steering.recording import NODE, Channel, Finding, IntArray, Kind, unused_name
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
@@ -44,6 +45,8 @@ MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
 NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate")
 """Counters of the estimator about samples that it did use."""
+POOR_R2 = 0.5
+"""Below, and with a torque worth a comparison, missing physics is the less likely cause."""
 
 Progress = Callable[[str, int, "int | None"], None]
 """Called with the name of a bag, messages done, and messages in all (None where not known)."""
@@ -91,7 +94,7 @@ def describe(summary: Mapping[str, Any]) -> Iterator[str]:
         if fit is None:
             yield f"  {bag['fit_note']}"
         else:
-            r2 = "" if fit["r2"] is None else f", R2 {fit['r2']:.5f}"
+            r2 = r2_words(fit["r2"])
             yield f"  against cylinder torque: RMSE {fit['rmse_Nm']:.1f} {unit}{r2}, bias {fit['bias_Nm']:+.1f} {unit}"
         for label, counts in bag["samples"].items():
             if counts["rejected"]:
@@ -180,12 +183,12 @@ class _Run:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
             if not self._counts["estimates"]:
-                raise BagError(f"{self.path}: no torque could be estimated ({_counted(samples, Kind.ANGLE)})")
+                raise BagError(f"{self.path}: no torque could be estimated ({self._counted(samples, Kind.ANGLE)})")
             if (out / self.name).exists():
                 shutil.rmtree(out / self.name)
             result.rename(out / self.name)
-            findings = [*bag.findings, *self._found, *self._last_findings()]
-        fit = self.fit.result()
+            fit = self.fit.result()
+            findings = [*bag.findings, *self._found, *self._last_findings(fit)]
         summary: dict[str, Any] = {
             "bag": str(self.path),
             "name": self.name,
@@ -318,7 +321,7 @@ class _Run:
 
     def _why_no_fit(self, samples: Mapping[str, Mapping[str, Any]]) -> str:
         """What came of pressures or measured torque, and how far their stamps are from the angles' where they miss them."""
-        angle, words = self._spans[0], [_counted(samples, Kind.PRESSURE, Kind.TORQUE)]
+        angle, words = self._spans[0], [self._counted(samples, Kind.PRESSURE, Kind.TORQUE)]
         for i, (channel, label) in enumerate(zip(self.vehicle.channels, samples, strict=False)):
             if channel.kind not in (Kind.PRESSURE, Kind.TORQUE):
                 continue
@@ -329,7 +332,10 @@ class _Run:
                 words.append(f"{label}: stamps begin {(begin - angle[1]) * 1e-9:.1f} s after those of the angles end")
         return "; ".join(words)
 
-    def _last_findings(self) -> Iterator[Finding]:
+    def _last_findings(self, fit: Mapping[str, Any] | None) -> Iterator[Finding]:
+        if fit is not None and fit["r2"] is not None and fit["r2"] < POOR_R2 and self._moved_much(fit["peaks"]["estimate"]):
+            statement = "the residual is as large as the torque: units, signs, plugs or clocks may be wrong; 'diagnose' tells which"
+            yield Finding("large_residual", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0
         if set_back:
             yield Finding("clock_set_back", "", f"stamps jumped back {set_back} times")
@@ -342,6 +348,26 @@ class _Run:
         if self.estimator.saturated_steps:
             statement = "steps with a temperature outside the rubber table, whose edge was used"
             yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
+
+    def _moved_much(self, estimate: Mapping[str, float]) -> bool:
+        """Whether the estimate spans a torque that is worth a comparison."""
+        friction = len(self.vehicle.sides) * baseline_parameters(self.vehicle)["static_torque"]
+        return estimate["max_Nm"] - estimate["min_Nm"] > 0.1 * float(friction)
+
+    def _counted(self, samples: Mapping[str, Mapping[str, Any]], *kinds: Kind) -> str:
+        """What came on the inputs of some kinds, in words."""
+        words = []
+        for channel, (label, counts) in zip(self.vehicle.channels, samples.items(), strict=False):
+            if channel.kind not in kinds:
+                continue
+            if counts["topic"] is None:
+                words.append(f"{label}: topic '{channel.topic}' missing")
+                continue
+            reasons = [f"{n} {reason}" for part in ("rejected", "noted") for reason, n in counts[part].items()]
+            if not reasons and not counts["used"] and channel.joint:
+                reasons = [f"no message of '{counts['topic']}' carries the joint '{channel.joint}'"]
+            words.append(", ".join([f"{label}: {counts['used']} samples used", *reasons]))
+        return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
     def _picture(self, file: Path, fit: Mapping[str, Any] | None) -> dict[str, str | None]:
         if note := no_pictures():
@@ -365,20 +391,6 @@ def _first_stamp(block: Block, sides: int) -> int | None:
     # One of them, not the mean of two: half of the stamps may be of another clock.
     near = (block.stamp_ns > 0) & (np.abs(offset - usual[(usual.size - 1) // 2]) <= STRAY_NS)
     return int(block.stamp_ns[near].min())
-
-
-def _counted(samples: Mapping[str, Mapping[str, Any]], *kinds: Kind) -> str:
-    """What came on the inputs of some kinds, in words."""
-    words = []
-    for label, counts in samples.items():
-        if label.split("/")[0].upper() not in [kind.name for kind in kinds]:
-            continue
-        if counts["topic"] is None:
-            words.append(f"{label}: topic missing")
-        else:
-            reasons = [f"{n} {reason}" for part in ("rejected", "noted") for reason, n in counts[part].items()]
-            words.append(", ".join([f"{label}: {counts['used']} samples used", *reasons]))
-    return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
 
 @lru_cache(maxsize=1)

@@ -348,12 +348,35 @@ def test_angle_topic_without_usable_samples_is_an_error(tmp_path: Path) -> None:
     assert list((tmp_path / "out").iterdir()) == []
 
 
+def test_a_joint_of_another_name_is_named(tmp_path: Path) -> None:
+    state = make.joint_state(make.T0, ["elsewhere"], [0.1])
+    messages = [row for row in drive() if "left" not in row[0]]
+    messages.append(("/steering/left/joint_state", make.JOINT_STATE, make.T0, state))
+    bag = make.write(tmp_path / "run", sorted(messages, key=lambda row: row[2]))
+    with pytest.raises(BagError, match="no message of '/steering/left/joint_state' carries the joint 'left_track_steer_joint'"):
+        replay([bag], VEHICLE, tmp_path / "out")
+
+
+@pytest.mark.parametrize(("scale", "found"), [(1.0, []), (1e-5, ["large_residual"]), (-1.0, ["large_residual"])])
+def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float, found: list[str]) -> None:
+    """Pressures in bar, and with the other sign."""
+    messages = []
+    for topic, kind, log, raw in read(DOUBLE_CYCLE):
+        if kind == make.FLUID_PRESSURE:
+            message = make.TYPES.deserialize_cdr(raw, kind)
+            raw = make.pressure(stamp_of(message), scale * message.fluid_pressure)
+        messages.append((topic, kind, log, raw))
+    (bag,) = replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")["bags"]
+    assert [finding["finding"] for finding in bag["findings"]] == found
+    assert (bag["fit"]["r2"] > 0.99) == (scale == 1.0)
+
+
 def test_without_a_pressure_the_torque_is_still_estimated(tmp_path: Path) -> None:
     whole = make.write(tmp_path / "whole", drive())
     poor = make.write(tmp_path / "poor", [row for row in drive() if "aux_b" not in row[0]])
     summary = replay([whole, poor], VEHICLE, tmp_path / "out")
     assert summary["bags"][1]["fit"] is None
-    assert "pressure/aux_b: topic missing" in summary["bags"][1]["fit_note"]
+    assert "pressure/aux_b: topic 'steering/pressure/aux_b' missing" in summary["bags"][1]["fit_note"]
     assert summary["overall"] == summary["bags"][0]["fit"]
     torques = [decoded(tmp_path / "out" / name, f"{NODE}/torque") for name in ("whole", "poor")]
     assert [m.wrench.torque.z for m in torques[0]] == [m.wrench.torque.z for m in torques[1]]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.online import Curves
+from lugre_steering.online import Curves, r2_words
 from lugre_steering.recording import Array
 from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, figure
 from lugre_steering.vehicle import Vehicle
@@ -93,8 +93,7 @@ def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
     if fit is None:
         return text + "No residual: the torque was not measured."
     unit = vehicle.coordinate.force_unit
-    r2 = "" if fit["r2"] is None else f", R² {fit['r2']:.5f}"
     return text + (
-        f"Residual over {fit['samples']} samples: RMSE {fit['rmse_Nm']:.1f} {unit}{r2}, bias {fit['bias_Nm']:+.1f} "
+        f"Residual over {fit['samples']} samples: RMSE {fit['rmse_Nm']:.1f} {unit}{r2_words(fit['r2'], 'R²')}, bias {fit['bias_Nm']:+.1f} "
         f"{unit}."
     )
