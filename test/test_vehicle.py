@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import math
 import tempfile
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from lugre_steering.errors import VehicleFileError
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
 from lugre_steering.vehicle.effects import WINDOWS
-from lugre_steering.vehicle.sections import Initial
+from lugre_steering.vehicle.sections import Initial, Topics
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FILE = CONFIG / "test_vehicle.yaml"
@@ -61,6 +62,17 @@ def test_reference_vehicle_loads_with_its_table() -> None:
     assert vehicle.rubber.dma is not None
     assert len(vehicle.rubber.dma.temperature_degC) > 50
     assert [c.name for c in vehicle.channels] == ["left", "right", "main_a", "main_b", "aux_a", "aux_b", "air"]
+
+
+def test_the_defaults_told_in_the_reference_vehicle_are_those(tmp_path: Path) -> None:
+    text = FILE.read_text().replace("#: ", "").replace("  # temperature_law", "  temperature_law")
+    text = text.replace("  # pressure_gain", "  pressure_gain").replace("rubber_dma", f"{FILE.parent}/rubber_dma")
+    (tmp_path / "told.yaml").write_text(text)
+    assert {"topics", "sensors", "friction"} <= yaml.safe_load(text).keys()
+    assert "temperature_law" in yaml.safe_load(text)["friction"]
+    assert "pressure_gain" in yaml.safe_load(text)["sensors"]
+    assert len(yaml.safe_load(text)["topics"]) == len(fields(Topics))
+    assert load(tmp_path / "told.yaml") == load(FILE)
 
 
 @pytest.mark.parametrize("sheet", [SHEET, JOINT], ids=["vehicle", "joint"])

@@ -28,12 +28,15 @@ def parse_priors(texts: Sequence[str]) -> dict[str, float]:
 def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
     """Parameters with intervals, what to make of them, and the paragraph."""
     table = Table(title="calibration (units as in the key)", title_justify="left")
-    for column in ("key", "sheet", "fitted", "95 % interval", "remark"):
-        table.add_column(column, no_wrap=column != "remark")
+    for column in ("key", "sheet", "fitted", "95 % interval"):
+        table.add_column(column, no_wrap=True)
     for row in result["parameters"]:
         interval = " … ".join(f"{end:.5g}" for end in row["ci95"])
-        table.add_row(row["key"], f"{row['sheet']:.5g}", f"{row['value']:.5g}", interval, _remark(row))
+        table.add_row(row["key"], f"{row['sheet']:.5g}", f"{row['value']:.5g}", interval)
     console.print(table)
+    for row in result["parameters"]:
+        if remark := _remark(row):
+            console.print(f"{row['key']}: {remark}", highlight=False)
     console.print(result["statement"], soft_wrap=True)
     if result["picture_note"]:
         console.print(result["picture_note"])

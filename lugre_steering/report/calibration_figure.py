@@ -62,8 +62,9 @@ def _parameters(ax: Any, rows: list[dict[str, Any]]) -> None:
     ax.axvline(1.0, color="#888888", linewidth=0.8)
     ax.set_yticks(range(len(rows)), [row["key"] for row in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)
-    ends = [row["value"] / row["sheet"] for row in rows]
-    ax.set_xlim(max(0.2, min(0.6, min(ends) - 0.1)), min(3.0, max(1.4, max(ends) + 0.1)))
-    sheet = "grey: the sheet's own; " if any(row["prior_relative_sd"] for row in rows) else ""
-    ax.set_title(f"parameters with 95 % interval ({sheet}orange: hardly determined or at a bound)")
+    ends = [end / row["sheet"] for row in rows for end in (row["value"], *row["ci95"])]
+    ends += [np.exp(sign * 1.96 * row["prior_relative_sd"]) for row in rows if row["prior_relative_sd"] for sign in (-1, 1)]
+    ax.set_xlim(max(0.2, min(0.6, min(ends) - 0.05)), min(3.0, max(1.4, max(ends) + 0.05)))
+    sheet = ", grey: the sheet's own" if any(row["prior_relative_sd"] for row in rows) else ""
+    ax.set_title(f"95 % intervals{sheet}; orange: hardly determined, or at a bound")
     ax.set_xlabel("value over sheet value")

@@ -294,12 +294,12 @@ def _torque(diagnosis: Diagnosis, drawing: _Drawing) -> str:
     if not diagnosis.traces:
         return '<p class="note">No model was fitted, so there is nothing to draw.</p>'
     found = bool(diagnosis.json["effects"])
-    parts = [
+    coloured = "; coloured, where an effect acts, shaded below unless that is nearly everywhere" if found else ""
+    note = (
         '<p class="note">Drag to zoom, double-click to go back; click a legend entry to hide a curve. '
-        + "Bars on top: grey, stretches that neither search nor fit saw"
-        + ("; coloured, where an effect acts, shaded below unless that is nearly everywhere" if found else "")
-        + ".</p>\n"
-    ]
+        f"Bars on top: grey, stretches that neither search nor fit saw{coloured}.</p>\n"
+    )
+    parts = [note] if drawing.interactive else []
     for i, trace in enumerate(diagnosis.traces):
         words = f"Measured torque of bag {trace.name}, the models' torque and the residuals over time"
         parts.append(

@@ -15,7 +15,7 @@ def show_import(console: Console, result: Mapping[str, Any]) -> None:
     """One row per channel: samples, rate, range, and what is worth a look."""
     table = Table(title=f"{result['table']} -> {result['bag']}", title_justify="left")
     for heading in ("channel", "samples", "rate", "time", "range", "worth a look"):
-        table.add_column(heading, overflow="fold")
+        table.add_column(heading, overflow="fold", no_wrap=heading == "channel")
     for channel in result["channels"]:
         rate = "-" if channel["rate_Hz"] is None else f"{channel['rate_Hz']:.4g} Hz"
         time = f"{channel['from_s']:.4g} ... {channel['to_s']:.4g} s"

@@ -76,10 +76,12 @@ def run_manoeuvre(
     ``Sensing``; None means the vehicle's own."""
     if storage not in STORAGES:
         raise DataError(f"storage: got '{storage}', expected {' or '.join(STORAGES)}")
+    folder = out / f"synthetic_{bag_name(Path(what)).replace('-', '_')}"
+    if folder.exists():  # said before the work, not after it
+        raise DataError(f"{folder}: exists already; recordings are never overwritten, choose another --out")
     given = {name: value for name, value in sensing.items() if value is not None}
     run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
     make_folder(out)
-    folder = out / f"synthetic_{bag_name(Path(what)).replace('-', '_')}"
     label = f"{what}, vehicle '{vehicle.name}'"
     write_bag(folder, run, label, storage)
     picture, note = out / f"{folder.name}.png", no_pictures()

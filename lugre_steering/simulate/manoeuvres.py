@@ -111,7 +111,7 @@ BUILT_IN = {
         Manoeuvre("six-cycles", "six full cycles at 4 deg/s: heating", cycles(LIMIT_DEG, 4.0, 6)),
         Manoeuvre(
             "varied-rates",
-            "full sweeps at 1 to 10 deg/s with short holds: speed dependence",
+            "full sweeps at 1.5 to 10 deg/s with short holds: speed dependence",
             (
                 Hold(2.0),
                 *(
