@@ -60,7 +60,9 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
                 clean[channel] = stamp[use], value[use], rate[use]
     if not clean:
         wanted = ", ".join(sorted({channel.topic for channel in channels}))
-        raise BagError(f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}")
+        counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
+        left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
+        raise BagError(f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}")
     start_ns = min(int(stamp[0]) for stamp, _, _ in clean.values())
     signals: dict[Kind, dict[str, Signal]] = {kind: {} for kind in Kind}
     rates: dict[str, Signal] = {}

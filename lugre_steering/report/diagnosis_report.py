@@ -353,7 +353,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
         + _table([title for title in header if title], rows, numeric=(1, 2, 4) if angular else (1, 2))
         + f"<p>{EXACT_LAW}</p>\n"
         + facts
-        + (_table(["bag", "acts during", "along"], where) if where else "")
+        + (_table(["bag", "acts during", "98 % of its energy lies along"], where) if where else "")
         + law
         + "</div>\n"
     )
@@ -434,7 +434,7 @@ def _left(diagnosis: Diagnosis) -> str:
             if formula
             else ""
         )
-        + (_table(["bag", "during", "along"], rows) if rows else "")
+        + (_table(["bag", "during", "98 % of the energy lies along"], rows) if rows else "")
     )
 
 

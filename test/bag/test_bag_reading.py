@@ -255,6 +255,12 @@ def test_a_joint_state_without_names_gives_its_first_position(tmp_path: Path) ->
 # ------------------------------------------------------------------- cleaning
 
 
+def test_why_nothing_is_usable(tmp_path: Path) -> None:
+    stopped = [("/" + LEFT.topic, make.JOINT_STATE, T0 + i, make.joint_state(0, [LEFT.joint], [0.1])) for i in range(30)]
+    with pytest.raises(BagError, match=f"left out: 30 zero_stamp on /{LEFT.topic}"):
+        read_recording(make.write(tmp_path / "run", stopped), CHANNELS)
+
+
 def test_a_clock_set_back_a_little_does_not_mix_two_times(tmp_path: Path) -> None:
     """Half a second back: what then comes between samples that are there already is left out; a late message fills a hole."""
     stamps = [T0 + i * 10**7 for i in range(100)] + [T0 + i * 10**7 - 5 * 10**8 + 4 * 10**6 for i in range(100, 300)]

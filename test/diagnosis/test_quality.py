@@ -25,6 +25,7 @@ from lugre_steering.diagnosis.data.quality import inspect
 from lugre_steering.diagnosis.data.wiring import SKEW_RANGE_S
 from lugre_steering.diagnosis.fitting.fit import fit
 from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.errors import DataError
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder
@@ -377,6 +378,12 @@ def test_air_in_kelvin_that_reading_refused(sound: Recording) -> None:
     (found,) = inspect(replace(sound, rejected={"/" + AIR: {"absurd_value": 54}}), VEHICLE).findings
     assert (found.finding, found.topic) == ("rejected_samples", AIR)
     assert "kelvin" in found.statement
+
+
+def test_a_missing_line_is_told_by_its_topic(sound: Recording) -> None:
+    poor = replace(sound, pressure={line: signal for line, signal in sound.pressure.items() if line != "aux_a"})
+    with pytest.raises(DataError, match=r"pressure/aux_a .topic 'steering/pressure/aux_a'.: got nothing"):
+        prepare(poor, VEHICLE)
 
 
 def test_small_angles_in_degrees() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.diagnosis.data.smoother import smooth_angle
 from lugre_steering.errors import DataError
-from lugre_steering.recording import Array, Recording, Signal
+from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
 
@@ -77,10 +77,11 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     signals |= {f"pressure/{line}": recording.pressure.get(line) for line in lines}
     if vehicle.torque_sensor is not None:
         signals["measured_torque"] = recording.measured_torque
-    for name, signal in signals.items():
+    topics = [channel.topic for channel in vehicle.channels if channel.kind is not Kind.AIR_TEMPERATURE]
+    for topic, (name, signal) in zip(topics, signals.items(), strict=True):
         if signal is None or signal.time_s.size < 20:
             found = "nothing" if signal is None else f"{signal.time_s.size} samples"
-            raise DataError(f"{recording.name}: channel {name}: got {found}, expected at least 20 samples")
+            raise DataError(f"{recording.name}: {name} (topic '{topic}'): got {found}, expected at least 20 samples")
     present = {name: signal for name, signal in signals.items() if signal is not None}
     time, valid = _clock(recording.name, present)
     noise = angle_noise(vehicle)
