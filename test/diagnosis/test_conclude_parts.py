@@ -11,6 +11,7 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from lugre_steering.diagnosis.conclude import experiment, left_over, limits, unlisted
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.statement import at_end
 from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.data.dataset import Run
 from lugre_steering.diagnosis.fitting import split
@@ -51,6 +52,11 @@ def test_the_line_that_is_named_stands_alone_in_the_evidence(problem: Problem) -
     rows = {row.label: row.verdict for row in evidence(finished(hidden, baseline, tuple(scores)), [entry])}
     assert {label for label, verdict in rows.items() if verdict == "named"} == {"pressure_offset[main_a]"}
     assert {f"pressure_offset[{line}]" for line in ("main_a", "main_b", "aux_a", "aux_b")} <= set(rows)
+
+
+@pytest.mark.parametrize(("value", "ends"), [(0.15, 1), (-0.15, 1), (0.149, 0), (0.0, 0)])
+def test_a_parameter_at_the_end_of_its_range_is_told(value: float, ends: int) -> None:
+    assert len(at_end({"id": "angle_offset", "parameters": {"offset": {"value": value, "unit": "rad"}}})) == ends
 
 
 def test_the_next_experiment_compares_what_the_sensors_would_show(problem: Problem) -> None:

@@ -4,10 +4,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.effects.catalogue import CATALOGUE
+
+
+def at_end(effect: Mapping[str, Any]) -> list[tuple[str, float, str]]:
+    """Name, value and unit of the parameters of a named effect that were fitted to an end of their range other than zero."""
+    ranges = {parameter.name: (parameter.low, parameter.high) for parameter in CATALOGUE[effect["id"]].parameters}
+    return [
+        (name, entry["value"], entry["unit"])
+        for name, entry in effect["parameters"].items()
+        if any(end and math.isclose(entry["value"], end, rel_tol=1e-6) for end in ranges.get(name, ()))
+    ]
 
 
 def statement(
@@ -34,6 +46,7 @@ def statement(
         for effect in effects
         if effect["indistinguishable_from"]
     ]
+    ends = [f"{effect['id']} with {name} = {value:.3g} {unit}" for effect in effects for name, value, unit in at_end(effect)]
     last = done.problem.runs[-1].name
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
@@ -42,6 +55,7 @@ def statement(
         f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
         + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
+        + (f" At the end of the range that is searched: {', '.join(ends)}; the cause is larger than that, or another." if ends else "")
         + (f" {' and '.join(ended)} does not act in {last}, the last recording: augmented.yaml is without." if ended else "")
         + (f" Structure is left: {left}." if left else "")
     )
