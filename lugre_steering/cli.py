@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
+from lugre_steering import __version__
 from lugre_steering.errors import DataError, LugreSteeringError
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
@@ -32,6 +33,21 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        print(f"lugre-steering {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _: Annotated[bool, typer.Option("--version", help="print the version and leave", callback=_tell_version, is_eager=True)] = False,
+) -> None:
+    """Options of the program itself."""
+
 
 Bags = Annotated[list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not)")]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML)")]

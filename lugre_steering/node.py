@@ -8,6 +8,11 @@ import os
 import signal
 import sys
 
+HELP = """usage: estimator --ros-args -p vehicle_file:=FILE [-p NAME:=VALUE ...] [--params-file FILE] [-r FROM:=TO ...]
+
+The live steering torque estimator. Its parameters: ros2 param describe /steering_torque_estimator NAME, while it runs;
+topics and a parameter file to copy: README of lugre_steering."""
+
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; returns the exit code (0; 2 for bad parameters or a bad vehicle file)."""
@@ -15,9 +20,13 @@ def main(args: list[str] | None = None) -> int:
     # handler may be swallowed (compiler callbacks) or turn the exit code into the signal's (CPython, inside exec).
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: os._exit(0))
+    arguments = sys.argv if args is None else args
+    if {"-h", "--help"}.intersection(arguments):
+        print(HELP)
+        return 0
     from lugre_steering.live.run import run
 
-    return run(sys.argv if args is None else args)
+    return run(arguments)
 
 
 if __name__ == "__main__":

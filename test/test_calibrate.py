@@ -194,6 +194,20 @@ def test_files_of_the_command(commanded):
     assert note["sheet"] == str(sheet)
 
 
+def test_an_interrupted_calibration_can_be_repeated(tmp_path, monkeypatch):
+    """Ctrl-C while the picture is drawn."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    arguments = ["calibrate", str(BAG), "--vehicle", str(SHEET_FILE), "--out", str(tmp_path)]
+    with monkeypatch.context() as patch:
+        patch.setattr("lugre_steering.report.calibration_figure.draw_calibration", interrupted)
+        assert CliRunner().invoke(app, arguments).exit_code != 0
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert (tmp_path / "calibration.png").exists()
+
+
 @pytest.mark.parametrize("name", ["calibration.json", "calibrated.yaml", "calibration.png"])
 def test_files_of_others_are_never_replaced(tmp_path, name):
     (tmp_path / name).write_text("{}", encoding="utf-8")

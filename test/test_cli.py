@@ -54,6 +54,23 @@ def test_text_result_names_the_fit_and_the_folder(bag: Path, tmp_path: Path) -> 
     assert done.stdout.endswith("results in out\n")
 
 
+def test_the_version_is_told(tmp_path: Path) -> None:
+    done = run("--version", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, f"lugre-steering {lugre_steering.__version__}\n")
+
+
+def test_brackets_in_names_are_names(tmp_path: Path) -> None:
+    """Rich would take them for its markup: lost words, or a traceback."""
+    sheet = VEHICLE.read_text().replace("name: test vehicle", 'name: "truck [/b] [prototype]').replace("dry concrete\n", 'dry concrete"\n', 1)
+    (tmp_path / "own.yaml").write_text(sheet.replace("rubber_dma", f"{VEHICLE.parent}/rubber_dma"))
+    done = run("vehicle", "own.yaml", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "truck [/b] [prototype]" in done.stdout
+    done = run("simulate", "small-loops", "--vehicle", "own.yaml", "--out", "folder [/x]", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "folder [/x]" in done.stdout
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminal")
 def test_progress_is_shown_on_a_terminal(bag: Path, tmp_path: Path) -> None:
     ours, its = os.openpty()

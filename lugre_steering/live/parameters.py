@@ -60,6 +60,6 @@ def declare(node: Node) -> Settings:
     if unknown:  # not refused: a file may set parameters of several nodes at once
         node.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
     if not values["vehicle_file"]:
-        raise ParameterError("parameter 'vehicle_file': got nothing, expected a vehicle file (-p vehicle_file:=PATH)")
+        raise ParameterError("parameter 'vehicle_file': got nothing, expected a vehicle file (--ros-args -p vehicle_file:=PATH)")
     values["vehicle_file"] = Path(values["vehicle_file"])
     return Settings(**values, options=Options(**options))

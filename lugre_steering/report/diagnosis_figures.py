@@ -137,6 +137,11 @@ def _evidence(diagnosis: Diagnosis, file: Path) -> None:
         ax.set_title("evidence")
 
 
+def _wrapped(name: str) -> str:
+    """The name of a bag in short lines, broken behind its underscores."""
+    return "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), 22))
+
+
 def _heldout(diagnosis: Diagnosis, file: Path) -> None:
     rows, unit = plots.heldout_rows(diagnosis), diagnosis.vehicle.coordinate.force_unit
     floor = diagnosis.json["noise_floor_Nm"]
@@ -154,7 +159,7 @@ def _heldout(diagnosis: Diagnosis, file: Path) -> None:
         ax.axhline(
             floor, color="black", linestyle=":", linewidth=1.2, label=f"noise floor {shown.number(floor, 3)} {unit}"
         )
-        ax.set_xticks(range(len(rows)), ["\n".join(textwrap.wrap(row[0], 20)) for row in rows])
+        ax.set_xticks(range(len(rows)), [_wrapped(row[0]) for row in rows])
         ax.set_xlim(-0.7, max(len(rows) - 0.3, 0.7))
         ax.set_ylabel(f"held-out RMSE ({unit})")
         ax.grid(axis="x", visible=False)

@@ -14,12 +14,11 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.online import Curves, r2_words
 from lugre_steering.recording import Array
-from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, figure
+from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, SHOWN, figure
 from lugre_steering.vehicle import Vehicle
 
 GAP_S = 0.5
 """A curve is broken where nothing came for longer than this."""
-SHOWN = {"rad": (180.0 / np.pi, "deg"), "m": (1000.0, "mm")}
 
 
 def draw_replay(

@@ -7,21 +7,17 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from lugre_steering import units
 from lugre_steering.recording import Kind
-from lugre_steering.report.style import IMPROVED, MEASURED, figure
+from lugre_steering.report.style import IMPROVED, MEASURED, SHOWN, figure
 from lugre_steering.simulate.run import Simulated
-
-DEGREES = {"rad": (180.0 / np.pi, "deg"), "m": (1000.0, "mm")}
 
 
 def draw_simulation(run: Simulated, label: str, file: Path) -> None:
     """Write the picture as PNG."""
     vehicle, truth = run.vehicle, run.truth
     time, coordinate = truth.motion.time, vehicle.coordinate
-    scale, unit = DEGREES.get(coordinate.unit, (1.0, coordinate.unit))
+    scale, unit = SHOWN.get(coordinate.unit, (1.0, coordinate.unit))
     pressures = {c.name: s for c, s in run.signals.items() if c.kind is Kind.PRESSURE}
     torques = [s for c, s in run.signals.items() if c.kind is Kind.TORQUE]
     effects = ", ".join(e.id for e in vehicle.effects) or "none"

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,6 +30,9 @@ ORIGINAL = {"color": "#1f4fb4", "linestyle": "-.", "linewidth": 1.4}
 
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
 """Colours for any other family of curves; told apart by readers with colour-deficient sight too (Okabe and Ito)."""
+
+SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1000.0, "mm")}
+"""Coordinates on axes: factor and unit."""
 
 RC: Any = {
     "figure.dpi": 110,
@@ -67,8 +71,8 @@ def figure(
     """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to
     ``file``.
 
-    ``words`` is applied to all its text (a linear axis has forces where others have torques). The figure grows with its
-    caption, so no line of it is ever cut off.
+    The caption is also the description inside the file. ``words`` is applied to all text (a linear axis has forces where
+    others have torques). The figure grows with its caption, so no line of it is ever cut off.
     """
     lines = [
         line for paragraph in words(caption).split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]
@@ -85,6 +89,6 @@ def figure(
             fig.text(
                 0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333"
             )
-            fig.savefig(file, metadata={"Software": None})
+            fig.savefig(file, metadata={"Software": None, "Description": words(caption)})
         finally:
             plt.close(fig)

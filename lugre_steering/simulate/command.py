@@ -146,7 +146,9 @@ def show_run(console: Console, result: Mapping[str, Any]) -> None:
     """What was simulated, in a few lines."""
     table = Table(title="synthetic recording", show_header=False, title_justify="left")
     for key, value in result.items():
-        table.add_row(key, f"{value:.6g}" if isinstance(value, float) else str(value))
+        if value not in (None, {}):
+            numbers = value if isinstance(value, list) else [value]
+            table.add_row(key, ", ".join(f"{n:.6g}" if isinstance(n, float) else str(n) for n in numbers))
     console.print(table)
 
 

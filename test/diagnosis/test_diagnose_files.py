@@ -51,7 +51,7 @@ def test_a_file_that_cannot_be_written_is_named(parked: Path, tmp_path: Path) ->
         run([parked], SHEET, tmp_path, report=False)
 
 
-@pytest.mark.parametrize("name", ["augmented.yaml", "report.html"])
+@pytest.mark.parametrize("name", ["augmented.yaml", "report.html", "evidence.png", "before_after_x.png"])
 def test_a_file_without_an_earlier_result_is_somebody_elses(parked: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine", encoding="utf-8")
     with pytest.raises(LugreSteeringError, match=f"{name}: exists and is not part of an earlier result"):
