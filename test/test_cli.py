@@ -61,7 +61,8 @@ def test_the_version_is_told(tmp_path: Path) -> None:
 
 def test_brackets_in_names_are_names(tmp_path: Path) -> None:
     """Rich would take them for its markup: lost words, or a traceback."""
-    sheet = VEHICLE.read_text().replace("name: test vehicle", 'name: "truck [/b] [prototype]').replace("dry concrete\n", 'dry concrete"\n', 1)
+    name = "name: test vehicle, front axle, dry concrete"
+    sheet = VEHICLE.read_text().replace(name, 'name: "truck [/b] [prototype]"')
     (tmp_path / "own.yaml").write_text(sheet.replace("rubber_dma", f"{VEHICLE.parent}/rubber_dma"))
     done = run("vehicle", "own.yaml", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

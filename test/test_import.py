@@ -206,6 +206,7 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
             HEAD + "channels: {rate/left: {column: b, unit: deg/s, time: {column: t}}, angle/left: {column: a, unit: deg}}\n",
             "key 'time': got nothing, expected this section, or channels.angle/left.time",
         ),
+        (HEAD + "time: {column: t}\nchannels: {pressure/a b: {column: a, unit: bar}}\n", "got 'pressure/a b', expected angle/left"),
         ("[1, 2", "is not valid YAML"),
         ("- 1\n", "expected a mapping"),
     ],

@@ -123,7 +123,7 @@ def test_version_is_the_same_everywhere() -> None:
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy to build in: building leaves folders behind."""
     folder = tmp_path_factory.mktemp("workspace") / "src" / NAME
-    ignored = shutil.ignore_patterns(".*", "*.egg-info", "__pycache__", "/build", "bags", "install", "log")
+    ignored = shutil.ignore_patterns(".*", "*.egg-info", "__pycache__", "build", "bags", "install", "log")
     shutil.copytree(ROOT, folder, ignore=ignored)
     return folder
 

@@ -16,14 +16,14 @@ from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
 
-MAX_PAIR_TOLERANCE_NS = 50_000_000
+LONGEST_PERIOD_NS = 50_000_000  # of a sensor whose stamps may pair by half their period
 
 
 @njit
 def _pair(core):
     """Drop waiting samples that can get no partner; stamp of the pair now at the head of the sides' queues, or 0."""
     sides, ring = core.waiting.shape
-    period_ns = MAX_PAIR_TOLERANCE_NS
+    period_ns = LONGEST_PERIOD_NS
     for side in range(sides):
         if core.channels[side].period_ns > 0:
             period_ns = min(period_ns, core.channels[side].period_ns)

@@ -11,6 +11,7 @@ from pathlib import Path
 from lugre_steering.errors import MapFileError
 from lugre_steering.recording import Array
 from lugre_steering.schema import Reader, positive, quantity
+from lugre_steering.vehicle.check import TOPIC
 
 SCHEMA = "lugre_steering/import/1"
 
@@ -158,7 +159,7 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
     kind, _, rest = name.partition("/")
     sided = kind in ("angle", "rate")
     known = (sided and rest in ("left", "right")) or (kind == "pressure" and rest) or (kind in _DIMENSIONS and not rest)
-    if not known or (not rest and (sided or kind == "pressure")):
+    if not known or (not rest and (sided or kind == "pressure")) or not TOPIC.fullmatch(name):
         expected = "angle/left, angle/right, rate/left, rate/right, pressure/<line>, air_temperature or measured_torque"
         raise reader.fail("channels", name, expected)
     ways = [way for way in ("column", "polynomial", "cylinder") if getattr(source, way) is not None]

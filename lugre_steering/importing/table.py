@@ -96,6 +96,10 @@ class _LazyColumns(Mapping[str, Array]):
 
     def __init__(self, file: Path, decimal: str, lines: Sequence[int], cells: Mapping[str, Sequence[str]]) -> None:
         self._file, self._decimal, self._lines, self._cells = file, decimal, lines, cells
+        self._read: dict[str, Array] = {}
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._cells
 
     def __iter__(self) -> Any:
         return iter(self._cells)
@@ -104,6 +108,11 @@ class _LazyColumns(Mapping[str, Array]):
         return len(self._cells)
 
     def __getitem__(self, name: str) -> Array:
+        if name not in self._read:
+            self._read[name] = self._numbers(name)
+        return self._read[name]
+
+    def _numbers(self, name: str) -> Array:
         cells = self._cells[name]
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):

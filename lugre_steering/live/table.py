@@ -60,7 +60,7 @@ TABLE = (
     Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)"),
 )
 _MEANINGS = {
-    "pair_tolerance_s": "left and right stamps this close are one instant [s]",
+    "pair_tolerance_s": "left and right stamps this close, or by half a sampling period up to 25 ms, are one instant [s]",
     "max_gap_s": "pressures are not interpolated across a longer gap [s]",
     "backward_jump_s": "a confirmed jump of all angles back in time this long is a restart [s]",
     "forward_jump_s": "a jump ahead this long must be confirmed [s]",

@@ -14,7 +14,7 @@ from lugre_steering.vehicle.sections import SIDES, DmaTable, Hydraulics, MasterC
 
 UNITS = {"rad": "N m", "m": "N"}
 """Units of the coordinate, each with that of its force: the program counts in these, so others would only mislabel."""
-_TOPIC = re.compile(r"(~?/)?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+TOPIC = re.compile(r"(~?/)?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 """Topic names that ROS accepts."""
 
 
@@ -86,7 +86,7 @@ def _check_topics(vehicle: Vehicle, reader: Reader) -> None:
     for i, line in enumerate(vehicle.hydraulics.lines if vehicle.hydraulics else ()):
         names[f"hydraulics.lines[{i}]"] = topics.pressure_prefix + line
     for key, name in names.items():
-        if not _TOPIC.fullmatch(name):
+        if not TOPIC.fullmatch(name):
             expected = "the name of a ROS topic: letters, digits, _ and /, no digit first in any part"
             raise reader.fail(key, name.removesuffix("line") if key.endswith("prefix") else name, expected)
     if (

@@ -45,7 +45,7 @@ HAS_LAUNCH = bool(importlib.util.find_spec("launch") and importlib.util.find_spe
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
     """Environment of a shell that has sourced the workspace."""
     workspace = tmp_path_factory.mktemp("workspace")
-    ignored = shutil.ignore_patterns(".*", "*.egg-info", "__pycache__", "/build", "bags", "test", "install", "log")
+    ignored = shutil.ignore_patterns(".*", "*.egg-info", "__pycache__", "build", "bags", "test", "install", "log")
     shutil.copytree(PACKAGE_ROOT, workspace / "src" / PACKAGE, ignore=ignored)
     env = {**environment(), "COLCON_HOME": str(workspace), "NUMBA_CACHE_DIR": str(workspace / "compiled")}
     del env["PYTHONPATH"]  # only what the workspace adds: the installed package, not this source tree
