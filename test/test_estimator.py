@@ -248,6 +248,44 @@ def test_rates_that_the_angles_refute_are_no_longer_used(give) -> None:  # type:
     assert np.sqrt(np.mean((totals - without)[200:] ** 2)) < 0.01 * np.ptp(without)
 
 
+def left_out(theta: Array, rate: Array, period_s: float = 0.01) -> Array:
+    """How many rates of the left side have been left out, after each sample of both sides (n,)."""
+    estimator, found = Estimator(VEHICLE), []
+    for i, (angle_rad, rate_rad_s) in enumerate(zip(theta, rate, strict=True)):
+        for side in (LEFT, RIGHT):
+            estimator.push(side, T0 + round(i * period_s * 1e9), float(angle_rad), float(rate_rad_s))
+        found.append(estimator.counters["angle/left"].get("absurd_rate", 0))
+    return np.array(found)
+
+
+SIGMA = math.hypot(math.radians(0.01), math.radians(0.0055) / math.sqrt(12.0))
+"""Noise of one angle sample by the sheet [rad]."""
+
+
+@pytest.mark.parametrize("spike_deg", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_spike_of_the_angle_does_not_refute_the_rate(spike_deg: float, moving: bool) -> None:
+    t = np.arange(0.0, 12.0, 0.01)
+    theta = 0.3 * np.sin(0.7 * t) * moving + np.random.default_rng(1).normal(0.0, SIGMA, t.size)
+    theta[600] += math.radians(spike_deg)
+    assert left_out(theta, 0.21 * np.cos(0.7 * t) * moving)[-1] <= 2
+
+
+@pytest.mark.parametrize("period_s", [0.01, 0.05])
+def test_noise_of_the_rate_does_not_refute_it(period_s: float) -> None:
+    """Ten minutes parked."""
+    rng, t = np.random.default_rng(2), np.arange(0.0, 600.0, period_s)
+    assert left_out(rng.normal(0.0, SIGMA, t.size), rng.normal(0.0, 0.01, t.size), period_s)[-1] == 0
+
+
+def test_rates_that_come_right_are_used_again() -> None:
+    t = np.arange(0.0, 40.0, 0.01)
+    theta = 0.3 * np.sin(0.7 * t) + np.random.default_rng(3).normal(0.0, SIGMA, t.size)
+    found = left_out(theta, np.where(t < 10.0, 0.0, 0.21 * np.cos(0.7 * t)))
+    assert found[999] > 900
+    assert found[-1] == found[-1000]
+
+
 def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:
     estimator, totals = Estimator(VEHICLE), []
     for i, m in enumerate(messages()):

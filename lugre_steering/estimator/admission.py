@@ -34,10 +34,6 @@ def _clear(ch):
     ch.period_ns = 0
     ch.head = 0
     ch.cursor = 0
-    ch.last_rate = 0.0
-    ch.rate_astray = 0.0
-    ch.travel = 0.0
-    ch.rate_refuted = False
 
 
 @njit
@@ -46,6 +42,7 @@ def _begin_side(core, side):
     saturated = core.state[side].saturated
     core.state[side] = np.zeros_like(core.state)[side]
     core.motion[side] = np.zeros_like(core.motion)[side]
+    core.trust[side] = np.zeros_like(core.trust)[side]
     core.state[side].saturated = saturated
     _clear(core.channels[side])
 

@@ -21,6 +21,7 @@ from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import admit
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
+from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
 from lugre_steering.recording import Array, IntArray, Kind
@@ -199,6 +200,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
         parameters=np.concatenate(model.parameters),
         state=np.zeros(sides, STATE),
         motion=np.zeros(sides, MOTION),
+        trust=np.zeros(sides, TRUST),
         output=np.zeros(sides, OUTPUT),
         waiting=np.zeros((sides, WAITING_RING), WAITING),
         rubber=model.rubber,

@@ -76,10 +76,6 @@ CHANNEL = np.dtype(
         ("period_ns", np.int64),  # from the last but one accepted sample to the last
         ("head", np.int64),  # samples stored so far in the ring of this line or side
         ("cursor", np.int64),  # first ring sample that may still be needed
-        ("last_rate", np.float64),  # of the last credible rate [rad/s]
-        ("rate_astray", np.float64),  # what the rates of late add up to beyond the way of the angle [rad]
-        ("travel", np.float64),  # that way, there and back [rad]
-        ("rate_refuted", np.bool_),  # no rate of this side is used any more
         ("offset", np.float64),  # sensor offset [Pa]
         ("drift", np.float64),  # sensor drift [Pa/s]
         ("reasons", np.int64, (len(REASONS),)),
@@ -105,6 +101,7 @@ class Core(NamedTuple):
     parameters: Records
     state: Records
     motion: Records
+    trust: Records
     output: Records
     waiting: Records
     rubber: Array

@@ -6,47 +6,73 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from lugre_steering.estimator.layout import RATE
 
-MEMORY_S = 1.0
+MEMORY_S = 3.0
 SLACK_SIGMA = 10.0
-LEAST_SIGMA = 1e-4  # rad; sheets may say that the angle has no noise
+LEAST_SIGMA = 1e-6  # rad, where the sheet gives the angle no noise
+NOISE_SIGMA = 4.0
 SHARE_OF_TRAVEL = 0.25
+REDEEMED_S = 10.0
+LASTING = 3  # samples: a spike of the angle is over sooner
+
+TRUST = np.dtype(
+    [
+        ("last_rate", np.float64),  # last credible rate [rad/s]
+        ("last_astray", np.float64),  # what the last rate made of its interval, less the change of the angle [rad]
+        ("astray", np.float64),  # the sum of these of late [rad]
+        ("variance", np.float64),  # of that sum, as the difference of neighbours tells it [rad2]
+        ("travel", np.float64),  # of the estimated angle in that time, there and back [rad]
+        ("doubts", np.int64),  # samples in a row for which the sum was too large
+        ("agreed", np.float64),  # for how long it moved and the sum was small, since it was not [s]
+        ("refuted", np.bool_),
+    ]
+)
 
 
 @njit
-def believed(ch, c, dt, value, rate):
+def believed(s, ch, c, dt, value, rate):
     """The ``rate`` [rad/s] of an accepted sample of channel ``ch``, ``dt`` [s] and ``value`` [rad] after the last; NaN: not used.
 
-    One rate is left out if it is faster than an angle may be, or departs from the change of the angle by more than that
-    change, the last rate and the noise together. All are left out from then on if, over the last second, they add up
-    to another way than the angle went, by a quarter of that way and more than noise could. Left out ones are counted.
+    ``s`` is one ``TRUST`` record. One rate is left out if it is faster than an angle may be, or departs from the change of
+    the angle by more than that change, the last rate and the noise together. All are left out once they add up, over
+    ``MEMORY_S``, to another way than the angle went, by a quarter of that way and more than noise could; until they have
+    added up for ``REDEEMED_S`` of motion. Left out ones are counted.
     """
     if math.isnan(rate):
         return rate
-    if ch.rate_refuted:
-        return _counted(ch, rate, False)
-    slack = SLACK_SIGMA * max(c.angle_noise, LEAST_SIGMA)
-    change = value - ch.last_value
     credible = abs(rate) <= c.max_rate
-    if not 0.0 < dt <= c.max_gap_ns * 1e-9:  # nothing to compare with
-        ch.last_rate = rate if credible else 0.0
+    if dt <= 0.0:
+        s.last_rate = rate if credible else 0.0
         return _counted(ch, rate, credible)
-    credible = credible and abs(rate * dt - change) <= slack + abs(change) + abs(ch.last_rate) * dt
-    decay = math.exp(-dt / MEMORY_S)
+    slack = SLACK_SIGMA * (c.angle_noise if c.angle_noise > 0.0 else LEAST_SIGMA)
+    change = value - ch.last_value
+    single = slack + NOISE_SIGMA * math.sqrt(2.0 * dt / MEMORY_S * s.variance)
+    credible = credible and abs(rate * dt - change) <= single + abs(change) + abs(s.last_rate) * dt
+    unsure = 0.0
     if credible:
-        doubt = 0.5 * abs(rate - ch.last_rate) * dt  # of the sum, as the rate may have changed at any instant between
-        astray = 0.5 * (rate + ch.last_rate) * dt - change
-        ch.last_rate = rate
+        unsure = 0.5 * abs(rate - s.last_rate) * dt  # it may have changed at any instant between
+        astray = 0.5 * (rate + s.last_rate) * dt - change
+        s.last_rate = rate
     else:
-        doubt = 0.0
         astray = math.copysign(slack, rate * dt - change)
-    ch.rate_astray = decay * ch.rate_astray + astray
-    ch.travel *= decay
-    ch.rate_refuted = abs(ch.rate_astray) > 3.0 * slack + doubt + SHARE_OF_TRAVEL * ch.travel
-    return _counted(ch, rate, credible and not ch.rate_refuted)
+    decay = math.exp(-dt / MEMORY_S)
+    s.astray = decay * s.astray + astray
+    s.variance = decay * decay * s.variance + 0.5 * (astray - s.last_astray) ** 2
+    s.last_astray = astray
+    s.travel *= decay
+    noise = 2.0 * slack + NOISE_SIGMA * math.sqrt(s.variance)
+    limit = noise + unsure + SHARE_OF_TRAVEL * s.travel
+    s.doubts = s.doubts + 1 if abs(s.astray) > limit else 0
+    if abs(s.astray) > 0.5 * limit:
+        s.agreed = 0.0
+    elif s.travel > 2.0 * noise:
+        s.agreed += dt
+    s.refuted = s.doubts >= LASTING or (s.refuted and s.agreed < REDEEMED_S)
+    return _counted(ch, rate, credible and not s.refuted)
 
 
 @njit

@@ -95,13 +95,14 @@ def advance(core, k, stamp_ns, value, rate, estimates, count):
     else:
         ch.period_ns = stamp_ns - ch.last_ns
         dt = ch.period_ns * 1e-9
-    rate = believed(ch, c, dt, value, rate)
+    trust = core.trust[side]
+    rate = believed(trust, ch, c, dt, value, rate)
     ch.last_ns = stamp_ns
     ch.last_value = value
     motion = core.motion[side]
     before = motion.theta if motion.started != 0.0 else value
     follow(motion, dt, value, rate, c.angle_noise)
-    ch.travel += abs(motion.theta - before)
+    trust.travel += abs(motion.theta - before)
     step(
         core.parameters[side],
         core.state[side],

@@ -12,7 +12,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from lugre_steering.chain.model import baseline_parameters
-from lugre_steering.recording import NODE, Array, Kind
+from lugre_steering.recording import NODE, Kind
 from lugre_steering.vehicle import Vehicle
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -70,8 +70,8 @@ class Health:
         self.last_exception = ""
         self._fault_ns = -FAULT_HOLD_NS
         self._notable_Nm = NOTABLE_SHARE * len(vehicle.sides) * baseline_parameters(vehicle)["static_torque"]
-        self._squares = np.zeros(2)  # of residual and of estimate
-        self._levels: deque[tuple[Array, int]] = deque(maxlen=RESIDUAL_SECONDS)
+        self._residual_squares = self._estimate_squares = 0.0
+        self._levels: deque[tuple[float, float, int]] = deque(maxlen=RESIDUAL_SECONDS)
         self._then: Mapping[str, int] = {}
         self._then_arrivals = list(self.arrivals)
         self._then_residuals = 0
@@ -95,7 +95,8 @@ class Health:
 
     def add_residual(self, residual: float, measured: float) -> None:
         self.residuals += 1
-        self._squares += residual * residual, (measured - residual) ** 2
+        self._residual_squares += residual * residual
+        self._estimate_squares += (measured - residual) * (measured - residual)
 
     def statuses(
         self,
@@ -165,10 +166,10 @@ class Health:
         return self._status("latency", OK, "p50 and p99 of the window, max since start", values)
 
     def _residual(self, saturated_steps: int) -> DiagnosticStatus:
-        self._levels.append((self._squares, self.residuals - self._then_residuals))
-        self._squares, self._then_residuals = np.zeros(2), self.residuals
-        count = sum(n for _, n in self._levels)
-        rms, estimate = (np.sqrt(sum(s for s, _ in self._levels) / count) if count else np.full(2, math.nan)).tolist()
+        self._levels.append((self._residual_squares, self._estimate_squares, self.residuals - self._then_residuals))
+        self._residual_squares, self._estimate_squares, self._then_residuals = 0.0, 0.0, self.residuals
+        of_residual, of_estimate, count = (sum(column) for column in zip(*self._levels, strict=True))
+        rms, estimate = (math.sqrt(squares / count) if count else math.nan for squares in (of_residual, of_estimate))
         large = estimate > self._notable_Nm and rms > LARGE_SHARE * estimate
         saturated = saturated_steps > self._then_saturated
         self._then_saturated = saturated_steps
