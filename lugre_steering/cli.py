@@ -88,7 +88,7 @@ def spinner() -> Iterator[Callable[[str], None]]:
         yield lambda _: None
         return
     with console().status("") as status:
-        yield lambda text: status.update(text)
+        yield lambda text: status.update(escape(text))
 
 
 @contextmanager

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,13 @@ def earlier_result(out: Path, record: str, schema: str, others: Sequence[str], v
         if (out / name).exists():
             raise not_ours(out / name, record)
     return None
+
+
+def write_record(record: Mapping[str, Any], file: Path) -> None:
+    """As JSON, whole or not at all: half a record would pass for a file of others."""
+    part = file.with_name(f".{file.name}.part")
+    part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    part.replace(file)
 
 
 def not_ours(file: Path, record: str) -> DataError:

@@ -10,10 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.chain.model import baseline_parameters
 from lugre_steering.recording import Array, IntArray
+from lugre_steering.vehicle import Vehicle
 
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3
+LARGE_SHARE = 0.7
+NOTABLE_SHARE = 0.05
+"""Of the static friction: below, the torque is too small to compare with."""
 
 
 @dataclass
@@ -51,6 +56,7 @@ class Fit:
     spread: float = 0.0  # sum of (measured - mean)^2
     error: float = 0.0  # sum of residuals
     squares: float = 0.0  # sum of residual^2
+    estimates: float = 0.0  # sum of estimate^2
     measured: Range = field(default_factory=Range)
     estimate: Range = field(default_factory=Range)
 
@@ -65,6 +71,7 @@ class Fit:
             float(((measured - mean) ** 2).sum()),
             float(residual.sum()),
             float((residual**2).sum()),
+            float(((measured - residual) ** 2).sum()),
         )
         batch.measured.add(time_s, measured)
         batch.estimate.add(time_s, measured - residual)
@@ -81,6 +88,7 @@ class Fit:
         self.count = count
         self.error += other.error
         self.squares += other.squares
+        self.estimates += other.estimates
         self.measured.merge(other.measured)
         self.estimate.merge(other.estimate)
 
@@ -99,6 +107,12 @@ class Fit:
             "bias_Nm": self.error / self.count,
             "peaks": {"cylinder_torque": peaks(self.measured), "estimate": peaks(self.estimate)},
         }
+
+
+def is_large(residual_rms: float, estimate_rms: float, vehicle: Vehicle) -> bool:
+    """Whether a residual is so large beside the torque that wrong units, signs or plugs are likelier than missing physics."""
+    friction = len(vehicle.sides) * float(baseline_parameters(vehicle)["static_torque"])
+    return estimate_rms > NOTABLE_SHARE * friction and residual_rms > LARGE_SHARE * estimate_rms
 
 
 def r2_words(r2: float | None, name: str = "R2") -> str:

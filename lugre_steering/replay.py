@@ -8,6 +8,7 @@ A bag streams through in blocks; memory does not grow with its length.
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import tempfile
 from collections import Counter
@@ -26,12 +27,12 @@ from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
 from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.bag.writer import copied
-from lugre_steering.chain.model import baseline_parameters
 from lugre_steering.chain.step import Records
+from lugre_steering.earlier import write_record
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.online import Curves, Fit, Timeline, r2_words
+from lugre_steering.online import Curves, Fit, Timeline, is_large, r2_words
 from lugre_steering.recording import NODE, Channel, Finding, IntArray, Kind, unused_name
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
@@ -45,8 +46,6 @@ MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
 NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate")
 """Counters of the estimator about samples that it did use."""
-POOR_R2 = 0.5
-"""Below, and with a torque worth a comparison, missing physics is the less likely cause."""
 
 Progress = Callable[[str, int, "int | None"], None]
 """Called with the name of a bag, messages done, and messages in all (None where not known)."""
@@ -78,8 +77,7 @@ def replay(
             summary["bags"].append(run.write(out, progress))
             overall.merge(run.fit)
             summary["overall"] = overall.result()
-            text = json.dumps(summary, indent=2, allow_nan=False)
-            (out / "summary.json").write_text(text + "\n", encoding="utf-8")
+            write_record(summary, out / "summary.json")
     except OSError as error:
         raise BagError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     return summary
@@ -187,8 +185,8 @@ class _Run:
             if (out / self.name).exists():
                 shutil.rmtree(out / self.name)
             result.rename(out / self.name)
-            fit = self.fit.result()
-            findings = [*bag.findings, *self._found, *self._last_findings(fit)]
+            findings = [*bag.findings, *self._found, *self._last_findings()]
+        fit = self.fit.result()
         summary: dict[str, Any] = {
             "bag": str(self.path),
             "name": self.name,
@@ -332,8 +330,9 @@ class _Run:
                 words.append(f"{label}: stamps begin {(begin - angle[1]) * 1e-9:.1f} s after those of the angles end")
         return "; ".join(words)
 
-    def _last_findings(self, fit: Mapping[str, Any] | None) -> Iterator[Finding]:
-        if fit is not None and fit["r2"] is not None and fit["r2"] < POOR_R2 and self._moved_much(fit["peaks"]["estimate"]):
+    def _last_findings(self) -> Iterator[Finding]:
+        rms = [math.sqrt(squares / max(self.fit.count, 1)) for squares in (self.fit.squares, self.fit.estimates)]
+        if is_large(rms[0], rms[1], self.vehicle):
             statement = "the residual is as large as the torque: units, signs, plugs or clocks may be wrong; 'diagnose' tells which"
             yield Finding("large_residual", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0
@@ -349,11 +348,6 @@ class _Run:
             statement = "steps with a temperature outside the rubber table, whose edge was used"
             yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
 
-    def _moved_much(self, estimate: Mapping[str, float]) -> bool:
-        """Whether the estimate spans a torque that is worth a comparison."""
-        friction = len(self.vehicle.sides) * baseline_parameters(self.vehicle)["static_torque"]
-        return estimate["max_Nm"] - estimate["min_Nm"] > 0.1 * float(friction)
-
     def _counted(self, samples: Mapping[str, Mapping[str, Any]], *kinds: Kind) -> str:
         """What came on the inputs of some kinds, in words."""
         words = []
@@ -365,7 +359,7 @@ class _Run:
                 continue
             reasons = [f"{n} {reason}" for part in ("rejected", "noted") for reason, n in counts[part].items()]
             if not reasons and not counts["used"] and channel.joint:
-                reasons = [f"no message of '{counts['topic']}' carries the joint '{channel.joint}'"]
+                reasons = [f"'{counts['topic']}' has no message with the joint '{channel.joint}'"]
             words.append(", ".join([f"{label}: {counts['used']} samples used", *reasons]))
         return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 

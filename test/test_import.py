@@ -42,6 +42,12 @@ def messages(bag: Path) -> dict[str, list]:
     return found
 
 
+def logged(bag: Path) -> list[tuple[int, str]]:
+    """Log time and topic of every message."""
+    with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        return [(log, connection.topic) for connection, log, _ in reader.messages()]
+
+
 def seconds(message) -> float:
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
@@ -290,6 +296,30 @@ def test_two_runs_in_one_table_are_not_mixed_into_one(tmp_path: Path) -> None:
     recording = read_recording(tmp_path / "bag", channels)
     assert recording.angle["left"].value[:499] == pytest.approx(np.radians(0.1 * once[:499]), abs=1e-7)
     assert recording.rejected["/steering/left/joint_state"]["backward_stamp"] >= once.size - 2
+
+
+def test_one_wild_time_costs_one_sample(tmp_path: Path) -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    time[200] = 1e5
+    rows = "".join(f"{t:.3f},{a:.6f}\n" for t, a in zip(time, np.arange(1000) * 1e-3, strict=True))
+    log, map_file = write(tmp_path, "log.csv", "t,a\n" + rows), write(tmp_path, "map.yaml", GOOD)
+    import_table(log, map_file, tmp_path / "bag")
+    channels = [channel for channel in load(VEHICLE).channels if channel.name == "left"]
+    assert read_recording(tmp_path / "bag", channels).angle["left"].value.size == 999
+
+
+def test_runs_of_channels_at_different_rates_stay_together(tmp_path: Path) -> None:
+    """Log times where the table's time has run back: a sample of both channels lies where its row does."""
+    t = np.tile(np.arange(0.0, 5.0, 0.01), 2)
+    rows = "".join(f"{x:.3f},{x:.4f},{'' if i % 5 else '7'}\n" for i, x in enumerate(t))
+    text = HEAD + "time: {column: t}\nchannels:\n  angle/left: {column: a, unit: rad}\n  pressure/main_a: {column: p, unit: bar}\n"
+    log, map_file = write(tmp_path, "log.csv", "t,a,p\n" + rows), write(tmp_path, "map.yaml", text)
+    import_table(log, map_file, tmp_path / "bag")
+    found = messages(tmp_path / "bag")
+    order = [stamp for stamp, topic in sorted(logged(tmp_path / "bag")) if "pressure" in topic]
+    angles = [stamp for stamp, topic in sorted(logged(tmp_path / "bag")) if "left" in topic]
+    assert len(found["/steering/pressure/main_a"]) == len(order) == 200
+    assert order == angles[::5]
 
 
 def test_outliers_are_not_found_in_clean_data() -> None:

@@ -33,6 +33,7 @@ LIMITS = {
     Kind.AIR_TEMPERATURE: (-AIR_LIMIT_DEGC, AIR_LIMIT_DEGC),
     Kind.TORQUE: (-1e9, 1e9),
 }
+SET_BACK_RUN = 5  # messages in a row between others: no mere lateness
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 
@@ -152,13 +153,9 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
         usual = np.percentile(offset, 50.0, method="lower")
         reject("absurd_stamp", np.abs(offset - usual) > STRAY_NS)
     if len(use):
-        # A stamp counts as reached once one of the next two confirms it: one wild stamp must not outdate the rest.
         s = stamp[use]
-        following = np.maximum(np.append(s[1:], s[-1]), np.append(s[2:], s[-2:]))
-        reached = np.maximum.accumulate(np.minimum(s, following))
-        ahead = s > following + LATE_NS
-        behind = s < reached - LATE_NS
-        reject("backward_stamp", ahead | behind)
+        believed = confirmed(s)
+        reject("backward_stamp", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
     if len(use):
         reject("backward_stamp", _doubled(stamp[use]))
     reordered = int(_late(stamp[use]).sum()) if len(use) else 0
@@ -167,16 +164,28 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
     return use, reasons, reordered
 
 
+def confirmed(stamp: IntArray) -> IntArray:
+    """How far (n,) each stamp is believed: until one of the next two has come as far. One wild stamp must not outdate the rest."""
+    following = np.maximum(np.append(stamp[1:], stamp[-1:]), np.append(stamp[2:], stamp[-2:]))
+    return np.asarray(np.minimum(stamp, following))
+
+
 def _late(stamp: IntArray) -> NDArray[np.bool_]:
     return np.asarray(stamp < np.maximum.accumulate(stamp))
 
 
 def _doubled(stamp: IntArray) -> NDArray[np.bool_]:
-    """Which late messages fill no hole but come between others, as after a clock was set back by less than ``LATE_NS``."""
+    """Which messages came after a clock was set back by less than ``LATE_NS``, between stamps that were there already.
+
+    Late ones fill holes, or are few or mixed among others; these run on, one after the other.
+    """
     late = _late(stamp)
+    if not late.any():
+        return late
     on_time = stamp[~late]
-    if not late.any() or on_time.size < 2:
-        return np.zeros(stamp.size, np.bool_)
     after = np.clip(np.searchsorted(on_time, stamp), 1, on_time.size - 1)
     apart = np.minimum(np.abs(stamp - on_time[after - 1]), np.abs(on_time[after] - stamp))
-    return np.asarray(late & (apart > 0) & (apart < 0.6 * float(np.median(np.diff(on_time)))))
+    between = late & (apart > 0) & (apart < 0.6 * float(np.median(np.diff(np.unique(stamp)))))
+    goes_on = between[1:] & between[:-1] & (np.diff(stamp) > 0)
+    run = np.cumsum(np.append(True, ~goes_on))
+    return np.asarray(between & (np.bincount(run)[run] >= SET_BACK_RUN))

@@ -13,6 +13,7 @@ import sqlite3
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -105,11 +106,15 @@ class BagWriter:
         self._kind = storage
         try:
             self.folder.mkdir(parents=True)
-            self._file = self.folder / f"{self.folder.name}.{'mcap' if storage == 'mcap' else 'db3'}"
-            self._storage: _Storage = _McapStorage(self._file) if storage == "mcap" else _SqliteStorage(self._file)
         except FileExistsError:
             raise BagError(f"{self.folder}: exists already; recordings are never overwritten") from None
+        except OSError as error:
+            raise BagError(f"{self.folder}: cannot be written ({error})") from error
+        try:
+            self._file = self.folder / f"{self.folder.name}.{'mcap' if storage == 'mcap' else 'db3'}"
+            self._storage: _Storage = _McapStorage(self._file) if storage == "mcap" else _SqliteStorage(self._file)
         except (OSError, sqlite3.Error) as error:
+            shutil.rmtree(self.folder, ignore_errors=True)
             raise BagError(f"{self.folder}: cannot be written ({error})") from error
 
     def __enter__(self) -> BagWriter:
@@ -121,8 +126,13 @@ class BagWriter:
         if kind is None:
             self.close()
         else:
+            self._discard()
+
+    def _discard(self) -> None:
+        """Half a recording would stand in the way of the next attempt."""
+        with suppress(OSError, sqlite3.Error):  # a full disk refuses the rest as well
             self._storage.abort()
-            shutil.rmtree(self.folder, ignore_errors=True)  # half a recording would stand in the way of the next attempt
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def add_topic(self, topic: str, msgtype: str) -> int:
         """Announce a topic of a stock type; returns its number."""
@@ -160,6 +170,7 @@ class BagWriter:
             self._storage.close()
             (self.folder / "metadata.yaml").write_text(self._metadata(), encoding="utf-8")
         except (OSError, sqlite3.Error) as error:
+            self._discard()
             raise BagError(f"{self._file}: writing failed ({error})") from error
 
     def _metadata(self) -> str:

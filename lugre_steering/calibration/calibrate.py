@@ -24,7 +24,6 @@ statement           one paragraph
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -44,13 +43,15 @@ from lugre_steering.diagnosis.fitting.apply import apply_calibration
 from lugre_steering.diagnosis.fitting.fit import fit
 from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
 from lugre_steering.diagnosis.fitting.split import split
-from lugre_steering.earlier import earlier_result
+from lugre_steering.earlier import earlier_result, write_record
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Recording
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load, save
 
 SCHEMA = "lugre_steering/calibration/1"
+FILES = ("calibrated.yaml", "calibration.png")
+"""What is written beside the record."""
 SHORTEST_S = 10.0
 SLIDING = 3.0
 """Turns must reach this many presliding lengths, or friction never slides."""
@@ -136,7 +137,7 @@ def calibrate(
     ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
     """
     vehicle = load(vehicle_file)
-    earlier_result(out, "calibration.json", SCHEMA, ("calibrated.yaml", "calibration.png"), vehicle_file)
+    earlier_result(out, "calibration.json", SCHEMA, FILES, vehicle_file)
     recordings = read_recordings(bags, vehicle.channels, progress)
     calibrations = chosen(vehicle, free, fix, prior or {})
     done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
@@ -152,10 +153,12 @@ def calibrate(
     try:
         out.mkdir(parents=True, exist_ok=True)
         # The record comes first: if the rest is interrupted, it tells the next attempt that all this is ours.
-        _write(result, out / "calibration.json")
+        write_record(result, out / "calibration.json")
+        for name in FILES:  # of an earlier run: they would not belong to this record
+            (out / name).unlink(missing_ok=True)
         save(with_provenance(done.vehicle, result), out / "calibrated.yaml")
         result["picture"], result["picture_note"] = _picture(done, out / "calibration.png")
-        _write(result, out / "calibration.json")
+        write_record(result, out / "calibration.json")
     except OSError as error:
         raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     return result
@@ -375,13 +378,8 @@ def with_provenance(vehicle: Vehicle, result: Mapping[str, Any]) -> Vehicle:
     return vehicle.replace(provenance={**vehicle.provenance, "calibration": note})
 
 
-def _write(result: Mapping[str, Any], file: Path) -> None:
-    file.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
 def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
     if note := no_pictures():
-        file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
         return None, note
     from lugre_steering.report.calibration_figure import draw_calibration
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
 from lugre_steering.diagnosis.result import SCHEMA, picture_names
-from lugre_steering.earlier import earlier_result, not_ours
+from lugre_steering.earlier import earlier_result, not_ours, write_record
 from lugre_steering.errors import BagError, DataError, LugreSteeringError
 from lugre_steering.vehicle import load, save
 
@@ -58,7 +57,7 @@ def run(
     try:
         if old is not None:
             _take_away_report(out, old)
-        (out / "diagnosis.json").write_text(json.dumps(result.json, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        write_record(result.json, out / "diagnosis.json")
         save(result.vehicle, out / "augmented.yaml")
     except OSError as error:
         raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error

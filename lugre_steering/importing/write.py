@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lugre_steering.bag import BagWriter, Part, cdr
+from lugre_steering.bag.load import confirmed
 from lugre_steering.bag.messages import Bytes
 from lugre_steering.errors import MapFileError
-from lugre_steering.importing.map import UNITS, Chamber, ImportMap, Source, load_map, to_si
+from lugre_steering.importing.map import UNITS, Chamber, Clock, ImportMap, Source, load_map, to_si
 from lugre_steering.importing.table import Table, read_table
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Topics, TorqueSensor
@@ -84,11 +86,12 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
     channels = {name: _channel(table, mapping, name) for name in mapping.channels if not name.startswith("rate/")}
     stamps = {name: _stamps(file, map_file, mapping, channel) for name, channel in channels.items()}
     messages = {name: _messages(table, mapping, channel, stamps[name]) for name, channel in channels.items()}
+    logged = _log_times(mapping, channels, stamps)
     marks = {"imported_from": file.name, "import_map": map_file.name}
     with BagWriter(out, "sqlite3" if storage == "sqlite3" else "mcap", marks) as writer:
         writer.write(
             [
-                Part(writer.add_topic(topic, msgtype), _logged(stamps[name]), rows)
+                Part(writer.add_topic(topic, msgtype), logged[name], rows)
                 for name, (topic, msgtype, rows) in messages.items()
             ]
         )
@@ -107,10 +110,19 @@ def _stamps(file: Path, map_file: Path, mapping: ImportMap, channel: Imported) -
     return round(mapping.epoch_s * 1e9) + np.round(channel.time_s * 1e9).astype(np.int64)
 
 
-def _logged(stamp: IntArray) -> IntArray:
-    """Log times (n,) [ns]: the stamps, but in the order of the table, so that readers see where its time runs back."""
-    row = np.arange(stamp.size)
-    return np.asarray(np.maximum.accumulate(stamp - row) + row, np.int64)
+def _log_times(mapping: ImportMap, channels: Mapping[str, Imported], stamps: Mapping[str, IntArray]) -> dict[str, IntArray]:
+    """Log times (n,) [ns] of each channel: the stamps, but in the order of the table's rows.
+
+    So readers see where its time runs back. Channels of one clock are taken together, and stay beside each other.
+    """
+    clocks: dict[Clock, IntArray] = {}
+    for name, channel in channels.items():
+        known = clocks.setdefault(mapping.clock(name), np.zeros(channel.rows.size, np.int64))
+        known[channel.rows] = stamps[name]
+    for known in clocks.values():
+        row = np.flatnonzero(known)
+        known[row] = np.maximum.accumulate(confirmed(known[row]) - row) + row
+    return {name: clocks[mapping.clock(name)][channel.rows] for name, channel in channels.items()}
 
 
 def _channel(table: Table, mapping: ImportMap, name: str) -> Imported:

@@ -11,17 +11,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from lugre_steering.chain.model import baseline_parameters
+from lugre_steering.online import is_large
 from lugre_steering.recording import NODE, Kind
 from lugre_steering.vehicle import Vehicle
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 FAULT_HOLD_NS = 1_000_000_000
 RESIDUAL_SECONDS = 10
-LARGE_SHARE = 0.7
-"""A residual of this share of the torque (both root mean square) is rather a fault of the wiring than missing physics."""
-NOTABLE_SHARE = 0.05
-"""Of the static friction: below, the torque is too small to compare with."""
 
 
 class Window:
@@ -51,7 +47,6 @@ class Health:
 
     def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int) -> None:
         self._node = NODE
-        self._hardware = vehicle.name
         self._kinds = [channel.kind for channel in vehicle.channels]
         self._topics: list[str] = [""] * len(self._kinds)
         self._timeouts_s = [angle_timeout_s if kind is Kind.ANGLE else pressure_timeout_s for kind in self._kinds]
@@ -69,7 +64,7 @@ class Health:
         self.exceptions = 0
         self.last_exception = ""
         self._fault_ns = -FAULT_HOLD_NS
-        self._notable_Nm = NOTABLE_SHARE * len(vehicle.sides) * baseline_parameters(vehicle)["static_torque"]
+        self._vehicle = vehicle
         self._residual_squares = self._estimate_squares = 0.0
         self._levels: deque[tuple[float, float, int]] = deque(maxlen=RESIDUAL_SECONDS)
         self._then: Mapping[str, int] = {}
@@ -120,7 +115,7 @@ class Health:
     def _status(self, component: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
         name = f"{self._node}: {component}"
-        return DiagnosticStatus(level=level, name=name, message=message, hardware_id=self._hardware, values=pairs)
+        return DiagnosticStatus(level=level, name=name, message=message, hardware_id=self._vehicle.name, values=pairs)
 
     def _inputs(self, now_ns: int, elapsed_s: float, labels: Sequence[str]) -> DiagnosticStatus:
         level, troubles = OK, []
@@ -170,7 +165,7 @@ class Health:
         self._residual_squares, self._estimate_squares, self._then_residuals = 0.0, 0.0, self.residuals
         of_residual, of_estimate, count = (sum(column) for column in zip(*self._levels, strict=True))
         rms, estimate = (math.sqrt(squares / count) if count else math.nan for squares in (of_residual, of_estimate))
-        large = estimate > self._notable_Nm and rms > LARGE_SHARE * estimate
+        large = is_large(rms, estimate, self._vehicle)
         saturated = saturated_steps > self._then_saturated
         self._then_saturated = saturated_steps
         message = "rubber temperature outside the rubber table" if saturated else ""

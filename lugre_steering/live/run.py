@@ -23,7 +23,8 @@ from lugre_steering.live.estimator_node import SteeringTorqueEstimator
 
 _SLICE_S = 0.5  # how long a shutdown that came between check and spin may go unnoticed
 _FAULTS = 100  # of the middleware in a row, and no callback between: a supervisor must know
-_BREATH_S = 0.05  # after such a fault
+_PATIENCE = 5
+_BREATH_S = 0.05  # after each further such fault: no core is kept busy with nothing
 
 
 def run(args: list[str]) -> int:
@@ -71,7 +72,8 @@ def spin(node: Node, executor_kind: str, fault: Callable[[Exception], None], cal
                 faults = 0
             else:
                 faults += 1
-                time.sleep(_BREATH_S)
+                if faults > _PATIENCE:
+                    time.sleep(_BREATH_S)
     except ExternalShutdownException:
         return True
     finally:

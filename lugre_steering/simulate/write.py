@@ -5,6 +5,7 @@ of its own."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
     topic = np.repeat(np.arange(len(topics)), [stamp.size for _, _, stamp, _ in topics])
     within = np.concatenate([np.arange(stamp.size) for _, _, stamp, _ in topics])
     store = get_typestore(Stores.ROS2_JAZZY)
+    ours = not folder.exists()
     try:
         writer = Writer(folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
         if compress:
@@ -55,6 +57,9 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
         raise BagError(f"{folder}: {str(error).removeprefix(f'{folder} ')}") from error
     except OSError as error:
         raise BagError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    finally:
+        if ours and not (folder / "metadata.yaml").exists():  # half a recording would stand in the way of the next attempt
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 _Topic = tuple[str, str, IntArray, Bytes]

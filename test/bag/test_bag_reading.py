@@ -255,6 +255,24 @@ def test_a_joint_state_without_names_gives_its_first_position(tmp_path: Path) ->
 # ------------------------------------------------------------------- cleaning
 
 
+@pytest.mark.parametrize("kind", ["swapped in pairs", "reversed in fives", "delayed at random"])
+def test_messages_out_of_order_are_put_back(tmp_path: Path, kind: str) -> None:
+    """Merely late ones are no set-back clock, however many they are."""
+    sent = np.arange(1000)
+    arrived = {
+        "swapped in pairs": sent ^ 1,
+        "reversed in fives": sent // 5 * 5 + 4 - sent % 5,
+        "delayed at random": np.argsort(sent + np.random.default_rng(1).exponential(5.0, 1000), kind="stable"),
+    }[kind]
+    messages = [
+        ("/" + LEFT.topic, make.JOINT_STATE, T0 + i * 10**7, make.joint_state(T0 + int(k) * 10**7, [LEFT.joint], [1e-4 * k]))
+        for i, k in enumerate(arrived)
+    ]
+    recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
+    assert recording.rejected == {}
+    assert recording.angle["left"].value == pytest.approx(1e-4 * sent)
+
+
 def test_why_nothing_is_usable(tmp_path: Path) -> None:
     stopped = [("/" + LEFT.topic, make.JOINT_STATE, T0 + i, make.joint_state(0, [LEFT.joint], [0.1])) for i in range(30)]
     with pytest.raises(BagError, match=f"left out: 30 zero_stamp on /{LEFT.topic}"):

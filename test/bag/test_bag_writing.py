@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import bag_making as make
@@ -15,6 +18,7 @@ from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
+import lugre_steering
 from lugre_steering.bag import Bag, BagWriter, Part, cdr, read_recording
 from lugre_steering.bag.messages import Connection
 from lugre_steering.bag.writer import copied
@@ -132,6 +136,30 @@ def test_a_failed_writer_leaves_nothing_behind(tmp_path: Path, storage: str) -> 
     with pytest.raises(RuntimeError, match="stopped"):
         failing()
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path: Path, storage: str) -> None:
+    """The process may write no file beyond 64 kB; then the end of the file fails, and so does giving up."""
+    code = f"""
+import resource, signal, sys
+import numpy as np
+from lugre_steering.bag import BagWriter, Part, cdr
+from lugre_steering.errors import BagError
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
+stamps = np.arange(1, 20001) * 10**6
+try:
+    with BagWriter("out", "{storage}") as writer:
+        topic = writer.add_topic("/a", "sensor_msgs/msg/Temperature")
+        writer.write([Part(topic, stamps, cdr.encode_temperature(stamps, "", np.random.default_rng(1).random(20000)))])
+except BagError as error:
+    sys.exit(f"told: {{error}}")
+"""
+    environment = os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.stderr.startswith("told: out"), done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_existing_folder_is_never_overwritten(tmp_path: Path) -> None:

@@ -59,6 +59,13 @@ def test_a_parameter_at_the_end_of_its_range_is_told(value: float, ends: int) ->
     assert len(at_end({"id": "angle_offset", "parameters": {"offset": {"value": value, "unit": "rad"}}})) == ends
 
 
+def test_an_end_of_a_line_is_told_and_that_of_a_shape_is_not() -> None:
+    (end,) = at_end({"id": "pressure_offset", "parameters": {"main_a": {"value": 5e6, "unit": "Pa"}}})
+    assert end == ("main_a", 5e6, "Pa")
+    (shape,) = (p for p in CATALOGUE["end_stop"].parameters if p.name == "engage_angle")
+    assert not at_end({"id": "end_stop", "parameters": {"engage_angle": {"value": shape.low, "unit": "rad"}}})
+
+
 def test_the_next_experiment_compares_what_the_sensors_would_show(problem: Problem) -> None:
     """An offset of one line acts through its arm, a slope does not: the difference is neither nothing nor the whole of either."""
     result = fit(problem, weight(problem))

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from lugre_steering import cli
 from lugre_steering.bag import read_recording
+from lugre_steering.errors import DataError
 from lugre_steering.recording import Kind
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import command, examples
@@ -140,6 +141,21 @@ def test_an_experiment_that_fails_gives_exit_code_1(tmp_path: Path, monkeypatch:
     monkeypatch.setitem(EXPERIMENTS, "paper-pavements", ("", lambda _: failed))
     monkeypatch.setattr(command, "write_outcomes", lambda _what, outcomes, _out: {"passed": outcomes[0].passed})
     assert invoke("paper-pavements", "--out", str(tmp_path))[0] == 1
+
+
+def test_an_interrupted_recording_can_be_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    vehicle = command.load_vehicle(None)
+    with monkeypatch.context() as patch:
+        patch.setattr("lugre_steering.simulate.write.Writer.write", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
+    assert list(tmp_path.iterdir()) == []
+    command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
+    with pytest.raises(DataError, match="exists already"):
+        command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
 
 
 def test_the_examples_are_written_with_equal_bytes(tmp_path: Path) -> None:

@@ -13,12 +13,14 @@ from lugre_steering.effects.catalogue import CATALOGUE
 
 
 def at_end(effect: Mapping[str, Any]) -> list[tuple[str, float, str]]:
-    """Name, value and unit of the parameters of a named effect that were fitted to an end of their range other than zero."""
-    ranges = {parameter.name: (parameter.low, parameter.high) for parameter in CATALOGUE[effect["id"]].parameters}
+    """Name, value and unit of the amplitudes of a named effect that were fitted to an end of their range other than zero."""
+    entry = CATALOGUE[effect["id"]]
+    amplitudes = {parameter.name: (parameter.low, parameter.high) for parameter in entry.parameters if not parameter.is_shape}
+    alone = next(iter(amplitudes.values()), ())  # one that acts on a line goes by the name of the line
     return [
-        (name, entry["value"], entry["unit"])
-        for name, entry in effect["parameters"].items()
-        if any(end and math.isclose(entry["value"], end, rel_tol=1e-6) for end in ranges.get(name, ()))
+        (name, found["value"], found["unit"])
+        for name, found in effect["parameters"].items()
+        if any(end and math.isclose(found["value"], end, rel_tol=1e-6) for end in (alone if entry.per_line else amplitudes.get(name, ())))
     ]
 
 
@@ -55,7 +57,7 @@ def statement(
         f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
         + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
-        + (f" At the end of the range that is searched: {', '.join(ends)}; the cause is larger than that, or another." if ends else "")
+        + (f" At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another." if ends else "")
         + (f" {' and '.join(ended)} does not act in {last}, the last recording: augmented.yaml is without." if ended else "")
         + (f" Structure is left: {left}." if left else "")
     )
