@@ -507,3 +507,16 @@ def test_drawn_differences_follow_the_laws() -> None:
     for found in card.traces(CATALOGUE["time_delay"]):
         late = np.interp(found.run.time - found.values["delay"], found.run.time, found.without)
         np.testing.assert_allclose(found.difference, late - found.without, atol=1e-6)
+
+
+def test_logarithmic_axes_carry_plain_numbers(tmp_path: Path) -> None:
+    """Names may hold any character, so nothing is read as mathematics; what Matplotlib writes there must not look like it."""
+    plt = pytest.importorskip("matplotlib.pyplot")
+    from lugre_steering.report.style import figure
+
+    with figure(1, 1, "", tmp_path / "log.png") as axes:
+        axes[0, 0].plot([0.01, 10.0], [1.0, 1000.0])
+        axes[0, 0].set(xscale="log", yscale="log")
+    shown = [label.get_text() for labels in ("xticklabels", "yticklabels") for label in plt.getp(axes[0, 0], labels)]
+    assert {"0.01", "1", "10", "1000"} <= set(shown)
+    assert not [text for text in shown if "$" in text]

@@ -64,6 +64,7 @@ def draw_power(board: Board, file: Path, made: str) -> None:
                 axis.errorbar(x, shares, np.abs(ends - shares), marker="o", capsize=3, color=SERIES[k], label=label)
         axis.plot([0.1, 0.3], [TARGETS["named_at_0.1"], TARGETS["named_from_0.3"]], "k_", markersize=16, label="target for names")
         axis.set(xscale="log", ylim=(-0.02, 1.04), title="Detection power")
+        axis.set_xticks(ratios)
         axis.set(xlabel="effect-to-noise variance ratio (1)", ylabel="share of cases (1)")
         axis.legend(loc="lower right")
 

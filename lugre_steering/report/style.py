@@ -83,6 +83,9 @@ def figure(
         fig, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False)
         try:
             yield axes
+            for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_scale() == "log"):
+                axis.set_major_formatter("{x:g}")  # the usual one writes mathematics, which is not parsed here
+                axis.set_minor_formatter("")
             for text in fig.findobj(Text):
                 text.set_text(words(text.get_text()))
             fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
