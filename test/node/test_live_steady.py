@@ -76,7 +76,7 @@ def watched_spin(*arguments):
     tracemalloc.start()
     before = signatures()
     event.register("numba:compile", compiled)
-    spin(*arguments)
+    sound = spin(*arguments)
     result = {
         "pushes": pushes,
         "compiled": compiled,
@@ -85,6 +85,7 @@ def watched_spin(*arguments):
         "resident_growth_kB": resident_kB("VmHWM") - memory.get("resident_kB", 0),
     }
     print("watched:", json.dumps(result))
+    return sound
 
 
 if not WARM_UP:
