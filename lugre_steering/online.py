@@ -109,10 +109,10 @@ class Fit:
         }
 
 
-def is_large(residual_rms: float, estimate_rms: float, vehicle: Vehicle) -> bool:
+def is_large(residual_rms: float, estimate_rms: float, measured_rms: float, vehicle: Vehicle) -> bool:
     """Whether a residual is so large beside the torque that wrong units, signs or plugs are likelier than missing physics."""
     friction = len(vehicle.sides) * float(baseline_parameters(vehicle)["static_torque"])
-    return estimate_rms > NOTABLE_SHARE * friction and residual_rms > LARGE_SHARE * estimate_rms
+    return estimate_rms > NOTABLE_SHARE * friction and residual_rms > LARGE_SHARE * min(estimate_rms, measured_rms)
 
 
 def r2_words(r2: float | None, name: str = "R2") -> str:

@@ -331,8 +331,10 @@ class _Run:
         return "; ".join(words)
 
     def _last_findings(self) -> Iterator[Finding]:
-        rms = [math.sqrt(squares / max(self.fit.count, 1)) for squares in (self.fit.squares, self.fit.estimates)]
-        if is_large(rms[0], rms[1], self.vehicle):
+        fit = self.fit
+        sums = fit.squares, fit.estimates, fit.spread + fit.count * fit.mean**2
+        residual, estimate, measured = (math.sqrt(squares / max(fit.count, 1)) for squares in sums)
+        if is_large(residual, estimate, measured, self.vehicle):
             statement = "the residual is as large as the torque: units, signs, plugs or clocks may be wrong; 'diagnose' tells which"
             yield Finding("large_residual", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0

@@ -278,6 +278,13 @@ def test_noise_of_the_rate_does_not_refute_it(period_s: float) -> None:
     assert left_out(rng.normal(0.0, SIGMA, t.size), rng.normal(0.0, 0.01, t.size), period_s)[-1] == 0
 
 
+@pytest.mark.parametrize(("share", "frequency_Hz", "amplitude"), [(0.0, 1.0, 0.1), (0.5, 0.3, 0.1), (2.0, 1.0, 0.1), (-1.0, 2.0, 0.02)])
+def test_wrong_rates_of_an_oscillation_do_not_redeem_themselves(share: float, frequency_Hz: float, amplitude: float) -> None:
+    t, omega = np.arange(0.0, 60.0, 0.01), 2.0 * math.pi * frequency_Hz
+    theta = amplitude * np.sin(omega * t) + np.random.default_rng(4).normal(0.0, SIGMA, t.size)
+    assert left_out(theta, share * amplitude * omega * np.cos(omega * t))[-1] > 5000
+
+
 def test_rates_that_come_right_are_used_again() -> None:
     t = np.arange(0.0, 40.0, 0.01)
     theta = 0.3 * np.sin(0.7 * t) + np.random.default_rng(3).normal(0.0, SIGMA, t.size)

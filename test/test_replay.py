@@ -358,9 +358,9 @@ def test_a_joint_of_another_name_is_named(tmp_path: Path) -> None:
         replay([bag], VEHICLE, tmp_path / "out")
 
 
-@pytest.mark.parametrize(("scale", "found"), [(1.0, []), (1e-5, ["large_residual"]), (-1.0, ["large_residual"]), (0.0, ["large_residual"])])
-def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float, found: list[str]) -> None:
-    """Pressures in bar, with the other sign, and none."""
+@pytest.mark.parametrize("scale", [1.0, 1e-5, -1.0, 0.5, 0.0])
+def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float) -> None:
+    """Pressures in bar, with the other sign, half of them, and none."""
     messages = []
     for topic, kind, log, raw in read(DOUBLE_CYCLE):
         if kind == make.FLUID_PRESSURE:
@@ -368,7 +368,7 @@ def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float,
             raw = make.pressure(stamp_of(message), scale * message.fluid_pressure)
         messages.append((topic, kind, log, raw))
     (bag,) = replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")["bags"]
-    assert [finding["finding"] for finding in bag["findings"]] == found
+    assert [finding["finding"] for finding in bag["findings"]] == ([] if scale == 1.0 else ["large_residual"])
 
 
 def test_without_a_pressure_the_torque_is_still_estimated(tmp_path: Path) -> None:

@@ -169,9 +169,11 @@ class BagWriter:
         try:
             self._storage.close()
             (self.folder / "metadata.yaml").write_text(self._metadata(), encoding="utf-8")
-        except (OSError, sqlite3.Error) as error:
+        except BaseException as error:
             self._discard()
-            raise BagError(f"{self._file}: writing failed ({error})") from error
+            if isinstance(error, (OSError, sqlite3.Error)):
+                raise BagError(f"{self._file}: writing failed ({error})") from error
+            raise
 
     def _metadata(self) -> str:
         count = sum(self._counts)

@@ -13,9 +13,10 @@ from lugre_steering.estimator.layout import RATE
 
 MEMORY_S = 3.0
 SLACK_SIGMA = 10.0
-LEAST_SIGMA = 1e-6  # rad, where the sheet gives the angle no noise
+LEAST_SIGMA = 1e-5  # rad, where the sheet gives the angle no noise
 NOISE_SIGMA = 4.0
 SHARE_OF_TRAVEL = 0.25
+REDEEMING_SHARE = 0.02
 REDEEMED_S = 10.0
 LASTING = 3  # samples: a spike of the angle is over sooner
 
@@ -40,8 +41,12 @@ def believed(s, ch, c, dt, value, rate):
     ``s`` is one ``TRUST`` record. One rate is left out if it is faster than an angle may be, or departs from the change of
     the angle by more than that change, the last rate and the noise together. All are left out once they add up, over
     ``MEMORY_S``, to another way than the angle went, by a quarter of that way and more than noise could; until they have
-    added up for ``REDEEMED_S`` of motion. Left out ones are counted.
+    added up closely for ``REDEEMED_S`` of motion. Left out ones are counted.
     """
+    decay = math.exp(-dt / MEMORY_S)
+    s.astray *= decay
+    s.variance *= decay * decay
+    s.travel *= decay
     if math.isnan(rate):
         return rate
     credible = abs(rate) <= c.max_rate
@@ -59,15 +64,14 @@ def believed(s, ch, c, dt, value, rate):
         s.last_rate = rate
     else:
         astray = math.copysign(slack, rate * dt - change)
-    decay = math.exp(-dt / MEMORY_S)
-    s.astray = decay * s.astray + astray
-    s.variance = decay * decay * s.variance + 0.5 * (astray - s.last_astray) ** 2
+    s.astray += astray
+    s.variance += 0.5 * (astray - s.last_astray) ** 2
     s.last_astray = astray
-    s.travel *= decay
     noise = 2.0 * slack + NOISE_SIGMA * math.sqrt(s.variance)
     limit = noise + unsure + SHARE_OF_TRAVEL * s.travel
     s.doubts = s.doubts + 1 if abs(s.astray) > limit else 0
-    if abs(s.astray) > 0.5 * limit:
+    # Closely: in a steady oscillation even zeros add up to little beside the way there and back.
+    if abs(s.astray) > 0.5 * (noise + unsure) + REDEEMING_SHARE * s.travel:
         s.agreed = 0.0
     elif s.travel > 2.0 * noise:
         s.agreed += dt

@@ -65,8 +65,8 @@ class Health:
         self.last_exception = ""
         self._fault_ns = -FAULT_HOLD_NS
         self._vehicle = vehicle
-        self._residual_squares = self._estimate_squares = 0.0
-        self._levels: deque[tuple[float, float, int]] = deque(maxlen=RESIDUAL_SECONDS)
+        self._residual_squares = self._estimate_squares = self._measured_squares = 0.0
+        self._levels: deque[tuple[float, float, float, int]] = deque(maxlen=RESIDUAL_SECONDS)
         self._then: Mapping[str, int] = {}
         self._then_arrivals = list(self.arrivals)
         self._then_residuals = 0
@@ -92,6 +92,7 @@ class Health:
         self.residuals += 1
         self._residual_squares += residual * residual
         self._estimate_squares += (measured - residual) * (measured - residual)
+        self._measured_squares += measured * measured
 
     def statuses(
         self,
@@ -161,11 +162,13 @@ class Health:
         return self._status("latency", OK, "p50 and p99 of the window, max since start", values)
 
     def _residual(self, saturated_steps: int) -> DiagnosticStatus:
-        self._levels.append((self._residual_squares, self._estimate_squares, self.residuals - self._then_residuals))
-        self._residual_squares, self._estimate_squares, self._then_residuals = 0.0, 0.0, self.residuals
-        of_residual, of_estimate, count = (sum(column) for column in zip(*self._levels, strict=True))
-        rms, estimate = (math.sqrt(squares / count) if count else math.nan for squares in (of_residual, of_estimate))
-        large = is_large(rms, estimate, self._vehicle)
+        sums = self._residual_squares, self._estimate_squares, self._measured_squares
+        self._levels.append((*sums, self.residuals - self._then_residuals))
+        self._residual_squares = self._estimate_squares = self._measured_squares = 0.0
+        self._then_residuals = self.residuals
+        *squares, count = (sum(column) for column in zip(*self._levels, strict=True))
+        rms, estimate, measured = (math.sqrt(s / count) if count else math.nan for s in squares)
+        large = is_large(rms, estimate, measured, self._vehicle)
         saturated = saturated_steps > self._then_saturated
         self._then_saturated = saturated_steps
         message = "rubber temperature outside the rubber table" if saturated else ""

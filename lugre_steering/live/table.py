@@ -108,7 +108,7 @@ def _sections(prefix: str, content: Mapping[object, object]) -> Iterator[tuple[s
     for key, section in content.items():
         name = prefix + str(key)
         inside = section if isinstance(section, Mapping) and "ros__parameters" not in section else {}
-        if inside and str(key).split("/")[-1] != NODE and all(isinstance(inner, Mapping) for inner in inside.values()):
+        if inside and (str(key).split("/")[-1] != NODE or NODE in inside) and all(isinstance(inner, Mapping) for inner in inside.values()):
             yield from _sections(f"{name}/", inside)
         else:
             yield name, section

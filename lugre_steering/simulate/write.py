@@ -36,7 +36,7 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
     topic = np.repeat(np.arange(len(topics)), [stamp.size for _, _, stamp, _ in topics])
     within = np.concatenate([np.arange(stamp.size) for _, _, stamp, _ in topics])
     store = get_typestore(Stores.ROS2_JAZZY)
-    ours = not folder.exists()
+    ours = False
     try:
         writer = Writer(folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
         if compress:
@@ -44,6 +44,7 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
             writer.set_compression(mode, CompressionFormat.ZSTD)
         writer.set_custom_data("synthetic", label)
         with writer:
+            ours = True
             text = store.types[STRING](data=f"synthetic: {label}")
             said = writer.add_connection(f"/{TRUTH}/label", STRING, typestore=store)
             writer.write(said, START_NS, store.serialize_cdr(text, STRING))

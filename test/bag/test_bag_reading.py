@@ -255,6 +255,18 @@ def test_a_joint_state_without_names_gives_its_first_position(tmp_path: Path) ->
 # ------------------------------------------------------------------- cleaning
 
 
+@pytest.mark.parametrize("seconds", [3.0, 10.0])
+def test_a_clock_set_back_by_much_of_a_short_recording(tmp_path: Path, seconds: float) -> None:
+    i = np.arange(round(100 * seconds))
+    stamps = T0 + i * 10**7 - np.where(i < i.size // 2, 0, 905_000_000)
+    messages = [
+        ("/" + LEFT.topic, make.JOINT_STATE, T0 + int(k) * 10**7, make.joint_state(int(stamp), [LEFT.joint], [1e-4 * k]))
+        for k, stamp in zip(i, stamps, strict=True)
+    ]
+    recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
+    assert recording.rejected == {"/" + LEFT.topic: {"backward_stamp": 90}}
+
+
 @pytest.mark.parametrize("kind", ["swapped in pairs", "reversed in fives", "delayed at random"])
 def test_messages_out_of_order_are_put_back(tmp_path: Path, kind: str) -> None:
     """Merely late ones are no set-back clock, however many they are."""

@@ -76,10 +76,10 @@ def test_stale_pressures_stop_the_residual_and_a_missing_angle_the_torque() -> N
 
 @pytest.mark.parametrize(
     ("estimate", "residual", "level"),
-    [(40_000.0, -40_000.0, WARN), (40_000.0, 1000.0, OK), (40_000.0, -20_000.0, OK), (10.0, 70.0, OK), (0.0, 1e5, OK)],
+    [(4e4, -4e4, WARN), (4e4, 1e3, OK), (4e4, -2e4, WARN), (4e4, -1e4, OK), (10.0, 70.0, OK), (0.0, 1e5, OK)],
 )
 def test_a_residual_as_large_as_the_torque_is_told(estimate: float, residual: float, level: bytes) -> None:
-    """As pressures in bar make it; missing physics leaves less, and where there is hardly any torque it means nothing."""
+    """As pressures in bar or half of the cylinders make it; missing physics leaves less. Without a torque it means nothing."""
     health = Health(load(VEHICLE), 0.2, 0.5, 10)
     for i in range(100):
         sign = (-1.0) ** i
