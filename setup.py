@@ -23,7 +23,7 @@ setup(
     # config/ is installed inside the package too, so that pavements are found by name after a plain pip install.
     packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
     package_dir={f"{PACKAGE}.config": "config"},
-    package_data={PACKAGE: ["py.typed", "report/*.html"], f"{PACKAGE}.config": ["*"]},
+    package_data={PACKAGE: ["py.typed", "diagnosis/report/*.html"], f"{PACKAGE}.config": ["*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

@@ -151,8 +151,8 @@ def replay(
     """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
     from lugre_steering.estimator import Options
     from lugre_steering.live.table import read_options
-    from lugre_steering.replay import describe
-    from lugre_steering.replay import replay as run
+    from lugre_steering.replay.run import describe
+    from lugre_steering.replay.run import replay as run
 
     options = read_options(parameters) if parameters is not None else Options()
     if horizon is not None:
@@ -232,8 +232,8 @@ def vehicle_(
     as_json: Json = False,
 ) -> None:
     """Check a vehicle file, and say what it amounts to: loads, friction, heat, inputs and effects."""
-    from lugre_steering.derived import derive
-    from lugre_steering.report.vehicle_sheet import draw_footprint, show_vehicle
+    from lugre_steering.sheet.derived import derive
+    from lugre_steering.sheet.show import draw_footprint, show_vehicle
     from lugre_steering.vehicle import load
 
     read = load(file)
@@ -251,8 +251,8 @@ def import_(
     as_json: Json = False,
 ) -> None:
     """Turn a table into a bag with the standard topics; counts rates, gaps and outliers, repairs nothing."""
+    from lugre_steering.importing.show import show_import
     from lugre_steering.importing.write import import_table
-    from lugre_steering.report.imported import show_import
 
     result = import_table(table, map_file, out, storage)
     print_json(result) if as_json else show_import(output(), result)
@@ -326,8 +326,8 @@ def effects(
     as_json: Json = False,
 ) -> None:
     """List the physics that diagnosis knows, or explain one effect: law, source, parameters, how it shows."""
+    from lugre_steering.diagnosis import effect_card as card
     from lugre_steering.effects import catalogue
-    from lugre_steering.report import effect_card as card
 
     if not effect_id:
         if out is not None:

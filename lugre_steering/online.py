@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from lugre_steering.chain.model import baseline_parameters
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import baseline_parameters
 
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3

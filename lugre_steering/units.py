@@ -17,6 +17,12 @@ from lugre_steering.vehicle import Vehicle
 _MASS = {("m", "N"): "kg"}
 """Unit of force over acceleration where it has a name of its own; kg m2 for joints."""
 
+COORDINATES = {
+    "steering angle": "rad", "|steering angle|": "rad", "steering rate": "rad/s", "steering acceleration": "rad/s2",
+    "angle since reversal": "rad", "accumulated slip": "rad", "dwell": "s", "direction": "1", "time": "s",
+    "torque": "N m", "torque rate": "N m/s", "pressure sum": "Pa", "rubber temperature": "degC",
+}  # fmt: skip
+"""Axes along which residuals are drawn and effects told, with the units of a steered track."""
 
 _PROSE = frozenset({"statement", "description", "formula", "manoeuvre", "why", "coordinate", "unit"})
 """Keys of the diagnosis that hold words; names, topics and bags are left as they are."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lugre_steering.diagnosis.data.bursts import all_bursts, find_bursts, set_aside
-from lugre_steering.diagnosis.data.dataset import Run, motion
+from lugre_steering.data.bursts import all_bursts, find_bursts, set_aside
+from lugre_steering.data.dataset import Run, motion
 
 STEP_S = 0.01
 

@@ -16,16 +16,16 @@ from lugre_steering.bag import read_recording
 from lugre_steering.calibration import calibrate_recordings, coverage
 from lugre_steering.calibration.calibrate import KEYS, chosen
 from lugre_steering.calibration.estimate import _larger
-from lugre_steering.chain.model import Model, build_model
 from lugre_steering.cli import app
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.fitting.apply import apply_calibration
-from lugre_steering.diagnosis.fitting.fit import fit
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import prepare
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Signal
-from lugre_steering.replay import replay
+from lugre_steering.replay.run import replay
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep
+from lugre_steering.vehicle.model import Model, build_model
 
 ROOT = Path(__file__).parent.parent
 SHEET_FILE = ROOT / "config" / "test_vehicle.yaml"
@@ -202,7 +202,7 @@ def test_an_interrupted_calibration_can_be_repeated(tmp_path, monkeypatch):
 
     arguments = ["calibrate", str(BAG), "--vehicle", str(SHEET_FILE), "--out", str(tmp_path)]
     with monkeypatch.context() as patch:
-        patch.setattr("lugre_steering.report.calibration_figure.draw_calibration", interrupted)
+        patch.setattr("lugre_steering.calibration.figure.draw_calibration", interrupted)
         assert CliRunner().invoke(app, arguments).exit_code != 0
     assert CliRunner().invoke(app, arguments).exit_code == 0
     assert (tmp_path / "calibration.png").exists()

@@ -17,12 +17,12 @@ from scipy.io import loadmat
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis.data.bursts import all_bursts, set_aside
-from lugre_steering.diagnosis.data.dataset import Run, prepare
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import Split
+from lugre_steering.data.bursts import all_bursts, set_aside
+from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.search.build_up import Search
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Split
 from lugre_steering.importing import import_table
 from lugre_steering.simulate.manoeuvres import BUILT_IN, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate

@@ -25,6 +25,8 @@ HEADER = ["# Copyright 2026 The lugre_steering contributors", "# SPDX-License-Id
 ROS = re.compile(r"rclpy|rcl_interfaces|builtin_interfaces|launch(_ros)?|ament_\w+|\w+_msgs")
 PLOTTING = {"matplotlib", "plotly"}
 NOT_CORE = ("live", "report", "bench")
+DRAWING = ("figure.py", "figures.py", "plots.py")
+"""Pictures lie beside the command that writes them, in files of these names."""
 ROS_KEYS = {
     "rclpy", "rcl_interfaces", "builtin_interfaces", "sensor_msgs", "geometry_msgs", "std_msgs", "trajectory_msgs",
     "diagnostic_msgs", "launch", "launch_ros", "ament_index_python",
@@ -63,7 +65,7 @@ def test_the_core_imports_neither_ros_nor_plotting() -> None:
     for file in sorted((ROOT / NAME).rglob("*.py")):
         part = file.relative_to(ROOT / NAME).parts[0]
         packages = set(imported(ast.parse(file.read_text(encoding="utf-8"))))
-        if part not in NOT_CORE:
+        if part not in NOT_CORE and file.name not in DRAWING:
             offences += [f"{file}: {name}" for name in packages if ROS.fullmatch(name) or name in PLOTTING]
         elif part == "live":
             offences += [f"{file}: {name}" for name in packages if name in PLOTTING | {"rosbags", "rich", "typer"}]

@@ -32,7 +32,7 @@ from lugre_steering.estimator import Estimator, Options
 from lugre_steering.live.plan import planned_angles
 from lugre_steering.live.table import ParameterError, read_options
 from lugre_steering.recording import Kind
-from lugre_steering.replay import replay
+from lugre_steering.replay.run import replay
 from lugre_steering.vehicle import Vehicle, load
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -266,7 +266,7 @@ import sys
 for name in ("rclpy", "trajectory_msgs", "sensor_msgs", "builtin_interfaces", "std_msgs", "geometry_msgs"):
     sys.modules[name] = None
 from pathlib import Path
-from lugre_steering.replay import replay
+from lugre_steering.replay.run import replay
 print(replay([Path({str(bag)!r})], Path({str(VEHICLE)!r}), Path("out"))["bags"][0]["samples"]["command"]["used"])
 """
     environment = os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])}

@@ -23,12 +23,12 @@ from hypothesis.extra.numpy import arrays
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
+from lugre_steering.diagnosis import effect_card as card
+from lugre_steering.diagnosis.report import plots
+from lugre_steering.diagnosis.report.page import Written, render, write_report
 from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence
 from lugre_steering.effects.catalogue import CATALOGUE
-from lugre_steering.report import diagnosis_plots as plots
-from lugre_steering.report import effect_card as card
-from lugre_steering.report import shown
-from lugre_steering.report.diagnosis_report import Written, render, write_report
+from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle, load
 
 VEHICLE_FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
@@ -315,7 +315,7 @@ def test_names_that_are_numbers_stay_names(vehicle: Vehicle) -> None:
 
 @given(arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6)), st.integers(2, 50))
 def test_thinned_curves_keep_their_peaks(values: np.ndarray, limit: int) -> None:
-    points, width = shown.thin(values, limit)
+    points, width = words.thin(values, limit)
     assert points.size <= limit + 1
     assert (points.min(), points.max()) == (values.min(), values.max())
     assert points.size * width >= values.size > (points.size - 2) * width
@@ -327,11 +327,11 @@ def test_thinned_curves_keep_their_peaks(values: np.ndarray, limit: int) -> None
      (3.1234e-7, "3.123e-07"), (99999.0, "100\u2009000"), (0.00123456, "0.001235")],
 )  # fmt: skip
 def test_numbers_are_readable(value: float | None, text: str) -> None:
-    assert shown.number(value) == text
+    assert words.number(value) == text
 
 
 def test_intervals_show_digits_that_differ() -> None:
-    value, ends = shown.estimate(0.4200123, [0.4199921, 0.4200325])
+    value, ends = words.estimate(0.4200123, [0.4199921, 0.4200325])
     low, high = (float(end) for end in ends.split(" … "))
     assert high - low == pytest.approx(0.4200325 - 0.4199921, rel=0.05)
     assert low < float(value) < high
@@ -343,7 +343,7 @@ def test_intervals_show_digits_that_differ() -> None:
 @pytest.fixture
 def without(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Call it with names of libraries that shall be missing."""
-    drawing = ("lugre_steering.report.style", "lugre_steering.report.diagnosis_figures")
+    drawing = ("lugre_steering.report.style", "lugre_steering.diagnosis.report.figures")
 
     def remove(*libraries: str) -> None:
         for name in [m for m in sys.modules if m.split(".")[0] in libraries]:

@@ -22,15 +22,15 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
+from lugre_steering.data.dataset import prepare
 from lugre_steering.diagnosis.conclude import experiment
-from lugre_steering.diagnosis.data.dataset import prepare
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.diagnosis.report.page import write_report
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.estimator import Estimator
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Recording, Signal
-from lugre_steering.report.diagnosis_report import write_report
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag

@@ -13,10 +13,10 @@ from scipy.integrate import solve_ivp
 
 from lugre_steering.bag import read_recording
 from lugre_steering.chain.lag import lagged
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import prepare
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Signal
-from lugre_steering.replay import replay
+from lugre_steering.replay.run import replay
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, motion_of
 from lugre_steering.simulate.plant import with_effects

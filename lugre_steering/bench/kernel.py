@@ -16,12 +16,12 @@ from scipy.integrate import solve_ivp
 from lugre_steering.bench.kernel_c import CLoop
 from lugre_steering.chain.lanes import torque_sets
 from lugre_steering.chain.layout import EFFECT_FIELDS
-from lugre_steering.chain.model import build_model
 from lugre_steering.chain.step import Records, torque_side
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
 from lugre_steering.vehicle import load
+from lugre_steering.vehicle.model import build_model
 
 RATE_HZ = 100.0
 SETS = 512

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis.data.dataset import Run, motion, prepare
-from lugre_steering.diagnosis.fitting.fit import fit
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import Run, motion, prepare
 from lugre_steering.diagnosis.search.build_up import OWN_ERROR
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.proof.blind import noise_of
 from lugre_steering.proof.contact import HiddenContact, Patches, run_track
 from lugre_steering.proof.rubber import rubber_table

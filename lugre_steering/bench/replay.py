@@ -23,7 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import BagWriter, Part, cdr
 from lugre_steering.recording import Kind
-from lugre_steering.replay import replay
+from lugre_steering.replay.run import replay
 from lugre_steering.resources import config_folder
 from lugre_steering.vehicle import load
 

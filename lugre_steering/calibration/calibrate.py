@@ -37,14 +37,14 @@ from lugre_steering import __version__, units
 from lugre_steering.bag import read_recordings
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.data.quality import inspect
-from lugre_steering.diagnosis.fitting.apply import apply_calibration
-from lugre_steering.diagnosis.fitting.fit import fit
-from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
-from lugre_steering.diagnosis.fitting.split import split
+from lugre_steering.data.dataset import prepare
+from lugre_steering.data.quality import inspect
 from lugre_steering.earlier import earlier_result, write_record
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
+from lugre_steering.fitting.split import split
 from lugre_steering.recording import Array, Recording
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load, save
@@ -381,7 +381,7 @@ def with_provenance(vehicle: Vehicle, result: Mapping[str, Any]) -> Vehicle:
 def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
     if note := no_pictures():
         return None, note
-    from lugre_steering.report.calibration_figure import draw_calibration
+    from lugre_steering.calibration.figure import draw_calibration
 
     draw_calibration(done, file)
     return str(file), None

@@ -16,9 +16,9 @@ import numpy as np
 
 from lugre_steering.calibration.calibrate import KEYS, chosen, parameter_rows
 from lugre_steering.calibration.estimate import estimate
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.fitting.apply import apply_calibration
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import prepare
+from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Kind, Recording, Signal
 from lugre_steering.simulate.command import load_vehicle
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, motion_of

@@ -18,10 +18,10 @@ import numpy as np
 from scipy import stats
 from scipy.signal import correlate
 
-from lugre_steering.diagnosis.data.dataset import Run, motion
-from lugre_steering.diagnosis.fitting.fit import ROBUST, Fit, fit
-from lugre_steering.diagnosis.fitting.noise import noise_model, repeated_motion
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import Run, motion
+from lugre_steering.fitting.fit import ROBUST, Fit, fit
+from lugre_steering.fitting.noise import noise_model, repeated_motion
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 DRAWS = 16

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lugre_steering.calibration.estimate import Estimate, physical_jacobian
-from lugre_steering.chain.model import Model
-from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, Calibration, Problem
+from lugre_steering.fitting.problem import GAIN, KINGPIN, Calibration, Problem
 from lugre_steering.recording import Array
+from lugre_steering.vehicle.model import Model
 
 SENSITIVITY = Calibration("temperature_sensitivity", (), 0.15, -0.6, 0.6)
 """Exponent on the rubber table's ratios: how strongly stiffness and friction follow the temperature."""

@@ -63,7 +63,7 @@ def run(
         raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     if report:
         progress("writing the report")
-        from lugre_steering.report.diagnosis_report import write_report
+        from lugre_steering.diagnosis.report.page import write_report
 
         note = write_report(result, out).note
         if note:

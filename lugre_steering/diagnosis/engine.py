@@ -12,17 +12,17 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.bag import read_recordings
+from lugre_steering.data.bursts import set_aside
+from lugre_steering.data.dataset import prepare
+from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.data.bursts import set_aside
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.data.quality import Quality, inspect
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import split
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import split
 from lugre_steering.recording import Finding, Recording
 from lugre_steering.vehicle import Vehicle
 

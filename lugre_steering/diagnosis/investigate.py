@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.data.dataset import Run
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.noise import Noise, noise_model, repeated_motion
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import Split, balanced, split
+from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.search.build_up import Search, search
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Split, balanced, split
 
 NULL_DRAWS = 16
 NOISE_ROUNDS, QUIETER = 2, 0.8

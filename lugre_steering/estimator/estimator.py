@@ -14,7 +14,6 @@ from numba import njit
 
 from lugre_steering.chain.hydraulics import CylinderTable, gauge_offset
 from lugre_steering.chain.layout import OUTPUT, STATE
-from lugre_steering.chain.model import build_model
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
@@ -27,6 +26,7 @@ from lugre_steering.estimator.torque import advance
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import build_model
 
 LINE_RING = 8192
 PENDING_RING = 8192

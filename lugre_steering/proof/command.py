@@ -68,7 +68,7 @@ def run(
     })  # fmt: skip
     (out / "scoreboard.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     try:
-        from lugre_steering.report.proof_figures import draw_all
+        from lugre_steering.proof.figures import draw_all
     except LugreSteeringError as error:  # raised where matplotlib is missing
         announce(str(error))
     else:

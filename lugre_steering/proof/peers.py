@@ -32,11 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.fitting.fit import fit
-from lugre_steering.diagnosis.fitting.problem import GAIN, KINGPIN, Problem, calibrations_for
-from lugre_steering.diagnosis.fitting.split import Split, split
+from lugre_steering.data.dataset import prepare
 from lugre_steering.diagnosis.search.locate import coordinates
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import GAIN, KINGPIN, Problem, calibrations_for
+from lugre_steering.fitting.split import Split, split
 from lugre_steering.vehicle import load
 
 Array = NDArray[np.float64]

@@ -21,11 +21,11 @@ from lugre_steering.bag.reader import bag_name
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Kind
 from lugre_steering.report.available import no_pictures
-from lugre_steering.report.paper import checks_table, draw_outcome, outcome_table, write_table
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
 from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench
+from lugre_steering.simulate.paper.figure import checks_table, draw_outcome, outcome_table, write_table
 from lugre_steering.simulate.paper.outcome import Outcome
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import STORAGES, write_bag
@@ -86,7 +86,7 @@ def run_manoeuvre(
     write_bag(folder, run, label, storage)
     picture, note = out / f"{folder.name}.png", no_pictures()
     if note is None:
-        from lugre_steering.report.simulation import draw_simulation  # plotting is loaded only where it is used
+        from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
 
         draw_simulation(run, label, picture)
     truth = run.truth

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.chain.model import build_model
 from lugre_steering.chain.step import Records, run_side
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.vehicle import EffectEntry, Vehicle, add_effect
+from lugre_steering.vehicle.model import build_model
 
 
 @dataclass(frozen=True)

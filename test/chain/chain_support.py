@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lugre_steering.chain.model import build_model
 from lugre_steering.chain.step import Records, new_state, run_side
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.vehicle.model import build_model
 
 VEHICLE_FILE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
-from lugre_steering.chain.footprint import contact_lengths, ground_pressure, peak_pressure
 from lugre_steering.vehicle import Axle, Rollers, Track
+from lugre_steering.vehicle.footprint import contact_lengths, ground_pressure, peak_pressure
 
 AXLE = Axle(80_000.0, 6.0, 0.09, 3.6, 2.1)
 TRACK = Track(

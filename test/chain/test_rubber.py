@@ -11,7 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from reference_model import ReferenceTrack
 
-from lugre_steering.chain.rubber import (
+from lugre_steering.vehicle import DmaTable, MasterCurve, Rubber, Wlf
+from lugre_steering.vehicle.rubber import (
     _equivalent_temperature,
     friction_measure,
     known_range,
@@ -19,7 +20,6 @@ from lugre_steering.chain.rubber import (
     ratio_table,
     wlf_shift,
 )
-from lugre_steering.vehicle import DmaTable, MasterCurve, Rubber, Wlf
 
 WLF = Wlf(c1=10.17, c2_K=42.01, reference_degC=-61.0)
 HEAT = {

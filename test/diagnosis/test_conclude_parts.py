@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
+from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude import experiment, left_over, limits, unlisted
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.statement import at_end
 from lugre_steering.diagnosis.conclude.verify import rmse
-from lugre_steering.diagnosis.data.dataset import Run
-from lugre_steering.diagnosis.fitting import split
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.noise import Noise
-from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
 from lugre_steering.diagnosis.search import fingerprint, locate
 from lugre_steering.diagnosis.search.build_up import Search
 from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.fitting import split
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Candidate, Problem
 
 OFFSET = (Candidate(CATALOGUE["pressure_offset"], line="main_a", free=("offset",)), {"offset": 3e5})
 

@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import least_squares
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import split
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.diagnosis.search.fingerprint import score_columns, screen
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import split
 
 TRUTH = (0.12, -0.05, 0.08, 0.2, 0.1, -0.1)
 """Changes of the calibration values from the sheet."""

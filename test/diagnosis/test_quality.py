@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
-from lugre_steering.diagnosis.data.dataset import prepare
-from lugre_steering.diagnosis.data.quality import inspect
-from lugre_steering.diagnosis.data.wiring import SKEW_RANGE_S
-from lugre_steering.diagnosis.fitting.fit import fit
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import prepare
+from lugre_steering.data.quality import inspect
+from lugre_steering.data.wiring import SKEW_RANGE_S
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder

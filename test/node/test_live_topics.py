@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from lugre_steering.estimator import Estimator, Options
-from lugre_steering.replay import replay
+from lugre_steering.replay.run import replay
 from lugre_steering.vehicle import Vehicle, load
 
 EXACT = {"rtol": 1e-9, "atol": 0.0}

@@ -193,7 +193,7 @@ def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
     assert peer["named"]["share"] == 1.0
     assert board["peers"]["lugre_steering"]["false_alarms"]["share"] == 0.0
     pytest.importorskip("matplotlib")
-    from lugre_steering.report.proof_figures import draw_all
+    from lugre_steering.proof.figures import draw_all
 
     files = draw_all(board, tmp_path)
     assert {file.stem for file in files} == {f"proof_{name}" for name in ("power", "confusion", "location", "effects", "peers")}

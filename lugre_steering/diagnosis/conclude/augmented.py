@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.fitting.apply import apply_calibration
-from lugre_steering.diagnosis.fitting.fit import Fit
+from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
 from lugre_steering.vehicle.effects import WINDOWS
 

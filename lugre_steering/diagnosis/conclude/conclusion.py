@@ -17,10 +17,10 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.conclude.statement import statement
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.fitting.fit import Fit, fit
 
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""

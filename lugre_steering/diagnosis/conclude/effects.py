@@ -12,12 +12,12 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import verify
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.problem import Candidate
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.build_up import Found
 from lugre_steering.diagnosis.search.ties import tied
 from lugre_steering.diagnosis.search.trial import Trial, cost
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Candidate
 from lugre_steering.recording import Array
 
 BOTH_SIDES = 0.5
@@ -132,6 +132,6 @@ def _where(done: Finished, candidate: Candidate, part: Array) -> list[dict[str, 
                 axis, low, high = "|steering angle|", low_size, high_size
         entries.append({
             "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-            "range": [low, high], "unit": done.unit(locate.UNITS[axis]),
+            "range": [low, high], "unit": done.unit(units.COORDINATES[axis]),
         })  # fmt: skip
     return entries

@@ -11,13 +11,13 @@ import numpy as np
 
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.verify import rmse
-from lugre_steering.diagnosis.fitting.fit import Fit
 from lugre_steering.diagnosis.result import BagTrace, Evidence
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.build_up import FALSE_DISCOVERY_RATE
 from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.diagnosis.search.trial import Trial, cost
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.fitting.fit import Fit
 
 
 def evidence(done: Finished, effects: Sequence[dict[str, Any]]) -> tuple[Evidence, ...]:

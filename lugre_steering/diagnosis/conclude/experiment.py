@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
+from lugre_steering.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.data.dataset import Run, ideal_run
-from lugre_steering.diagnosis.fitting.fit import Fit
-from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
 

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.fitting.noise import Noise
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import Split
 from lugre_steering.diagnosis.search.build_up import Search
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
 

@@ -12,11 +12,11 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import unlisted
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.noise import slow_part
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import slow_part
 from lugre_steering.recording import Array
 
 UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
@@ -107,7 +107,7 @@ def _where(
         if spans:
             entries.append({
                 "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                "range": list(locate.active_range(values[axis], piece)), "unit": done.unit(locate.UNITS[axis]),
+                "range": list(locate.active_range(values[axis], piece)), "unit": done.unit(units.COORDINATES[axis]),
             })  # fmt: skip
     return entries
 

@@ -9,10 +9,10 @@ from functools import partial
 
 import numpy as np
 
-from lugre_steering.diagnosis.fitting.fit import Fit
-from lugre_steering.diagnosis.fitting.problem import Problem, in_threads
 from lugre_steering.diagnosis.search.fingerprint import Score, candidates, signature
 from lugre_steering.effects.entry import Parameter
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
 
 REVEALED = 0.3

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import CYCLE, Mask, Split, split
 from lugre_steering.diagnosis.search import onset
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import CYCLE, Mask, Split, split
 from lugre_steering.recording import Array, IntArray
 
 RESAMPLES = 2000

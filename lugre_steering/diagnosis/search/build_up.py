@@ -10,10 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.fitting.fit import Fit, fit
-from lugre_steering.diagnosis.fitting.noise import Noise
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import Split
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.fingerprint import Score, screen
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
@@ -29,6 +25,10 @@ from lugre_steering.diagnosis.search.trial import (
     timed,
     try_effect,
 )
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MAX_ROUNDS = 3, 8

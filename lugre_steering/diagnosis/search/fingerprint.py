@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.fitting.fit import Fit
-from lugre_steering.diagnosis.fitting.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.effects.entry import Effect
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.recording import Array
 
 WINDOW_EDGES = 9

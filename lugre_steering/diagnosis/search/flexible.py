@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from lugre_steering.diagnosis.fitting.fit import Fit
-from lugre_steering.diagnosis.fitting.problem import Problem
 from lugre_steering.diagnosis.search import locate
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 KNOTS = 7

@@ -18,8 +18,8 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from lugre_steering import units
-from lugre_steering.diagnosis.fitting.fit import Fit, fit, normalised
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.fitting.fit import Fit, fit, normalised
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 ROUNDS = 3

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lugre_steering.diagnosis.data.dataset import Run
-from lugre_steering.diagnosis.fitting.fit import Fit
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.data.dataset import Run
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 ACTIVE_SHARE = 0.05
@@ -18,11 +18,6 @@ ACTIVE_SHARE = 0.05
 BRIDGE_S = 0.5
 BINS = 24
 
-UNITS = {
-    "steering angle": "rad", "|steering angle|": "rad", "steering rate": "rad/s", "steering acceleration": "rad/s2",
-    "angle since reversal": "rad", "accumulated slip": "rad", "dwell": "s", "direction": "1", "time": "s",
-    "torque": "N m", "torque rate": "N m/s", "pressure sum": "Pa", "rubber temperature": "degC",
-}  # fmt: skip
 
 
 def contribution(problem: Problem, result: Fit, index: int) -> Array:
@@ -50,7 +45,7 @@ def intervals(time: Array, part: Array) -> tuple[tuple[float, float], ...]:
 
 
 def coordinates(run: Run, torque: Array, temperature: Array | None = None) -> dict[str, Array]:
-    """State-space coordinates (n,) of one run, by the names of ``UNITS``."""
+    """State-space coordinates (n,) of one run, by the names of ``units.COORDINATES``."""
     mean_rate = run.omega.mean(axis=0)
     dt = run.time[1] - run.time[0]
     moving = np.abs(mean_rate) > 1e-3

@@ -11,9 +11,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from lugre_steering.diagnosis.fitting.fit import Fit
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import Mask
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Mask
 from lugre_steering.recording import Array
 
 INSTANTS = 16

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.fitting.problem import Problem
-from lugre_steering.diagnosis.fitting.split import Split
 from lugre_steering.diagnosis.search.trial import Trial, rank
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
 TIE_T = 2.5

@@ -9,12 +9,12 @@ import math
 
 import numpy as np
 
-from lugre_steering.chain.model import baseline_parameters
 from lugre_steering.recording import Array
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import STEP_S, Motion
 from lugre_steering.simulate.paper.bench import Bench
 from lugre_steering.simulate.paper.outcome import Check, Curve, Outcome, Panel
+from lugre_steering.vehicle.model import baseline_parameters
 
 PUBLISHED_NM_PER_DEG = 5393.7
 LOAD_SHARE = 0.6

@@ -18,12 +18,12 @@ from typing import Any
 
 from lugre_steering import units
 from lugre_steering.calibration.calibrate import KEYS
-from lugre_steering.diagnosis.fitting.problem import calibrations_for
+from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError
-from lugre_steering.report import diagnosis_plots as plots
-from lugre_steering.report import shown
+from lugre_steering.fitting.problem import calibrations_for
+from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle
 
 VERDICTS = {
@@ -81,7 +81,7 @@ def write_report(diagnosis: Diagnosis, folder: Path) -> Written:
 
 def _pictures(diagnosis: Diagnosis, folder: Path) -> tuple[dict[str, Path], list[str]]:
     try:
-        from lugre_steering.report.diagnosis_figures import draw_all
+        from lugre_steering.diagnosis.report.figures import draw_all
     except LugreSteeringError:  # raised where matplotlib is missing
         return {}, ["pictures need matplotlib"]
     return draw_all(diagnosis, folder), []
@@ -229,18 +229,18 @@ def _facts(result: Mapping[str, Any], unit: str) -> str:
     facts = []
     if before is not None:
         facts.append(
-            ("held-out error, baseline", f"{shown.number(before, 3)} {_text(unit)}", "recalibrated on the same data")
+            ("held-out error, baseline", f"{words.number(before, 3)} {_text(unit)}", "recalibrated on the same data")
         )
     if result["effects"]:
-        facts.append(("held-out error, with what was found", f"{shown.number(after, 3)} {_text(unit)}", ""))
+        facts.append(("held-out error, with what was found", f"{words.number(after, 3)} {_text(unit)}", ""))
         ends = result["augmented"]["improvement_ci95"]
-        between = f"95 % interval {shown.percent(ends[0])} to {shown.percent(ends[1])}" if ends else ""
-        facts.append(("improvement", shown.percent(result["augmented"]["improvement"]), between))
+        between = f"95 % interval {words.percent(ends[0])} to {words.percent(ends[1])}" if ends else ""
+        facts.append(("improvement", words.percent(result["augmented"]["improvement"]), between))
     if before is not None:
         facts.append(
             (
                 "noise floor",
-                f"{shown.number(result['noise_floor_Nm'], 3)} {_text(unit)}",
+                f"{words.number(result['noise_floor_Nm'], 3)} {_text(unit)}",
                 "noise and motion error alone",
             )
         )
@@ -324,15 +324,15 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
     rows = []
     for name, parameter in effect["parameters"].items():
         unit, ends = units.label(vehicle, parameter["unit"]), parameter["ci95"]
-        value, between = shown.estimate(parameter["value"], ends)
+        value, between = words.estimate(parameter["value"], ends)
         degrees = _degrees(parameter["value"], ends) if unit == "rad" else ""
         meant = _text(meaning.get(name, per_line))
         row = [f"<code>{_text(name)}</code>", value, between, _text(unit), degrees, meant]
         rows.append([cell for cell, title in zip(row, header, strict=True) if title])
     law = ""
     if any(effect["id"] in trace.contributions for trace in diagnosis.traces):
-        words = f"Residual along the telling coordinate of {effect['id']}, with its fitted law, before and after"
-        law = drawing.place(f"effect {effect['id']}", plots.residual_plot(diagnosis, dict(effect)), words)
+        caption = f"Residual along the telling coordinate of {effect['id']}, with its fitted law, before and after"
+        law = drawing.place(f"effect {effect['id']}", plots.residual_plot(diagnosis, dict(effect)), caption)
     rivals = ", ".join(f"<code>{_text(rival)}</code>" for rival in effect["indistinguishable_from"])
     facts = _pairs(
         [
@@ -341,8 +341,8 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
             ("source", _text(entry.source)),
             ("how it shows", _text(entry.trace)),
             ("chance that noise does this", f"p {_p(effect['p_value'])}"),
-            ("share of the baseline residual's energy it explains", shown.percent(effect["energy_share"])),
-            ("share that recalibration had hidden", shown.percent(effect["masked_share"])),
+            ("share of the baseline residual's energy it explains", words.percent(effect["energy_share"])),
+            ("share that recalibration had hidden", words.percent(effect["masked_share"])),
             ("cannot be told from", rivals),
         ]
     )
@@ -360,24 +360,24 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) 
 
 
 def _p(p: float | None) -> str:
-    text = shown.chance(p)
+    text = words.chance(p)
     return _text(text if text.startswith("<") else f"= {text}")
 
 
 def _degrees(value: float | None, ends: Sequence[float] | None) -> str:
     if value is None:
         return ""
-    return shown.estimate(math.degrees(value), ends and [math.degrees(end) for end in ends])[0] + "°"
+    return words.estimate(math.degrees(value), ends and [math.degrees(end) for end in ends])[0] + "°"
 
 
 def _place(diagnosis: Diagnosis, entry: Mapping[str, Any]) -> list[str]:
     """Bag, stretches, and range of the coordinate (if one was found)."""
     along = "-"
     if entry.get("coordinate") and entry.get("range"):
-        axis = shown.coordinate_axis(diagnosis.vehicle, entry["coordinate"])
-        low, high = (shown.number(end * axis.scale, 3) if end is not None else "-" for end in entry["range"])
+        axis = words.coordinate_axis(diagnosis.vehicle, entry["coordinate"])
+        low, high = (words.number(end * axis.scale, 3) if end is not None else "-" for end in entry["range"])
         along = f"{_text(axis.label)}: {low} … {high}"
-    return [_text(entry["bag"]), shown.spans(entry["intervals_s"]), along]
+    return [_text(entry["bag"]), words.spans(entry["intervals_s"]), along]
 
 
 def _heldout(diagnosis: Diagnosis, drawing: _Drawing) -> str:
@@ -385,10 +385,10 @@ def _heldout(diagnosis: Diagnosis, drawing: _Drawing) -> str:
     if before["heldout_rmse_Nm"] is None:
         return ""
     unit = _text(diagnosis.vehicle.coordinate.force_unit)
-    rows = [["recalibrated baseline", shown.number(before["rmse_Nm"]), shown.number(before["heldout_rmse_Nm"])]]
+    rows = [["recalibrated baseline", words.number(before["rmse_Nm"]), words.number(before["heldout_rmse_Nm"])]]
     if diagnosis.json["effects"]:
-        rows.append(["with the effects found", shown.number(after["rmse_Nm"]), shown.number(after["heldout_rmse_Nm"])])
-    rows.append(["noise floor", shown.number(diagnosis.json["noise_floor_Nm"]), ""])
+        rows.append(["with the effects found", words.number(after["rmse_Nm"]), words.number(after["heldout_rmse_Nm"])])
+    rows.append(["noise floor", words.number(diagnosis.json["noise_floor_Nm"]), ""])
     spec = plots.heldout_plot(diagnosis)
     return (
         "<p>Root mean square torque error on stretches kept away from both the search and the fit, with a gap to them "
@@ -407,8 +407,8 @@ def _evidence(diagnosis: Diagnosis) -> str:
         named = row.verdict == "named"
         mark = f' class="named" style="--row:{colour.get(row.label.split("[")[0], "var(--accent)")}"' if named else ""
         width = 6.0 * min(max(row.energy_share, 0.0), 1.0)
-        share = f'<span class="bar" style="width:{width:.2f}em"></span>{shown.percent(row.energy_share)}'
-        numbers = [shown.percent(row.masked_share), shown.percent(row.heldout_gain), _text(shown.chance(row.p_value))]
+        share = f'<span class="bar" style="width:{width:.2f}em"></span>{words.percent(row.energy_share)}'
+        numbers = [words.percent(row.masked_share), words.percent(row.heldout_gain), _text(words.chance(row.p_value))]
         rows.append((mark, [f"<code>{_text(row.label)}</code>", _text(row.title), share, *numbers, _text(row.verdict)]))
     numeric = (2, 3, 4, 5)
     rest = rows[EVIDENCE_SHOWN:]
@@ -462,7 +462,7 @@ def _limits(diagnosis: Diagnosis) -> str:
         unit = units.label(diagnosis.vehicle, limit["unit"])
         title = units.title(diagnosis.vehicle, CATALOGUE[name]) if name in CATALOGUE else ""
         rows.append([f"<code>{_text(name)}</code>", _text(title), f"<code>{_text(limit['parameter'])}</code>",
-                     "hidden at any size" if limit["smallest"] is None else shown.number(limit["smallest"], 3), _text(unit)])  # fmt: skip
+                     "hidden at any size" if limit["smallest"] is None else words.number(limit["smallest"], 3), _text(unit)])  # fmt: skip
     table = _table(["effect", "", "parameter", "smallest that would have shown", "unit"], rows, numeric=(3,))
     if len(rows) > EVIDENCE_SHOWN:
         opened = " open" if diagnosis.json["verdict"] == "consistent" else ""
@@ -475,7 +475,7 @@ def _quality(diagnosis: Diagnosis) -> str:
     if not findings:
         return "<p>No stuck, dropped, spiking, swapped or sign-flipped channel and no clock skew was found.</p>"
     rows = [
-        [_text(f["finding"]), _text(f["topic"]), _text(f["bag"]), shown.spans(f["intervals_s"]), _text(f["statement"])]
+        [_text(f["finding"]), _text(f["topic"]), _text(f["bag"]), words.spans(f["intervals_s"]), _text(f["statement"])]
         for f in findings
     ]
     return _table(["finding", "topic", "bag", "during", "what it means"], rows)
@@ -487,16 +487,16 @@ def _baseline(diagnosis: Diagnosis) -> str:
     for key in KEYS:
         if key.calibration in calibrated and (value := key.read(vehicle)) is not None:
             unit = units.label(vehicle, key.unit)
-            rows.append([f"<code>{_text(key.key)}</code>", shown.number(value), "" if unit == "1" else _text(unit)])
+            rows.append([f"<code>{_text(key.key)}</code>", words.number(value), "" if unit == "1" else _text(unit)])
     made = [(_text(name.replace("_", " ")), _plain(value)) for name, value in vehicle.provenance.items()]
-    words = (
+    sentence = (
         "Nothing was fitted: these are the values of the vehicle file, as they were."
         if diagnosis.json["verdict"] == "insufficient_data"
         else "The published model with these values is what missing physics was judged against, so that a wrong friction "
         "level is never reported as physics. They stand in <code>augmented.yaml</code>."
     )
     return (
-        f"<p>{words}</p>\n"
+        f"<p>{sentence}</p>\n"
         + (_table(["key of the vehicle file", "value", "unit"], rows, (1,), narrow=True) if rows else "")
         + (_pairs(made) if made else "")
     )
@@ -507,7 +507,7 @@ def _plain(value: object) -> str:
         return ", ".join(f"{_text(key)}: {_plain(item)}" for key, item in value.items())
     if isinstance(value, (list, tuple)):
         return ", ".join(_plain(item) for item in value)
-    return shown.number(value) if isinstance(value, float) else _text(value)
+    return words.number(value) if isinstance(value, float) else _text(value)
 
 
 _GLOSSARY = _pairs(

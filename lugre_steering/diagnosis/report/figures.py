@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
+from lugre_steering.diagnosis.report import plots, shown
 from lugre_steering.diagnosis.result import BagTrace, Diagnosis, picture_names
-from lugre_steering.report import diagnosis_plots as plots
-from lugre_steering.report import shown
+from lugre_steering.report import words
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, figure
 
 EVIDENCE_ROWS = 14
@@ -47,14 +47,14 @@ def draw_all(diagnosis: Diagnosis, folder: Path) -> dict[str, Path]:
 def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
     colour, vehicle = plots.colours(diagnosis), diagnosis.vehicle
     parts = {name: part for name, part in trace.contributions.items() if name in colour}
-    torque, left = (shown.torque_axis(vehicle, v) for v in (trace.measured, trace.measured - trace.baseline))
-    added = shown.torque_axis(vehicle, *parts.values())
+    torque, left = (words.torque_axis(vehicle, v) for v in (trace.measured, trace.measured - trace.baseline))
+    added = words.torque_axis(vehicle, *parts.values())
     caption = f"Bag {trace.name}. {diagnosis.json['statement']}"
     if parts:
         caption += " Shaded: where an effect acts (unless it acts nearly everywhere)."
 
     def line(ax: Any, values: Any, scale: float, **style: Any) -> None:
-        points, width = shown.thin(values, POINTS)
+        points, width = words.thin(values, POINTS)
         ax.plot(
             trace.time[0] + np.arange(points.size) * width * (trace.time[1] - trace.time[0]), points * scale, **style
         )
@@ -94,7 +94,7 @@ def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
 def _residual(diagnosis: Diagnosis, effect: dict[str, Any], file: Path) -> None:
     cloud, colour = plots.Cloud.of(diagnosis, effect), plots.colours(diagnosis)[effect["id"]]
     x, scale = cloud.x * cloud.axis.scale, cloud.torque.scale
-    lx, ly = shown.broken(x, cloud.law)
+    lx, ly = words.broken(x, cloud.law)
     caption = (
         f"{effect['statement']} Left: blue, what the recalibrated baseline leaves over; grey, what the rest of the "
         "augmented model leaves to this effect; line, its fitted law. Right: what is left with everything found; band, "
@@ -157,7 +157,7 @@ def _heldout(diagnosis: Diagnosis, file: Path) -> None:
                 ends = [[max(after - spread[0], 0.0)], [max(spread[1] - after, 0.0)]]
                 ax.errorbar(i + 0.18, after, yerr=ends, color="black", capsize=5, linewidth=1.4)
         ax.axhline(
-            floor, color="black", linestyle=":", linewidth=1.2, label=f"noise floor {shown.number(floor, 3)} {unit}"
+            floor, color="black", linestyle=":", linewidth=1.2, label=f"noise floor {words.number(floor, 3)} {unit}"
         )
         ax.set_xticks(range(len(rows)), [_wrapped(row[0]) for row in rows])
         ax.set_xlim(-0.7, max(len(rows) - 0.3, 0.7))

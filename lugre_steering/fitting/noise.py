@@ -20,9 +20,9 @@ from scipy.optimize import nnls
 from scipy.signal import butter, sosfiltfilt
 
 from lugre_steering.chain.step import REST_RATE_RAD_S
-from lugre_steering.diagnosis.data.dataset import Run, angle_noise, motion
-from lugre_steering.diagnosis.data.smoother import smooth_angle
-from lugre_steering.diagnosis.fitting.problem import Candidate, Problem, Values, in_threads
+from lugre_steering.data.dataset import Run, angle_noise, motion
+from lugre_steering.data.smoother import smooth_angle
+from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.recording import Array
 
 AR_ORDER_S = 0.6

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.data.dataset import Run
 from lugre_steering.recording import Array, Finding, IntArray
 
 THRESHOLD = 6.0

@@ -16,15 +16,15 @@ from rich.table import Table
 from rich.text import Text
 
 from lugre_steering import vehicle as vehicle_file
-from lugre_steering.diagnosis.data.dataset import Run, ideal_run
-from lugre_steering.diagnosis.fitting.problem import Candidate, Problem
+from lugre_steering.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.result import finite
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.fingerprint import candidates
 from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.effects.entry import Effect
+from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
-from lugre_steering.report import shown
+from lugre_steering.report import words
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.command import make_folder
@@ -145,12 +145,12 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
 
     best = found[0]
     effect, run, vehicle = best.candidate.effect, best.run, best.problem.vehicle
-    torque = shown.torque_axis(vehicle, best.without)
-    change = shown.torque_axis(vehicle, best.difference)
+    torque = words.torque_axis(vehicle, best.without)
+    change = words.torque_axis(vehicle, best.difference)
     coordinates = locate.coordinates(run, best.without)
     name = "steering angle" if effect.coordinate == "direction" else effect.coordinate
     along = name in coordinates and name != "time"
-    values = ", ".join(f"{key} = {shown.number(value)}" for key, value in best.values.items())
+    values = ", ".join(f"{key} = {words.number(value)}" for key, value in best.values.items())
     line = f" on line {best.candidate.line}" if best.candidate.line else ""
     caption = (
         f"SIMULATED: test vehicle, manoeuvre '{best.manoeuvre.name}', no sensor noise. {effect.title} ({effect.id}){line} with "
@@ -172,8 +172,8 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
             ax.set_xlim(0.0, float(run.time[-1]))
             ax.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
         if along:
-            axis = shown.coordinate_axis(vehicle, name)
-            x, y = shown.broken(coordinates[name] * axis.scale, best.difference * change.scale)
+            axis = words.coordinate_axis(vehicle, name)
+            x, y = words.broken(coordinates[name] * axis.scale, best.difference * change.scale)
             axes[2, 0].plot(x, y, color=SERIES[0], linewidth=1.1)
             axes[2, 0].set_title("difference along the coordinate that tells it")
             axes[2, 0].set_xlabel(axis.label)
@@ -228,9 +228,9 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         for p in effect.parameters:
             name = f"{p.name} (for each line, by its name)" if effect.per_line else p.name
             meaning = f"{p.meaning} (refinement)" if p.optional else p.meaning
-            scaled = f"{p.relative_to.replace('_', ' ')} times {', '.join(map(shown.number, p.grid))}"
-            typical = scaled if p.relative_to else shown.number(p.grid[len(p.grid) // 2] if p.grid else p.scale)
-            table.add_row(name, p.unit, meaning, typical, shown.number(p.low), shown.number(p.high))
+            scaled = f"{p.relative_to.replace('_', ' ')} times {', '.join(map(words.number, p.grid))}"
+            typical = scaled if p.relative_to else words.number(p.grid[len(p.grid) // 2] if p.grid else p.scale)
+            table.add_row(name, p.unit, meaning, typical, words.number(p.low), words.number(p.high))
         console.print(table)
     if result["shown_by"]:
         table = Table(
@@ -239,10 +239,10 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         table.add_column("trace [N m rms]", justify="right")
         table.add_column("after recalibration", justify="right")
         for row in result["shown_by"]:
-            sizes = [shown.number(row[key], 3) for key in ("rms_Nm", "visible_rms_Nm")]
+            sizes = [words.number(row[key], 3) for key in ("rms_Nm", "visible_rms_Nm")]
             table.add_row(row["manoeuvre"], row["description"], *sizes)
         console.print(table)
-        values = ", ".join(f"{key} = {shown.number(value)}" for key, value in result["example"].items())
+        values = ", ".join(f"{key} = {words.number(value)}" for key, value in result["example"].items())
         console.print(f"Traces are for {values}.", highlight=False)
     else:
         console.print("No manoeuvre shows it with the standard topics; there is no picture.", highlight=False)

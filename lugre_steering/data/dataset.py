@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
-from lugre_steering.diagnosis.data.smoother import smooth_angle
+from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.simulate.actuation import line_pressures, total_gains

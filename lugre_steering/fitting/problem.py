@@ -15,13 +15,13 @@ import numpy as np
 
 from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.layout import EFFECT_FIELDS
-from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_in_phases
-from lugre_steering.diagnosis.data.dataset import Run
+from lugre_steering.data.dataset import Run
 from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import Model, build_model
 
 T = TypeVar("T")
 R = TypeVar("R")

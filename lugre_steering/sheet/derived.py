@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from lugre_steering import units
-from lugre_steering.chain.footprint import contact_lengths, peak_pressure
-from lugre_steering.chain.loads import load_moment, roller_loads, vertical_load
-from lugre_steering.chain.model import baseline_parameters
 from lugre_steering.recording import Kind
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.footprint import contact_lengths, peak_pressure
+from lugre_steering.vehicle.loads import load_moment, roller_loads, vertical_load
+from lugre_steering.vehicle.model import baseline_parameters
 
 
 def derive(vehicle: Vehicle) -> dict[str, Any]:

@@ -12,11 +12,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from lugre_steering.chain.footprint import contact_lengths, ground_pressure, peak_pressure
 from lugre_steering.errors import DataError
-from lugre_steering.report import shown
+from lugre_steering.report import words
 from lugre_steering.simulate.command import make_folder
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.footprint import contact_lengths, ground_pressure, peak_pressure
 
 
 def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
@@ -26,7 +26,7 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
         table.add_column(heading, overflow="fold")
     for row in result["quantities"]:
         values = row["value"] if isinstance(row["value"], list) else [row["value"]]
-        table.add_row(row["quantity"], ", ".join(shown.number(value) for value in values), row["unit"])
+        table.add_row(row["quantity"], ", ".join(words.number(value) for value in values), row["unit"])
     console.print(table)
     inputs = Table(title="inputs", title_justify="left")
     for heading in ("channel", "topic", "joint"):
@@ -35,7 +35,7 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
         inputs.add_row(row["channel"] + (" (optional)" if row["optional"] else ""), row["topic"], row["joint"] or "")
     console.print(inputs)
     for effect in result["effects"]:
-        parameters = ", ".join(f"{name} = {shown.number(value)}" for name, value in effect["parameters"].items())
+        parameters = ", ".join(f"{name} = {words.number(value)}" for name, value in effect["parameters"].items())
         console.print(f"effect {effect['id']}: {parameters} (SI)")
 
 

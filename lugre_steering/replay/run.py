@@ -369,7 +369,7 @@ class _Run:
         if note := no_pictures():
             file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
             return {"picture": None, "picture_note": note}
-        from lugre_steering.report.replay_figure import draw_replay
+        from lugre_steering.replay.figure import draw_replay
 
         draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
         return {"picture": file.name, "picture_note": None}

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.special import erf
 
-from lugre_steering.chain.rubber import ComplexArray, friction_measure, moduli
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Rubber
+from lugre_steering.vehicle.rubber import ComplexArray, friction_measure, moduli
 
 Modulus = Callable[[Array], ComplexArray]
 """Complex modulus [Pa] over the frequency [Hz]."""

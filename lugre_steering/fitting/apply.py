@@ -7,10 +7,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from lugre_steering.chain.loads import vertical_load
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.loads import vertical_load
 
 
 def apply_calibration(vehicle: Vehicle, problem: Problem, x: Array) -> Vehicle:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lugre_steering.diagnosis.fitting.problem import Problem
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 Mask = NDArray[np.bool_]

@@ -8,11 +8,11 @@ import math
 from dataclasses import dataclass
 
 from lugre_steering.chain.layout import EFFECT_FIELDS
-from lugre_steering.chain.loads import load_moment, vertical_load
-from lugre_steering.chain.rubber import ratio_table
 from lugre_steering.chain.step import Records, new_parameters
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.loads import load_moment, vertical_load
+from lugre_steering.vehicle.rubber import ratio_table
 
 
 @dataclass(frozen=True)

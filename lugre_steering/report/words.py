@@ -6,23 +6,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.result import BagTrace
-from lugre_steering.diagnosis.search.locate import UNITS
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
-
-EFFECT_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31")
-"""One per named effect; apart from the black, blue and red of measured, baseline and augmented torque."""
-
-WIDESPREAD = 0.6
-"""Share of a bag's duration above which shading would cover nearly everything."""
 
 _HANDIER = (("rad", "deg", 180.0 / math.pi), ("m", "mm", 1e3), ("Pa", "MPa", 1e-6))
 
@@ -43,11 +34,11 @@ def torque_axis(vehicle: Vehicle, *values: Array) -> Axis:
 
 
 def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
-    """A coordinate of ``locate.UNITS``, or its name in this vehicle's words, in its words and units; angles in degrees."""
-    name = {units.words(vehicle, key): key for key in UNITS}.get(name, name)
+    """A coordinate of ``units.COORDINATES``, or its name in this vehicle's words, in its words and units; angles in degrees."""
+    name = {units.words(vehicle, key): key for key in units.COORDINATES}.get(name, name)
     if name == "torque":
         return Axis(f"{units.words(vehicle, name)} [k{vehicle.coordinate.force_unit}]", 1e-3)
-    unit, scale = units.label(vehicle, UNITS.get(name, "")), 1.0
+    unit, scale = units.label(vehicle, units.COORDINATES.get(name, "")), 1.0
     for plain, handy, factor in _HANDIER:
         if re.match(rf"{plain}(?!\w)|{plain}/", unit):
             unit, scale = handy + unit[len(plain) :], factor
@@ -59,22 +50,6 @@ def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
 def coordinate_name(vehicle: Vehicle, name: str) -> str:
     """'steering rate' of a linear axis called position: 'position rate'; 'steering angle' by the name it has in the file."""
     return units.words(vehicle, name).replace("steering angle", vehicle.coordinate.name)
-
-
-def law_coordinate(effect: Mapping[str, Any], told_by: str, coordinates: Collection[str]) -> str:
-    """Name of the recorded coordinate an effect is drawn along: the catalogue's, else the one it was located by.
-
-    A law of the direction is drawn along the angle, where it opens into a loop.
-    """
-    found = [entry.get("coordinate") for entry in effect["where"]]
-    name = next((name for name in (told_by, *found) if name in coordinates), "time")
-    return "steering angle" if name == "direction" else name
-
-
-def is_local(trace: BagTrace, effect_id: str) -> bool:
-    """Whether an effect acts for so little of a bag that shading it tells something."""
-    acts = sum(end - start for start, end in trace.intervals.get(effect_id, ()))
-    return 0.0 < acts < WIDESPREAD * float(trace.time[-1] - trace.time[0])
 
 
 def number(value: float | None, digits: int = 4) -> str:

@@ -20,14 +20,14 @@ from scipy.stats import theilslopes
 
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.model import Model, build_model
 from lugre_steering.chain.step import torque_side
-from lugre_steering.diagnosis.data.dataset import Run, angle_noise, prepare
+from lugre_steering.data.dataset import Run, angle_noise, prepare
 from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import Model, build_model
 
 BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
-from lugre_steering.chain.model import build_model
-from lugre_steering.diagnosis.data.dataset import GAP_S, angle_noise
-from lugre_steering.diagnosis.data.wiring import BLOCKING, inspect_wiring
+from lugre_steering.data.dataset import GAP_S, angle_noise
+from lugre_steering.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import build_model
 
 Mask = NDArray[np.bool_]
 Intervals = tuple[tuple[float, float], ...]

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.diagnosis.report import shown
+from lugre_steering.diagnosis.report.shown import EFFECT_COLOURS
 from lugre_steering.diagnosis.result import BagTrace, Diagnosis
 from lugre_steering.recording import Array
-from lugre_steering.report import shown
-from lugre_steering.report.shown import EFFECT_COLOURS
+from lugre_steering.report import words
 
 Spec = dict[str, Any]
 
@@ -69,14 +70,14 @@ def torque_plot(diagnosis: Diagnosis, trace: BagTrace) -> Spec:
     vehicle, colour = diagnosis.vehicle, colours(diagnosis)
     limit = CURVE_POINTS // len(diagnosis.traces)
     before, after = trace.measured - trace.baseline, trace.measured - trace.augmented
-    torque = shown.torque_axis(vehicle, trace.measured)
-    left = shown.torque_axis(vehicle, before)
+    torque = words.torque_axis(vehicle, trace.measured)
+    left = words.torque_axis(vehicle, before)
     parts = {name: part for name, part in trace.contributions.items() if name in colour}
-    added = shown.torque_axis(vehicle, *parts.values())
+    added = words.torque_axis(vehicle, *parts.values())
     step = float(trace.time[1] - trace.time[0])
 
     def curve(values: Array, scale: float, axis: str, name: str, line: Spec, **more: Any) -> Spec:
-        points, width = shown.thin(values, limit)
+        points, width = words.thin(values, limit)
         x = {"x0": round(float(trace.time[0]), 4), "dx": step * width}
         return {"type": "scatter", "mode": "lines", "name": name, "line": line, "xaxis": "x", "yaxis": axis, **x,
                 "y": rounded(points, scale), "hoverlabel": {"namelength": -1}, **more}  # fmt: skip
@@ -150,7 +151,7 @@ def residual_plot(diagnosis: Diagnosis, effect: dict[str, Any]) -> Spec:
                 "yaxis": f"y{axis}", "x": rounded(cloud.x, cloud.axis.scale), "y": rounded(y, cloud.torque.scale),
                 "hoverinfo": "skip"}  # fmt: skip
 
-    x, y = shown.broken(cloud.x, cloud.law)
+    x, y = words.broken(cloud.x, cloud.law)
     law = {
         "type": "scatter", "mode": "lines", "name": f"fitted law of {html.escape(effect['id'])}",
         "x": rounded(x, cloud.axis.scale), "y": rounded(y, cloud.torque.scale), "xaxis": "x", "yaxis": "y",
@@ -180,7 +181,7 @@ def residual_plot(diagnosis: Diagnosis, effect: dict[str, Any]) -> Spec:
 class Cloud:
     """Samples of all bags along the telling coordinate of one effect, few enough to draw; all (n,)."""
 
-    def __init__(self, name: str, axis: shown.Axis, torque: shown.Axis, columns: Array) -> None:
+    def __init__(self, name: str, axis: words.Axis, torque: words.Axis, columns: Array) -> None:
         self.name, self.axis, self.torque = name, axis, torque
         self.x, self.before, self.partial, self.after, self.law = columns
 
@@ -200,8 +201,8 @@ class Cloud:
             ],
             axis=1,
         )  # fmt: skip
-        axis = shown.coordinate_axis(diagnosis.vehicle, name)
-        return cls(name, axis, shown.torque_axis(diagnosis.vehicle, *columns[1:]), columns)
+        axis = words.coordinate_axis(diagnosis.vehicle, name)
+        return cls(name, axis, words.torque_axis(diagnosis.vehicle, *columns[1:]), columns)
 
 
 def heldout_rows(diagnosis: Diagnosis) -> list[tuple[str, float, float, tuple[float, float] | None]]:
@@ -236,7 +237,7 @@ def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
     }
 
     def bars(name: str, values: list[float], colour: str, **more: Any) -> Spec:
-        text = [shown.number(v, 3) for v in values]
+        text = [words.number(v, 3) for v in values]
         return {"type": "bar", "name": name, "x": names, "y": values, "marker": {"color": colour}, "text": text,
                 "textposition": "outside", "textangle": 0, "cliponaxis": False, **more}  # fmt: skip
 
@@ -247,8 +248,8 @@ def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
     floor = diagnosis.json["noise_floor_Nm"]
     line = {"type": "line", "xref": "paper", "yref": "y", "x0": 0, "x1": 1, "y0": floor, "y1": floor,
             "line": {"color": MEASURED, "width": 1.3, "dash": "dot"}}  # fmt: skip
-    words = f"noise floor<br>{shown.number(floor, 3)} {html.escape(unit)}"
-    note = _note(words, yref="y", x=1.01, y=floor, xanchor="left", yanchor="middle")
+    text = f"noise floor<br>{words.number(floor, 3)} {html.escape(unit)}"
+    note = _note(text, yref="y", x=1.01, y=floor, xanchor="left", yanchor="middle")
     layout = _layout(xaxis=_axis("", type="category", range=[-0.6, max(len(rows) - 0.4, 1.6)]), yaxis=_axis(f"held-out RMSE [{unit}]",
                      rangemode="tozero"), height=360, shapes=[line], annotations=[note], bargap=0.35,
                      margin={"l": 78, "r": 100, "t": 34, "b": 48})  # fmt: skip

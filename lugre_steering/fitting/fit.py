@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
-from lugre_steering.diagnosis.fitting.problem import Candidate, Problem, in_threads
+from lugre_steering.fitting.problem import Candidate, Problem, in_threads
 from lugre_steering.recording import Array
 
 ROBUST = 3.0

@@ -1,0 +1,32 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How effects are shown in the pictures and the page of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from lugre_steering.diagnosis.result import BagTrace
+
+EFFECT_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31")
+"""One per named effect; apart from the black, blue and red of measured, baseline and augmented torque."""
+
+WIDESPREAD = 0.6
+"""Share of a bag's duration above which shading would cover nearly everything."""
+
+
+def law_coordinate(effect: Mapping[str, Any], told_by: str, coordinates: Collection[str]) -> str:
+    """Name of the recorded coordinate an effect is drawn along: the catalogue's, else the one it was located by.
+
+    A law of the direction is drawn along the angle, where it opens into a loop.
+    """
+    found = [entry.get("coordinate") for entry in effect["where"]]
+    name = next((name for name in (told_by, *found) if name in coordinates), "time")
+    return "steering angle" if name == "direction" else name
+
+
+def is_local(trace: BagTrace, effect_id: str) -> bool:
+    """Whether an effect acts for so little of a bag that shading it tells something."""
+    acts = sum(end - start for start, end in trace.intervals.get(effect_id, ()))
+    return 0.0 < acts < WIDESPREAD * float(trace.time[-1] - trace.time[0])
