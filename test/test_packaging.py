@@ -25,7 +25,7 @@ HEADER = ["# Copyright 2026 The lugre_steering contributors", "# SPDX-License-Id
 ROS = re.compile(r"rclpy|rcl_interfaces|builtin_interfaces|launch(_ros)?|ament_\w+|\w+_msgs")
 PLOTTING = {"matplotlib", "plotly"}
 NOT_CORE = ("live", "report", "bench")
-DRAWING = ("figure.py", "figures.py", "plots.py")
+DRAWING = ("figure.py", "figures.py", "plots.py", "page.py", "show.py", "effect_card.py")
 """Pictures lie beside the command that writes them, in files of these names."""
 ROS_KEYS = {
     "rclpy", "rcl_interfaces", "builtin_interfaces", "sensor_msgs", "geometry_msgs", "std_msgs", "trajectory_msgs",
