@@ -16,7 +16,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
