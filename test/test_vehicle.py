@@ -20,7 +20,6 @@ from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
-from lugre_steering.vehicle.effects import WINDOWS
 from lugre_steering.vehicle.sections import Initial, Topics
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -192,7 +191,7 @@ def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
             values = {p.name: p.unscaled(p.scaled(getattr(p, bound))) for p in effect.parameters}
             if effect.per_line:
                 values = {"main_a": next(iter(values.values()))}
-            for low, high in WINDOWS.get(effect.id, ()):  # the ends of a range are not equal
+            for low, high in effect.places:  # the ends of a range are not equal
                 values |= {high: values[low] + 0.1} if bound == "low" else {low: values[high] - 0.1}
             if effect.observable:
                 from_mapping(with_effects((effect.id, values)), FILE)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from lugre_steering.chain.compiled import law
@@ -18,7 +20,7 @@ def cylinder_length(theta: Array, chassis_m: tuple[float, ...], knuckle_m: tuple
 
 
 @law
-def moment_arm(theta, chassis_x, chassis_y, knuckle_x, knuckle_y):
+def moment_arm(theta: Any, chassis_x: float, chassis_y: float, knuckle_x: float, knuckle_y: float) -> Any:
     """dL/dtheta [m], exact: (chassis x knuckle(theta)) / L, from L**2 = |knuckle(theta) - chassis|**2."""
     c, s = np.cos(theta), np.sin(theta)
     x = knuckle_x * c - knuckle_y * s
