@@ -23,11 +23,15 @@ setup(
     # config/ is installed inside the package too, so that pavements are found by name after a plain pip install.
     packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
     package_dir={f"{PACKAGE}.config": "config"},
-    package_data={PACKAGE: ["py.typed", "diagnosis/report/*.html"], f"{PACKAGE}.config": ["*"]},
+    package_data={
+        PACKAGE: ["py.typed", "diagnosis/report/*.html"],
+        f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
-        (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if not path.endswith("__pycache__"))),
+        (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if Path(path).is_file())),
+        (f"share/{PACKAGE}/config/own_physics", sorted(path for path in glob("config/own_physics/*") if Path(path).is_file())),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     zip_safe=False,

@@ -6,6 +6,7 @@ returns."""
 from __future__ import annotations
 
 import functools
+import inspect
 import json
 import os
 import sys
@@ -53,6 +54,10 @@ Bags = Annotated[list[Path], typer.Argument(help="rosbag2 folders or files (mcap
 VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML)")]
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
+
+OwnEffects = Annotated[
+    list[Path] | None, typer.Option("--effects", help="file with physics of your own (.yaml or .py); repeatable")
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -116,10 +121,13 @@ def command(name: str | None = None) -> Callable[[F], F]:
     """Register a command whose expected errors end as one line on stderr and exit code 2."""
 
     def register(function: F) -> F:
-        @app.command(name)
         @functools.wraps(function)
-        def run(*arguments: Any, **options: Any) -> Any:
+        def run(*arguments: Any, own_effects: list[Path] | None = None, **options: Any) -> Any:
             try:
+                if own_effects:
+                    from lugre_steering.effects.registry import add_files
+
+                    add_files(own_effects)
                 return function(*arguments, **options)
             except LugreSteeringError as error:
                 print(f"lugre-steering: {error}", file=sys.stderr)
@@ -130,6 +138,11 @@ def command(name: str | None = None) -> Callable[[F], F]:
                 print(f"lugre-steering: {error.filename or name or function.__name__}: {error.strerror or error}", file=sys.stderr)
                 raise typer.Exit(2) from None
 
+        own = inspect.signature(function, eval_str=True)
+        last = inspect.Parameter("own_effects", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=OwnEffects)
+        run.__signature__ = own.replace(parameters=[*own.parameters.values(), last])  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
+        app.command(name)(run)
         return function
 
     return register
@@ -323,6 +336,7 @@ def diagnose(
 def effects(
     effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,
+    check: Annotated[bool, typer.Option("--check", help="try what every effect owes the chain (exit code 1 if it fails)")] = False,
     as_json: Json = False,
 ) -> None:
     """List the physics that diagnosis knows, or explain one effect: law, source, parameters, how it shows."""
@@ -335,6 +349,12 @@ def effects(
         print_json([card.describe(e) for e in registry.CATALOGUE.values()]) if as_json else card.show_list(output())
         return
     effect = registry.effect(effect_id)
+    if check:
+        from lugre_steering.simulate.contract import broken
+
+        failures = broken(effect)
+        print_json({"id": effect.id, "broken": failures}) if as_json else print("\n".join(failures) or f"{effect.id}: sound")
+        raise typer.Exit(1 if failures else 0)
     traces = card.traces(effect)
     result = card.explain(effect, traces, card.draw(traces, out) if out is not None and traces else None)
     print_json(result) if as_json else card.show_effect(output(), effect, result)

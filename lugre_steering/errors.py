@@ -21,3 +21,7 @@ class BagError(LugreSteeringError):
 
 class DataError(LugreSteeringError):
     """The data are readable but do not determine what was asked for."""
+
+
+class EffectError(LugreSteeringError):
+    """An effect, shipped or a user's own, is not what the chain can take."""

@@ -104,6 +104,8 @@ class Reader:
             if not isinstance(value, Mapping):
                 raise self.fail(key, value, "a mapping")
             return {str(k): self.convert(arguments[1], v, _join(key, k), bounds) for k, v in value.items()}
+        if hint is bool and not isinstance(value, bool):
+            raise self.fail(key, value, "true or false")
         if hint is float:
             return self.number(value, key, bounds)
         if hint is str:

@@ -24,7 +24,7 @@ from lugre_steering.chain import baseline, bristle, heat
 from lugre_steering.chain.compiled import law
 from lugre_steering.chain.layout import BASELINE_FIELDS, STATE_FIELDS
 from lugre_steering.chain.template import SENSED, STEP, WIND_UP
-from lugre_steering.errors import LugreSteeringError
+from lugre_steering.errors import EffectError
 
 Law = Callable[..., Any]
 
@@ -171,15 +171,15 @@ def check(effect: Physics) -> None:
     read = set()
     for hook, function in effect.hooks.items():
         if hook not in HOOKS:
-            raise LugreSteeringError(f"effect '{effect.id}': hooks: got '{hook}', expected one of {', '.join(HOOKS)}")
+            raise EffectError(f"effect '{effect.id}': hooks: got '{hook}', expected one of {', '.join(HOOKS)}")
         for name in _arguments(function):
             _wire(effect, hook, name)
             read.add(name)
     own = [p.name for p in effect.parameters] + list(effect.memory)
     if doubled := sorted({name for name in own if own.count(name) > 1}):
-        raise LugreSteeringError(f"effect '{effect.id}': {', '.join(doubled)}: expected each name once among parameters and memory")
+        raise EffectError(f"effect '{effect.id}': {', '.join(doubled)}: expected each name once among parameters and memory")
     if effect.hooks and (idle := [name for name in own if name not in read]):
-        raise LugreSteeringError(f"effect '{effect.id}': {', '.join(idle)}: no law reads it; expected an argument of that name")
+        raise EffectError(f"effect '{effect.id}': {', '.join(idle)}: no law reads it; expected an argument of that name")
 
 
 def _arguments(function: Law) -> tuple[str, ...]:
@@ -188,13 +188,15 @@ def _arguments(function: Law) -> tuple[str, ...]:
 
 def _source(function: Law) -> str:
     plain = getattr(function, "py_func", function)
+    if written := getattr(plain, "__source__", None):
+        return str(written)
     try:
         return inspect.getsource(plain)
     except OSError:
         return repr(plain.__code__.co_code) + repr(plain.__code__.co_consts)
 
 
-def _known(hook: str) -> dict[str, str]:
+def quantities_of(hook: str) -> dict[str, str]:
     """Quantities that laws of a hook may read, with their expressions in the step."""
     if hook not in _STEPWISE:
         return dict(HOOKS[hook].given)
@@ -209,7 +211,7 @@ def _known(hook: str) -> dict[str, str]:
 def _wire(effect: Physics, hook: str, name: str) -> str:
     """The expression of the step that an argument of a law stands for."""
     record = "q" if effect.per_line else "p"
-    known = _known(hook)
+    known = quantities_of(hook)
     if name in effect.memory:
         return f"s.{effect.id}_{name}"
     if any(p.name == name for p in effect.parameters):
@@ -219,7 +221,7 @@ def _wire(effect: Physics, hook: str, name: str) -> str:
     if name in BASELINE_FIELDS and hook not in ("line", "delay", "lag"):
         return f"p.{name}"
     own = [p.name for p in effect.parameters] + list(effect.memory)
-    raise LugreSteeringError(
+    raise EffectError(
         f"effect '{effect.id}': law '{hook}': got the argument '{name}', expected one of its own ({', '.join(own) or 'none'}), a quantity "
         f"known there ({', '.join(known) or 'none'}) or a parameter of the baseline ({', '.join(BASELINE_FIELDS)})"
     )

@@ -29,4 +29,5 @@ EFFECT = Effect(
     hooks={"angle": angle},
     rivals=("slope_bias", "pressure_offset", "kingpin_jacking"),
     counts_from_start=True,
+    one_sided=True,
 )

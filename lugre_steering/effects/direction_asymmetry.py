@@ -29,4 +29,5 @@ EFFECT = Effect(
     hooks={"level": level},
     rivals=("slope_bias",),
     joint_title="Friction differs between the two directions",
+    one_sided=True,
 )

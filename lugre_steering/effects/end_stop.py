@@ -60,4 +60,5 @@ EFFECT = Effect(
     rivals=("soil_shear", "moment_arm_error"),
     memory={"loading": 1.0},  # 1 loading ... 0 unloading
     joint_title="Elastic end stop",
+    one_sided=True,
 )

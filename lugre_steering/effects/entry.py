@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from lugre_steering.recording import Array
 
 STAGES = ("motion", "contact", "thermal", "parallel_torque", "measurement")
@@ -115,6 +117,8 @@ class Effect:
     """Begun late, it leaves another trace than the end of the same always there (heat, path, time and age are remembered)."""
     never_late: bool = False
     """It has its own window in time, or acts at the start only."""
+    one_sided: bool = False
+    """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
     joint_title: str = ""
     """Title for a single joint, which has no tracks and no kingpin."""
     variants: Callable[[Seen], Sequence[Variant]] | None = None
@@ -134,6 +138,11 @@ class Effect:
         return self.acts_by or tuple(plain)
 
     def law(self, hook: str, values: Mapping[str, float], **quantities: Any) -> Any:
-        """A law without memory as plain NumPy arithmetic: its own parameters from ``values`` (0 where absent)."""
-        plain = getattr(self.hooks[hook], "py_func", self.hooks[hook])
-        return plain(*(quantities.get(name, values.get(name, 0.0)) for name in inspect.signature(plain).parameters))
+        """A law without memory over arrays: its own parameters from ``values`` (0 where absent)."""
+        compiled = self.hooks[hook]
+        plain = getattr(compiled, "py_func", compiled)
+        arguments = [quantities.get(name, values.get(name, 0.0)) for name in inspect.signature(plain).parameters]
+        try:
+            return plain(*arguments)
+        except (TypeError, ValueError):  # math.sin, or an if: written for one number at a time
+            return np.vectorize(compiled, otypes=[np.float64])(*arguments)

@@ -35,4 +35,5 @@ EFFECT = Effect(
     acts_by=("amplitude", "second_harmonic", "even"),
     rivals=("moment_arm_error", "angle_scale"),
     joint_title="Gravity or another conservative torque of the angle",
+    one_sided=True,
 )

@@ -1,38 +1,64 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The catalogue of physics that the baseline leaves out: every module of this folder that holds an ``EFFECT``, and what
-users add to it."""
+"""The catalogue of physics that the baseline leaves out: every module of this folder that holds an ``EFFECT``, what installed
+packages offer (entry points ``lugre_steering.effects``), and what users add from files."""
 
 from __future__ import annotations
 
 import difflib
+import hashlib
 import importlib
+import inspect
+import os
 import pkgutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
 
 from lugre_steering.chain.compose import Composition, check, compose
+from lugre_steering.chain.layout import OUTPUT
+from lugre_steering.chain.step import new_parameters, run_side
+from lugre_steering.effects import own
 from lugre_steering.effects.entry import STAGES, Effect
-from lugre_steering.errors import LugreSteeringError
+from lugre_steering.errors import EffectError
+
+GROUP = "lugre_steering.effects"
+VARIABLE = "LUGRE_STEERING_EFFECTS"
+"""Environment variable that names files of effects (separated like a PATH), for processes started by this one."""
 
 
-def _shipped() -> Iterable[Effect]:
-    package = __name__.rpartition(".")[0]
-    folder = importlib.import_module(package).__path__
-    for module in pkgutil.iter_modules(folder):
-        found = getattr(importlib.import_module(f"{package}.{module.name}"), "EFFECT", None) if module.name not in _NO_EFFECT else None
+@dataclass(frozen=True)
+class Origin:
+    """Where foreign physics comes from: what to give or install, and the SHA-256 of what it is."""
+
+    source: str
+    sha256: str
+
+
+def _shipped() -> Iterator[Effect]:
+    package = importlib.import_module(__name__.rpartition(".")[0])
+    for module in pkgutil.iter_modules(package.__path__):
+        if f"{package.__name__}.{module.name}" == __name__:
+            continue
+        found = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), "EFFECT", None)
         if found is not None:
             yield found
 
 
-_NO_EFFECT = ("entry", "registry")
+def _sort() -> None:
+    """The order of the chain; what is foreign comes last of its stage and tier."""
+    ordered = sorted(CATALOGUE.values(), key=lambda e: (STAGES.index(e.stage), e.tier, e.id in ORIGINS, e.id))
+    CATALOGUE.clear()
+    CATALOGUE.update({effect.id: effect for effect in ordered})
 
 
-def _in_order(effects: Iterable[Effect]) -> dict[str, Effect]:
-    return {effect.id: effect for effect in sorted(effects, key=lambda e: (STAGES.index(e.stage), e.tier, e.id))}
-
-
-CATALOGUE: dict[str, Effect] = _in_order(_shipped())
+CATALOGUE: dict[str, Effect] = {effect.id: effect for effect in _shipped()}
 """All known effects by id, in the order of the chain."""
+ORIGINS: dict[str, Origin] = {}
+"""Where the effects come from that this package does not ship."""
 
 
 def effect(effect_id: str) -> Effect:
@@ -40,7 +66,7 @@ def effect(effect_id: str) -> Effect:
     if effect_id not in CATALOGUE:
         near = difflib.get_close_matches(effect_id, CATALOGUE, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(CATALOGUE)}"
-        raise LugreSteeringError(f"effect '{effect_id}': not in the catalogue; {hint}")
+        raise EffectError(f"effect '{effect_id}': not in the catalogue; {hint}")
     return CATALOGUE[effect_id]
 
 
@@ -50,5 +76,66 @@ def composed(ids: Iterable[str] | None = None) -> Composition:
     return compose([effect for effect in CATALOGUE.values() if effect.id in chosen])
 
 
+def add_files(files: Sequence[Path]) -> None:
+    """Add users' physics to the catalogue, here and in processes that are started from here."""
+    for file in files:
+        effects, sha256 = own.read_effects(file)
+        _add(effects, Origin(file.name, sha256), str(file))
+    if files:
+        known = os.environ.get(VARIABLE, "").split(os.pathsep)
+        os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(file.resolve()) for file in files)]))
+
+
+def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
+    for new in effects:
+        if ORIGINS.get(new.id) == origin:
+            continue
+        if new.id in CATALOGUE:
+            known = ORIGINS[new.id].source if new.id in ORIGINS else "lugre_steering itself"
+            raise EffectError(f"{where}: effect '{new.id}': there is one of this name in {known}; expected another id")
+        try:
+            check(new)
+            _try(new)
+        except EffectError as error:
+            raise EffectError(f"{where}: {error}") from error
+        CATALOGUE[new.id], ORIGINS[new.id] = new, origin
+    _sort()
+
+
+def _try(new: Effect) -> None:
+    """Compile an effect and run it over a short motion at its typical size: what fails is told now, not in mid-work."""
+    made = compose([new])
+    p, time = new_parameters(made), np.asarray(np.arange(200) * 0.01, np.float64)
+    for field, value in (("static_torque", 1.1), ("coulomb_torque", 1.0), ("sigma_0", 50.0), ("stribeck_speed", 0.05),
+                         ("stribeck_exponent", 2.0), ("heat_capacity", 1e4), ("sides", 1.0), ("table_step", 1.0)):  # fmt: skip
+        p[field] = value
+    for parameter in new.parameters if not new.per_line else ():
+        p[f"{new.id}_{parameter.name}"] = parameter.typical
+    try:
+        phase = 3.0 * time
+        theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))
+        out = run_side(p, np.ones((2, 2)), np.asarray(time), theta, omega, alpha)
+    except Exception as error:  # Numba's errors are many and long; the last line says what it stumbled over
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        raise EffectError(f"effect '{new.id}': its laws cannot be compiled: {lines[0] if lines else type(error).__name__}") from error
+    if not all(np.isfinite(out[name]).all() for name in OUTPUT.names or ()):
+        raise EffectError(f"effect '{new.id}': got torques that are no numbers at its typical size, expected finite ones")
+
+
+def _add_installed() -> None:
+    for entry in metadata.entry_points(group=GROUP):
+        where = f"package '{entry.dist.name}'" if entry.dist is not None else f"entry point '{entry.name}'"
+        try:
+            found = entry.load()
+        except Exception as error:  # whatever a foreign package raises
+            raise EffectError(f"{where}: entry point '{entry.name}' cannot be loaded: {type(error).__name__}: {error}") from error
+        effects = own.of_objects(found, f"{where}: entry point '{entry.name}'")
+        written = "".join(inspect.getsource(getattr(one, "py_func", one)) for each in effects for one in each.hooks.values())
+        _add(effects, Origin(where, hashlib.sha256(written.encode()).hexdigest()), where)
+
+
 for _effect in CATALOGUE.values():
     check(_effect)
+_sort()
+_add_installed()
+add_files([Path(name) for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name])

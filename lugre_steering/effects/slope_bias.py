@@ -29,4 +29,5 @@ EFFECT = Effect(
     hooks={"torque": bias},
     rivals=("pressure_offset",),
     joint_title="Constant offset",
+    one_sided=True,
 )

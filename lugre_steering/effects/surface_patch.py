@@ -71,4 +71,5 @@ EFFECT = Effect(
     never_late=True,
     variants=windows,
     joint_title="Friction differs within a range or from a time on",
+    one_sided=True,
 )

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
@@ -25,8 +26,17 @@ def add_effect(
     An effect stands once; one that acts per line may be given line by line.
     """
     effect = CATALOGUE.get(added.id)
+    if effect is None and added.source is not None:
+        what = f"install {added.source}" if added.source.startswith("package ") else f"give the file with --effects {added.source}"
+        raise fail("id", added.id, f"physics of {added.source}, which is not here: {what} (sha256 {added.sha256})")
     if effect is None:
         raise fail("id", added.id, f"an effect of the catalogue; {suggestion(added.id, list(CATALOGUE))}")
+    origin = ORIGINS.get(added.id)
+    if origin is not None and added.sha256 not in (None, origin.sha256):
+        expected = f"that of the laws given now in {origin.source} ({origin.sha256}): they are others under the same name"
+        raise fail("sha256", added.sha256, expected)
+    if origin is not None:
+        added = replace(added, source=origin.source, sha256=origin.sha256)
     if not effect.observable:
         raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.not_recorded}")
     if effect.stage == "thermal" and vehicle.rubber is None:
@@ -57,7 +67,7 @@ def add_effect(
             raise fail(f"parameters.{high_key}", added.parameters.get(high_key), f"more than {low_key} ({low:g}), both of a window given")
     if before is None:
         return vehicle.replace(effects=(*vehicle.effects, added))
-    joined = EffectEntry(added.id, {**before.parameters, **added.parameters})
+    joined = replace(added, parameters={**before.parameters, **added.parameters})
     return vehicle.replace(effects=tuple(joined if entry is before else entry for entry in vehicle.effects))
 
 
@@ -75,7 +85,8 @@ def _fail_in(reader: Reader, section: str, key: str, value: object, expected: st
 
 def each_once(effects: Iterable[EffectEntry]) -> tuple[EffectEntry, ...]:
     """Effects found again stand once, as a file must have them: later values replace earlier ones, other lines join."""
-    joined: dict[str, dict[str, float]] = {}
+    joined: dict[str, EffectEntry] = {}
     for entry in effects:
-        joined.setdefault(entry.id, {}).update(entry.parameters)
-    return tuple(EffectEntry(name, values) for name, values in joined.items())
+        before = joined.get(entry.id)
+        joined[entry.id] = replace(entry, parameters={**(before.parameters if before else {}), **entry.parameters})
+    return tuple(joined.values())

@@ -204,6 +204,10 @@ class EffectEntry:
 
     id: str
     parameters: dict[str, float] = field(default_factory=dict)
+    source: str | None = None
+    """File or package that holds an effect which is not shipped."""
+    sha256: str | None = None
+    """Of that file, or of the laws of the package: another law under the same name is refused."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.effects.registry import ORIGINS
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
@@ -33,7 +34,9 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, An
         else:  # found again: nothing of its old values stays
             entries = [entry for entry in entries if entry.id != candidate.effect.id]
         if keep:
-            entries.append(EffectEntry(candidate.effect.id, keep))
+            origin = ORIGINS.get(candidate.effect.id)
+            source, sha256 = (origin.source, origin.sha256) if origin is not None else (None, None)
+            entries.append(EffectEntry(candidate.effect.id, keep, source, sha256))
     provenance = {
         "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
         "heldout_rmse_Nm": round(heldout_rmse, 3),

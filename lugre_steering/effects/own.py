@@ -1,0 +1,186 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Physics of users: a YAML file of one-line laws (parsed, never run as Python), or a Python file with ``EFFECT`` or ``EFFECTS``."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib.util
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from lugre_steering.chain.compiled import exp, law
+from lugre_steering.chain.compose import HOOKS, quantities_of
+from lugre_steering.chain.layout import BASELINE_FIELDS
+from lugre_steering.effects.entry import STAGES, Effect, Parameter
+from lugre_steering.errors import EffectError
+from lugre_steering.expression import ExpressionError, parse
+from lugre_steering.schema import Reader
+
+PAIRED = ("wind_up", "contact")
+"""Hooks whose laws return more than one number: a line of YAML cannot."""
+NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@law
+def _sign(x):
+    """-1, 0 or 1."""
+    return 0.0 if x == 0.0 else math.copysign(1.0, x)
+
+
+_FUNCTIONS = {
+    "abs": abs, "sign": _sign, "sqrt": math.sqrt, "exp": exp, "log": math.log, "tanh": math.tanh, "sin": math.sin, "cos": math.cos,
+    "min": min, "max": max,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A parameter in a YAML file; see ``entry.Parameter``."""
+
+    unit: str
+    meaning: str
+    scale: float
+    low: float = -1e300
+    high: float = 1e300
+    grid: tuple[float, ...] = ()
+    relative_to: str = ""
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """An effect in a YAML file; see ``entry.Effect``. ``update``: next value of each memory."""
+
+    id: str
+    stage: str
+    title: str
+    laws: dict[str, str]
+    parameters: dict[str, _Number]
+    source: str = "own physics"
+    trace: str = "as its law says"
+    coordinate: str = "time"
+    equation: str = ""
+    memory: dict[str, float] = field(default_factory=dict)
+    update: dict[str, str] = field(default_factory=dict)
+    rivals: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    counts_from_start: bool = False
+    never_late: bool = False
+    one_sided: bool = False
+    joint_title: str = ""
+
+
+def read_effects(file: Path) -> tuple[list[Effect], str]:
+    """Effects of a user's file, and the SHA-256 of its content, by which vehicle files know it again."""
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise EffectError(f"{file}: cannot be read: {error.strerror or error}; expected a .py or .yaml file of effects") from error
+    if file.suffix == ".py":
+        found = _of_module(_run(file), str(file))
+    elif file.suffix in (".yaml", ".yml"):
+        found = _of_yaml(file)
+    else:
+        raise EffectError(f"{file}: got the ending '{file.suffix}', expected .py or .yaml")
+    return found, hashlib.sha256(content).hexdigest()
+
+
+def _run(file: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"lugre_steering_own_{file.stem}", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's own Python raises
+        raise EffectError(f"{file}: cannot be run: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _of_module(module: object, name: str) -> list[Effect]:
+    found = getattr(module, "EFFECTS", None) or [getattr(module, "EFFECT", None)]
+    return of_objects(found, name)
+
+
+def of_objects(found: object, name: str) -> list[Effect]:
+    """Effects with compiled laws out of what a file or package offers."""
+    items = list(found) if isinstance(found, Sequence) else [found]
+    effects = [item for item in items if isinstance(item, Effect)]
+    if not items or len(effects) < len(items):
+        kinds = ", ".join(type(item).__name__ for item in items)
+        raise EffectError(f"{name}: got {kinds or 'nothing'}, expected EFFECT = Effect(...), or EFFECTS, a list of them")
+    return [
+        dataclasses.replace(item, hooks={hook: one if hasattr(one, "py_func") else law(one) for hook, one in item.hooks.items()})
+        for item in effects
+    ]
+
+
+def _of_yaml(file: Path) -> list[Effect]:
+    reader = Reader(file, EffectError)
+    data = reader.load()
+    listed = data.get("effects") if isinstance(data, Mapping) and "effects" in data else [data]
+    if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
+        raise reader.fail("effects", listed, "a list of effects")
+    prefixes = [f"effects[{i}]" for i in range(len(listed))] if len(listed) > 1 else [""]
+    return [_of_sheet(reader, reader.build(_Sheet, item, prefix), prefix) for item, prefix in zip(listed, prefixes, strict=True)]
+
+
+def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
+    def key(name: str) -> str:
+        return f"{prefix}.{name}" if prefix else name
+
+    for what, names in (("id", [sheet.id]), ("parameters", sheet.parameters), ("memory", sheet.memory)):
+        for name in names:
+            if not NAME.fullmatch(name):
+                raise reader.fail(key(what), name, "a name of small letters, digits and _, a letter first")
+    if sheet.stage not in STAGES:
+        raise reader.fail(key("stage"), sheet.stage, f"one of {', '.join(STAGES)}")
+    if not sheet.laws:
+        raise reader.fail(key("laws"), sheet.laws, f"at least one law: {', '.join(HOOKS)}")
+    if set(sheet.update) != set(sheet.memory):
+        raise reader.fail(key("update"), sorted(sheet.update), f"the next value of each memory ({', '.join(sheet.memory) or 'none'})")
+    hooks = {}
+    for i, (hook, text) in enumerate(sheet.laws.items()):
+        if hook not in HOOKS or hook in PAIRED:
+            known = ", ".join(name for name in HOOKS if name not in PAIRED)
+            hint = " (this one needs a .py file)" if hook in PAIRED else ""
+            raise reader.fail(key(f"laws.{hook}"), text, f"a hook out of {known}{hint}")
+        own = [*sheet.parameters, *sheet.memory]
+        names = [*own, *(name for name in (*quantities_of(hook), *BASELINE_FIELDS) if name not in own)]
+        parts = {"": text, **(sheet.update if i == 0 else {})}
+        hooks[hook] = _compiled(reader, key(f"laws.{hook}"), hook, parts, names, tuple(sheet.memory) if i == 0 else ())
+    parameters = tuple(
+        Parameter(
+            name, p.unit, p.meaning, p.scale, -math.inf if p.low <= -1e300 else p.low, math.inf if p.high >= 1e300 else p.high,
+            p.grid, p.relative_to, p.optional,
+        )
+        for name, p in sheet.parameters.items()
+    )  # fmt: skip
+    return Effect(
+        id=sheet.id, stage=sheet.stage, tier=2, title=sheet.title, source=sheet.source, trace=sheet.trace, coordinate=sheet.coordinate,
+        equation=sheet.equation or "; ".join(f"{hook}: {text}" for hook, text in sheet.laws.items()), parameters=parameters, hooks=hooks,
+        memory=sheet.memory, rivals=sheet.rivals, needs=sheet.needs, counts_from_start=sheet.counts_from_start,
+        never_late=sheet.never_late, one_sided=sheet.one_sided, joint_title=sheet.joint_title,
+    )  # fmt: skip
+
+
+def _compiled(reader: Reader, key: str, hook: str, parts: Mapping[str, str], names: Sequence[str], memory: Sequence[str]) -> Any:
+    """A law out of its expression and the updates of the memory, which see the memory as it was."""
+    try:
+        checked = {name: parse(text, names) for name, text in parts.items()}
+    except ExpressionError as error:
+        raise EffectError(f"{reader.file}: key '{key}': {error}") from None
+    used = [name for name in names if name not in memory and any(name in one.names for one in checked.values())]
+    results = ", ".join(checked[name].source for name in ("", *memory))
+    text = f"def {hook}({', '.join([*used, *memory])}):\n    return {results}\n"
+    scope: dict[str, Any] = dict(_FUNCTIONS)
+    exec(compile(text, f"{reader.file}:{key}", "exec"), scope)  # built of checked nodes only: numbers, names, arithmetic
+    scope[hook].__source__ = text
+    return law(scope[hook])

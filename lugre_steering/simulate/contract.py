@@ -1,0 +1,156 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What every effect owes the chain, checked on the test vehicle: ``broken`` says what an effect fails to keep."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from lugre_steering.chain.compose import SENSOR_HOOKS
+from lugre_steering.chain.step import Records, new_state, run_side, torque_side
+from lugre_steering.effects.entry import Effect
+from lugre_steering.estimator import Estimator
+from lugre_steering.recording import Array
+from lugre_steering.resources import config_folder
+from lugre_steering.vehicle import EffectEntry, Vehicle, load
+from lugre_steering.vehicle.model import build_model
+
+UNIT = re.compile(r"(1|[0-9]|N|m|rad|deg|s|K|W|J|Pa|kg|degC|[/^() ])+")
+NOTICED = 1e-6
+"""Change of the torque, as a share of its amplitude, from which a parameter acts."""
+
+Motion = tuple[Array, Array, Array, Array]
+
+
+def broken(effect: Effect) -> list[str]:
+    """The promises that an effect breaks, in words; empty if it keeps all. It must stand in the catalogue."""
+    vehicle = load(config_folder() / "test_vehicle.yaml")
+    model = build_model(vehicle)
+    found = [f"unit: {p.name} has '{p.unit}', expected SI units" for p in effect.parameters if not UNIT.fullmatch(p.unit)]
+    if not effect.hooks.keys() - {*SENSOR_HOOKS} and "angle" not in effect.hooks:
+        return found
+    bench = _Bench(effect, model.parameters[0], model.rubber)
+    for check in (_neutral, _acting, _finite, _in_pieces, _causal, _mirrored, _passive):
+        found += check(bench)
+    return found
+
+
+class _Bench:
+    """One track with an effect at its typical size, driven through two cycles with rests and small reversals."""
+
+    def __init__(self, effect: Effect, baseline: Records, rubber: Array) -> None:
+        self.effect, self.baseline, self.rubber = effect, baseline, rubber
+        self.motion = _cycles()
+        self.plain = self.torque(baseline)
+
+    def parameters(self, **changes: float) -> Records:
+        p = self.baseline.copy()
+        for parameter in self.effect.parameters:
+            p[f"{self.effect.id}_{parameter.name}"] = changes.get(parameter.name, parameter.typical)
+        return p
+
+    def torque(self, p: Records, motion: Motion | None = None) -> Array:
+        return torque_side(p, self.rubber, *(motion or self.motion))
+
+    def change(self, a: Array, b: Array) -> float:
+        return float(np.sqrt(np.mean((a - b) ** 2)) / np.abs(self.plain).max())
+
+
+def _cycles() -> Motion:
+    """Time, angle, rate, acceleration (n,): two cycles of 25 deg at 6 deg/s with rests at the limits, then reversals of 3 deg."""
+    corners = np.radians([0.0, 25.0, 25.0, -25.0, -25.0, 25.0, 25.0, -25.0, -25.0, 0.0, 0.0])
+    at = np.cumsum(np.concatenate([[1.0], np.maximum(np.abs(np.diff(corners)) / np.radians(6.0), 2.0)]))
+    time = np.asarray(np.arange(round((at[-1] + 12.0) * 100.0)) / 100.0, np.float64)
+    theta = np.convolve(np.interp(time, at, corners), np.full(21, 1.0 / 21.0), mode="same")
+    late = time > at[-1] + 1.0
+    theta[late] += np.radians(3.0) * np.sin(1.5 * (time[late] - time[late][0]))
+    omega = np.diff(theta, prepend=theta[0]) * 100.0
+    return time, theta, omega, np.asarray(np.gradient(omega, time))
+
+
+def _neutral(bench: _Bench) -> Iterator[str]:
+    off = bench.parameters(**dict.fromkeys(bench.effect.amplitudes, 0.0))
+    if not np.allclose(bench.torque(off), bench.plain, rtol=1e-12, atol=1e-9):
+        yield "neutral: the torque is not that of the baseline where every amplitude is zero"
+
+
+def _acting(bench: _Bench) -> Iterator[str]:
+    typical = bench.torque(bench.parameters())
+    if bench.change(typical, bench.plain) < NOTICED:
+        yield "acting: the torque does not change at its typical size; give parameters an 'example' at which it does"
+        return
+    windows = [{}, *(dict.fromkeys(pair, 0.0) for pair in bench.effect.places)]  # one range hides what another does
+    for parameter in bench.effect.parameters:
+        value = parameter.typical
+        other = 1.2 * value if value != 0.0 else 0.1 * parameter.scale
+        changes = [
+            bench.change(bench.torque(bench.parameters(**rest)), bench.torque(bench.parameters(**rest, **{parameter.name: other})))
+            for rest in windows
+            if parameter.name not in rest
+        ]
+        if max(changes) < NOTICED:
+            yield f"acting: the torque does not change with {parameter.name}"
+
+
+def _finite(bench: _Bench) -> Iterator[str]:
+    time, theta, omega, alpha = bench.motion
+    gap = time + np.where(np.arange(time.size) > 500, 1e4, 0.0)
+    twice = np.repeat(time[:400], 2), np.repeat(theta[:400], 2), np.repeat(omega[:400], 2), np.repeat(alpha[:400], 2)
+    for what, motion in (("a gap of hours", (gap, theta, omega, alpha)), ("two samples of one time", twice)):
+        if not np.isfinite(bench.torque(bench.parameters(), motion)).all():
+            yield f"finite: {what} makes the torque no number"
+
+
+def _in_pieces(bench: _Bench) -> Iterator[str]:
+    p, cut = bench.parameters(), 1200
+    state = new_state(p)
+    time, theta, omega, alpha = bench.motion
+    run_side(p, bench.rubber, time[:cut], theta[:cut], omega[:cut], alpha[:cut], state)
+    rest = run_side(p, bench.rubber, time[cut:], theta[cut:], omega[cut:], alpha[cut:], state, float(time[cut - 1]))
+    if not np.array_equal(rest["torque"], bench.torque(p)[cut:]):
+        yield "pieces: a run that is interrupted and goes on from its state gives another torque (memory outside the state)"
+
+
+def _causal(bench: _Bench) -> Iterator[str]:
+    time, *columns = bench.motion
+    changed = [np.where(np.arange(time.size) < 1700, column, 0.9 * column) for column in columns]
+    p = bench.parameters()
+    if not np.array_equal(bench.torque(p, (time, changed[0], changed[1], changed[2]))[:1700], bench.torque(p)[:1700]):
+        yield "causal: what comes later changes the torque of before"
+
+
+def _mirrored(bench: _Bench) -> Iterator[str]:
+    time, theta, omega, alpha = bench.motion
+    odd = bench.change(bench.torque(bench.parameters()), -bench.torque(bench.parameters(), (time, -theta, -omega, -alpha)))
+    if odd > NOTICED and not bench.effect.one_sided:
+        yield "mirror: left and right turns differ; declare one_sided if that is meant"
+    if odd <= NOTICED and bench.effect.one_sided:
+        yield "mirror: left and right turns are alike, but one_sided is declared"
+
+
+def _passive(bench: _Bench) -> Iterator[str]:
+    """Over whole cycles no effect gives back more energy than the friction takes."""
+    time, theta, *_ = bench.motion
+    once = (time > 14.0) & (time <= 14.0 + 2.0 * (50.0 / 6.0 + 2.0))  # from one passage to the next
+    work = float(np.sum(bench.torque(bench.parameters())[1:][once[1:]] * np.diff(theta)[once[1:]]))
+    if work < 0.0:
+        yield f"passive: a whole cycle gives {-work:.3g} J back"
+
+
+def differs_live(vehicle: Vehicle, effect: Effect) -> float:
+    """Largest difference between one sample at a time and a block of them, as a share of the torque; 0 in a sound estimator."""
+    values = {p.name: p.typical for p in effect.parameters}
+    entry = EffectEntry(effect.id, values)
+    time, theta, *_ = _cycles()
+    stamps = (time * 1e9).astype(np.int64) + 1_000_000_000
+    channel = np.tile(np.arange(len(vehicle.sides)), time.size)
+    block = Estimator(vehicle.replace(effects=(entry,)))
+    single = Estimator(vehicle.replace(effects=(entry,)))
+    rows = (channel, np.repeat(stamps, len(vehicle.sides)), np.repeat(theta, len(vehicle.sides)))
+    whole, _ = block.push_block(*rows, np.full(channel.size, np.nan))
+    push: Callable[..., tuple[Records, Records]] = single.push
+    alone = np.concatenate([push(int(c), int(s), float(v))[0]["total"].copy() for c, s, v in zip(*rows, strict=True)])
+    return float(np.abs(whole["total"] - alone).max() / np.abs(whole["total"]).max())

@@ -1,0 +1,161 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Physics of users: from YAML, Python and packages through every command, shared, refused. All data are synthetic."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lugre_steering.chain.step import torque_side
+from lugre_steering.effects import registry
+from lugre_steering.effects.own import read_effects
+from lugre_steering.errors import EffectError
+from lugre_steering.resources import config_folder
+from lugre_steering.simulate.contract import differs_live
+from lugre_steering.vehicle import load
+from lugre_steering.vehicle.model import build_model
+
+OWN = config_folder() / "own_physics"
+RIPPLE = OWN / "chain_ripple.yaml"
+SHEET = config_folder() / "test_vehicle.yaml"
+
+
+def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The command line in a process of its own: this one's catalogue stays as it is."""
+    command = [sys.executable, "-m", "lugre_steering.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment}, check=False)
+
+
+def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path) -> None:
+    made = run("simulate", "double-cycle", "--effect", "chain_ripple:torque=1500,pitch=0.11", "--effects", RIPPLE, "--out", tmp_path)
+    assert made.returncode == 0, made.stderr
+    bag = tmp_path / "synthetic_double_cycle"
+    done = run("diagnose", bag, "--vehicle", SHEET, "--effects", RIPPLE, "--out", tmp_path / "d", "--no-report", "--json")
+    found = json.loads(done.stdout)
+    assert [effect["id"] for effect in found["effects"]] == ["chain_ripple"]
+    parameters = found["effects"][0]["parameters"]
+    assert parameters["torque"]["value"] == pytest.approx(1500.0, rel=0.02)
+    assert parameters["pitch"]["value"] == pytest.approx(0.11, rel=0.01)
+    augmented = tmp_path / "d" / "augmented.yaml"
+    told = run("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")
+    assert told.returncode == 2
+    assert "chain_ripple.yaml, which is not here" in told.stderr
+    assert len(told.stderr.splitlines()) == 1
+    ran = run("replay", bag, "--vehicle", augmented, "--effects", RIPPLE, "--out", tmp_path / "r", "--json")
+    left = json.loads(ran.stdout)["overall"]["rmse_Nm"]
+    assert left < 0.2 * found["baseline"]["rmse_Nm"]
+    other = tmp_path / "chain_ripple.yaml"
+    other.write_text(RIPPLE.read_text().replace("sin(6", "cos(6"))
+    assert "others under the same name" in run("vehicle", augmented, "--effects", other).stderr
+
+
+def test_a_law_of_yaml_is_its_formula() -> None:
+    (effect,), _ = read_effects(RIPPLE)
+    theta = np.linspace(-0.5, 0.5, 101)
+    found = effect.law("torque", {"torque": 3.0, "pitch": 0.2}, theta=theta)
+    np.testing.assert_allclose(found, 3.0 * np.sin(6.283185307 * theta / 0.2), atol=1e-12)
+
+
+@pytest.fixture
+def catalogue() -> Iterator[None]:
+    """The catalogue, put back as it was."""
+    known, origins, variable = dict(registry.CATALOGUE), dict(registry.ORIGINS), os.environ.get(registry.VARIABLE)
+    yield
+    for table, before in ((registry.CATALOGUE, known), (registry.ORIGINS, origins)):
+        table.clear()
+        table.update(before)  # type: ignore[arg-type]
+    if variable is None:
+        os.environ.pop(registry.VARIABLE, None)
+    else:
+        os.environ[registry.VARIABLE] = variable
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_a_memory_of_yaml_follows_its_update() -> None:
+    """Grease that stiffens at rest: the torque after a pause against the closed form of its two exponentials."""
+    registry.add_files([OWN / "thixotropic_grease.yaml"])
+    p = build_model(load(SHEET)).parameters[0].copy()
+    rubber = build_model(load(SHEET)).rubber
+    time = np.arange(0.0, 8.0, 0.01)
+    omega = np.where(time >= 6.0, 0.1, 0.0)
+    theta = np.cumsum(omega) * 0.01
+    plain = torque_side(p, rubber, time, theta, omega, np.zeros(time.size))
+    for name, value in (("viscosity", 4000.0), ("rest_time", 5.0), ("shear_angle", 0.1)):
+        p[f"thixotropic_grease_{name}"] = value
+    added = torque_side(p, rubber, time, theta, omega, np.zeros(time.size)) - plain
+    assert not added[time < 6.0].any()
+    first = int(np.flatnonzero(time >= 6.0)[0])
+    structure = 1.0 - np.exp(-time[first - 1] / 5.0)
+    assert added[first] == pytest.approx(4000.0 * 0.1 * structure, rel=1e-9)  # the law sees the memory as the last step left it
+    steady = 0.0
+    for _ in range(2000):  # the fixed point of stiffening against shearing
+        steady = (1.0 - (1.0 - steady) * np.exp(-0.01 / 5.0)) * np.exp(-0.001 / 0.1)
+    assert steady < added[-1] / 400.0 < 1.1 * structure
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_physics_of_users_runs_live_as_in_replay() -> None:
+    registry.add_files([RIPPLE])
+    assert differs_live(load(SHEET), registry.effect("chain_ripple")) == 0.0
+
+
+def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    shutil.copytree(OWN / "example_package", source)
+    install = [sys.executable, "-m", "pip", "install", "-q", "--no-build-isolation", "--no-deps", "--target", tmp_path / "site", source]
+    subprocess.run(list(map(str, install)), check=True, capture_output=True)
+    path = os.pathsep.join([str(tmp_path / "site"), *filter(None, [os.environ.get("PYTHONPATH", "")])])
+    told = run("effects", "centre_detent", "--check", "--json", PYTHONPATH=path)
+    assert json.loads(told.stdout) == {"id": "centre_detent", "broken": []}, told.stderr
+    assert "not in the catalogue" in run("effects", "centre_detent").stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("* theta", "* tetha", "did you mean 'theta'"),
+        ("torque * sin", "__import__('os').system('true') * sin", "is not allowed|no function"),
+        ("torque: torque", "wind_up: torque", "needs a .py file"),
+        ("torque: torque", "torsion: torque", "expected a hook"),
+        ("torque * sin(6.283185307 * theta / pitch)", "torque", "pitch: no law reads it"),
+        ("torque * sin(6.283185307 * theta / pitch)", "torque / (pitch - pitch)", "no numbers"),
+        ("id: chain_ripple", "id: end_stop", "there is one of this name in lugre_steering itself"),
+        ("stage: parallel_torque", "stage: engine", "expected one of motion"),
+        ("scale: 300.0", "scale: many", "a plain number"),
+        ("laws:", "lawz:", "no such key"),
+        ("laws:", "memory: {wound: 0.0}\nlaws:", "the next value of each memory"),
+    ],
+)
+def test_what_is_no_effect_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    file = tmp_path / "mine.yaml"
+    text = RIPPLE.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    with pytest.raises(EffectError, match=words) as caught:
+        registry.add_files([file])
+    assert "mine.yaml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.py", "EFFECT = 3", "got int, expected EFFECT"),
+        ("a.py", "import nothing_of_this_name", "cannot be run: ModuleNotFoundError"),
+        ("a.txt", "", "expected .py or .yaml"),
+        ("a.yaml", "effects: []", "expected a list of effects"),
+        ("a.yaml", "{", "not valid YAML"),
+    ],
+)
+def test_a_file_without_effects_is_refused(tmp_path: Path, name: str, text: str, words: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(EffectError, match=words):
+        registry.add_files([tmp_path / name])
