@@ -23,6 +23,8 @@ def show_import(console: Console, result: Mapping[str, Any]) -> None:
         notes = "; ".join(_notes(channel)) or "-"
         table.add_row(channel["channel"], str(channel["samples"]), rate, time, value, notes)
     console.print(table)
+    for what, count in result["left_out"].items():
+        console.print(f"left out: {count} {what}")
 
 
 def _notes(channel: Mapping[str, Any]) -> list[str]:
@@ -37,4 +39,4 @@ def _notes(channel: Mapping[str, Any]) -> list[str]:
         notes.append(f"{len(gaps)} gaps, longest {end - begin:.3g} s at {begin:.4g} s")
     if spikes := channel["outliers_s"]:
         notes.append(f"{len(spikes)} outliers, first at {spikes[0]:.4g} s")
-    return notes
+    return [*notes, *channel["doubts"]]
