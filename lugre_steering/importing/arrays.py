@@ -145,7 +145,7 @@ def _weigh_mat(file: Path, stream: BinaryIO, order: str) -> None:
         while size > 0 and (packed := stream.read(min(size, _CHUNK))):
             size -= len(packed)
             while packed and total <= MAX_BYTES:
-                total += len(unpacked.decompress(packed, 1 << 24))
+                total += len(unpacked.decompress(packed, _CHUNK << 4))
                 packed = unpacked.unconsumed_tail
             if total > MAX_BYTES:
                 raise too_large(file)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +23,9 @@ _ALIKE = 0.1
 _CORRELATED = 0.9
 _MIN_SAMPLES = 20
 
-RANGES: Mapping[str, tuple[float, float, str]] = {
-    "Pa": (2e4, 2e8, "kPa, bar or MPa"),
-    "degC": (-60.0, 80.0, "K"),
-}
-"""SI unit -> what the largest size of a channel should lie within, and which units are mistaken for it. Temperatures: all."""
+_PRESSURES_PA = (2e4, 2e8)
+"""Where the highest pressure of a hydraulic machine lies."""
+_AIR_DEGC = (-60.0, 80.0)
 
 
 def check_units(file: Path, mapping: ImportMap, channels: Mapping[str, Imported]) -> None:
@@ -49,10 +47,12 @@ def check_units(file: Path, mapping: ImportMap, channels: Mapping[str, Imported]
             _refuse_degrees(file, left.name, right.name, ratio)
 
 
-def doubts(mapping: ImportMap, channel: Imported) -> list[str]:
+def doubts(mapping: ImportMap, channel: Imported, others: Iterable[Imported]) -> list[str]:
     """What is odd about the numbers of a channel, but possible."""
     low, high = float(np.min(channel.value)), float(np.max(channel.value))
-    found = []
+    begin, end = channel.time_s.min(), channel.time_s.max()
+    apart = [other.name for other in others if other.time_s.min() > end or other.time_s.max() < begin]
+    found = [f"no time in common with {', '.join(apart)}: clocks of different zero?"] if apart else []
     unit = mapping.channels[channel.name].unit
     if channel.unit == "rad":
         low, high = _range(channel.value)
@@ -63,12 +63,11 @@ def doubts(mapping: ImportMap, channel: Imported) -> list[str]:
         ratio = None if channel.rate is None else _ratio(*_moved(channel))
         if ratio is not None and not 0.8 < ratio < 1.25:
             found.append(f"moves {ratio:.3g} times what its rate says")
-    elif channel.unit == "Pa" and 0.0 < max(-low, high) < RANGES["Pa"][0]:
-        found.append(f"at most {max(-low, high):.3g} Pa: is the unit {unit}, or {RANGES['Pa'][2]}?")
-    elif (channel.unit == "Pa" and high > RANGES["Pa"][1]) or (
-        channel.unit == "degC" and not RANGES["degC"][0] <= low <= high <= RANGES["degC"][1]
-    ):
-        found.append(f"{low:.3g} ... {high:.3g} {channel.unit}: is the unit {unit}?")
+    elif channel.unit == "Pa":
+        if max(-low, high) > 0.0 and not _PRESSURES_PA[0] <= max(-low, high) <= _PRESSURES_PA[1]:
+            found.append(f"up to {max(-low, high):.3g} Pa: is the unit {unit}?")
+    elif channel.unit == "degC" and not _AIR_DEGC[0] <= low <= high <= _AIR_DEGC[1]:
+        found.append(f"{low:.3g} ... {high:.3g} degC: is the unit {unit}?")
     return found
 
 

@@ -20,7 +20,7 @@ from lugre_steering.importing.plausible import DEGREES, check_units
 from lugre_steering.importing.read import KINDS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, unit_in, words_of
+from lugre_steering.importing.words import tells, unit_in
 from lugre_steering.recording import Array
 
 _FEW = 5
@@ -94,7 +94,7 @@ def _problem(file: Path, map_file: Path) -> str | None:
 def _clocks(table: Table) -> list[Guess]:
     """Time columns: by their name, else the first column that only rises."""
     rising = [name for name, values in table.columns.items() if _rises(values)]
-    named = [name for name in rising if WORDS["time"] & set(words_of(name)) and not WORDS["command"] & set(words_of(name))]
+    named = [name for name in rising if tells(name, "time") and not tells(name, "command")]
     return [_clock(table, name, name in named) for name in named or rising[:1]]
 
 
@@ -167,13 +167,12 @@ def _obstacle(key: str, taken: Mapping[str, Guess]) -> str | None:
 
 def _kind(table: Table, name: str) -> str | None:
     """What a column holds, by its words, else by its unit."""
-    words = set(words_of(name))
-    if WORDS["command"] & words:
+    if tells(name, "command"):
         return "command"
-    if WORDS["temperature"] & words:
-        return "air_temperature" if WORDS["air"] & words else "temperature"
+    if tells(name, "temperature"):
+        return "air_temperature" if tells(name, "air") else "temperature"
     for kind in ("rate", "torque", "pressure", "angle"):
-        if WORDS[kind] & words:
+        if tells(name, kind):
             return kind
     dimension = UNITS[unit][0] if (unit := _stated(table, name, None)) else None
     by_unit = {"angle": "angle", "angular speed": "rate", "pressure": "pressure", "torque": "torque", "force": "torque"}
@@ -182,11 +181,11 @@ def _kind(table: Table, name: str) -> str | None:
 
 def _key(table: Table, name: str) -> tuple[str | None, str]:
     """The channel of a column, with the reason, or why it is none."""
-    kind, words = _kind(table, name), set(words_of(name))
+    kind = _kind(table, name)
     if np.isfinite(table.columns[name]).sum() < _FEW:
         return None, "hardly any numbers"
     if kind in ("angle", "rate"):
-        side = next((side for side in ("left", "right") if WORDS[side] & words), None)
+        side = next((side for side in ("left", "right") if tells(name, side)), None)
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
         line = re.sub(r"\W+", "_", re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1]), flags=re.ASCII).strip("_").lower()
@@ -228,7 +227,7 @@ def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tupl
     if kind == "pressure":
         return _pressure_unit(most)
     if kind == "measured_torque":
-        unit = "N" if WORDS["force"] & set(words_of(name)) else "N m"
+        unit = "N" if tells(name, "force") else "N m"
         return unit, f"GUESSED: up to {most:.3g}, nothing says more"
     return ("K", f"{most:.0f} can only be K") if float(np.median(values)) > 150.0 else ("degC", f"up to {most:.3g}")
 

@@ -38,7 +38,7 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
     begin = _begin(rows, decimal)
     if begin is None:
         raise MapFileError(f"{file}: no row of numbers among the first {len(lines)} lines, expected a table")
-    width = Counter(len(_filled(cells)) for _, cells in rows[begin:]).most_common(1)[0][0]
+    width = Counter(len(cells) for _, cells in rows[begin:]).most_common(1)[0][0]
     top = begin
     while top > 0 and _is_title(rows[top - 1][1], width, decimal):
         top -= 1

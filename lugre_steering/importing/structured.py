@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +17,17 @@ from lugre_steering.importing.text import number
 from lugre_steering.recording import Array
 
 MAX_MEMORY = 1_000_000_000
-_COST = {b"{": 256, b"[": 96, b",": 32}
-"""Bytes that Python needs for an object, a list and a value, at most, told from the text."""
+_COST = {b"{": 256, b"[": 96, b",": 48}
+"""Bytes that an object, a list and a value take in Python and as numbers, at most, told from the text."""
+_COPIES = 3
+"""Of the text itself: as bytes, as characters, as texts within."""
 
 
 def read_json(file: Path) -> Table:
     """All numbers of a JSON file by their path."""
     size = file.stat().st_size
     raw = file.read_bytes() if size < MAX_MEMORY else b""
-    memory = size + sum(cost * raw.count(sign) for sign, cost in _COST.items())
+    memory = _COPIES * size + sum(cost * raw.count(sign) for sign, cost in _COST.items())
     if memory > MAX_MEMORY:
         raise MapFileError(f"{file}: would take {memory / 1e9:.1f} GB as JSON, expected at most 1 GB; split it, or write CSV or Parquet")
     try:
@@ -57,10 +59,10 @@ def _record(line: int, row: str) -> Any:
 def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
     if depth > MAX_DEPTH:
         raise MapFileError(f"{found.file}: '{name[:60]}': nested more than {MAX_DEPTH} deep")
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         for key, inner in value.items():
             _collect(found, _join(name, key), inner, depth + 1)
-    elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+    elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
         _collect_records(found, name, value)
     elif isinstance(value, list) and value and all(isinstance(item, list) for item in value):
         width = len(value[0])
@@ -95,7 +97,7 @@ def _leaves(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
     """Path and value of everything in one record; elements of a list by their place, from 1."""
     if depth > MAX_DEPTH:
         raise RecursionError
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         for key, inner in value.items():
             yield from _leaves(_join(name, key), inner, depth + 1)
     elif isinstance(value, list):
@@ -107,6 +109,8 @@ def _leaves(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
 
 def _numbers(found: Gathering, name: str, values: Sequence[Any]) -> Array | None:
     """Values (n,); nothing if one of them is no number, which is noted."""
+    if set(map(type, values)) == {float}:
+        return np.array(values)
     numbers = np.empty(len(values))
     for place, value in enumerate(values):
         single = _number(value)

@@ -115,6 +115,7 @@ class _Columns:
         self.file, self.options, self.titles = file, options, list(titles)
         self.names = _distinct(titles)
         self.header = [_trimmed(row) for _, row in header]
+        self.leads = {row[0] for row in self.header if row}
         self.values = [array("d") for _ in self.names]
         self.unusable: dict[str, str] = {
             title: f"column '{title}' occurs twice; expected '{title}[1]', '{title}[2]', ... in the map"
@@ -147,7 +148,7 @@ class _Columns:
         width = len(self.titles)
         if len(row) > width and not any(cell.strip() for cell in row[width:]):
             row = row[:width]  # trailing commas
-        if self.header and _trimmed(row) in self.header:
+        if row[0].strip() in self.leads and _trimmed(row) in self.header:
             self.left_out["repeated header rows"] += 1
             return None
         if "text_rows" in self.options.allow and all(number(cell, self.options.decimal) is None for cell in row if cell.strip()):
@@ -174,7 +175,7 @@ class _Columns:
         text, decimal = "".join(cells), self.options.decimal
         if decimal == "." and text.isascii() and "_" not in text:
             try:
-                return [float(cell) for cell in cells]
+                return list(map(float, cells))
             except ValueError:
                 pass
         found = []

@@ -44,6 +44,12 @@ def words_of(name: str) -> list[str]:
     return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced)]
 
 
+def tells(name: str, kind: str) -> bool:
+    """Whether a name holds a word of this kind; long words count as part of a compound too (Umgebungstemperatur)."""
+    known, words = WORDS[kind], words_of(name)
+    return any(word in known or any(len(part) > 4 and part in word for part in known) for word in words)
+
+
 def unit_in(text: str, whole: bool = False) -> str | None:
     """A unit that a name or a header cell states: in brackets, at its end after a blank or _, or as the ``whole`` text."""
     text = text.strip().replace("µ", "u").replace("μ", "u")

@@ -50,7 +50,9 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
                 for name, (topic, msgtype, rows) in messages.items()
             ]
         )
-    summaries = [{**channel.summary(), "doubts": doubts(mapping, channel)} for channel in channels.values()]
+    summaries = [
+        {**channel.summary(), "doubts": doubts(mapping, channel, channels.values())} for channel in channels.values()
+    ]
     left_out = dict(table.left_out)
     return {"bag": str(out), "table": str(file), "map": str(map_file), "left_out": left_out, "channels": summaries}
 
