@@ -103,8 +103,10 @@ def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
 
 
 def _is_title(cells: Sequence[str], width: int, decimal: str) -> bool:
+    """A row of words as wide as the data; remarks of a logger are narrower."""
     filled = [cell for cell in cells if cell.strip()]
-    return 2 * len(filled) >= width and len(_filled(cells)) <= width and all(number(cell, decimal) is None for cell in filled)
+    wide = len(cells) >= width - 1 and 2 * len(filled) >= width and len(_filled(cells)) <= width
+    return wide and all(number(cell, decimal) is None for cell in filled)
 
 
 def _is_units(cells: Sequence[str]) -> bool:
