@@ -333,8 +333,3 @@ def test_outliers_are_not_found_in_clean_data() -> None:
         np.zeros(9),
     ):
         assert outliers(clean).size == 0
-
-
-def test_the_shipped_example_map_is_read() -> None:
-    found = load_map(Path(__file__).parents[1] / "config" / "emps_map.yaml")
-    assert set(found.channels) == {"angle/left", "measured_torque"}
