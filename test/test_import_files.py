@@ -94,6 +94,24 @@ def test_columns_apart_by_blanks_and_other_encodings(tmp_path: Path) -> None:
         assert list(read_table(file, Csv(encoding=encoding)).column("Winkel [°]")) == [1.0]
 
 
+@pytest.mark.parametrize(
+    ("cell", "unix"),
+    [
+        ("2026-11-22 05:30:00", 1795325400.0), ("2026-11-22T05:30:00.25Z", 1795325400.25),
+        ("2026-11-22T07:30:00,125+02:00", 1795325400.125), ("1970-01-01T00:00:01-0130", 5401.0),
+    ],
+)  # fmt: skip
+def test_dates_are_unix_times(tmp_path: Path, cell: str, unix: float) -> None:
+    file = write(tmp_path, "log.csv", f"stamp;a\n{cell};1\n")
+    assert list(read_table(file, Csv(delimiter=";")).column("stamp")) == [pytest.approx(unix, abs=1e-6)]
+
+
+def test_a_day_that_is_none_is_no_number(tmp_path: Path) -> None:
+    file = write(tmp_path, "log.csv", "stamp,a\n2026-02-30 00:00:00,1\n")
+    with pytest.raises(MapFileError, match="got '2026-02-30 00:00:00', expected a number"):
+        read_table(file).column("stamp")
+
+
 def test_a_long_csv_is_read_by_blocks(tmp_path: Path) -> None:
     t = np.arange(10_000) * 0.01
     file = write(tmp_path, "log.csv", "t,a\n" + "".join(f"{x:.2f},{'' if i % 7 else i}\n" for i, x in enumerate(t)))

@@ -9,6 +9,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -21,19 +22,34 @@ Row = tuple[int, list[str]]
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE | re.ASCII)
 """A number as loggers write it; float() would take the underscores of Python too."""
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?\s*(Z|[-+]\d\d:?\d\d)?", re.ASCII)
+"""Date and time as ISO 8601 has them."""
 _MISSING = ("", "nan", "-nan", "na", "n/a", "null", "none")
 _MAX_LINE = 1 << 20
 _BLOCK = 4096
 
 
 def number(text: str, decimal: str = ".") -> float | None:
-    """A cell as a number, NaN if it says that there is none, nothing if it is other text."""
+    """A cell as a number, NaN if it says that there is none, nothing if it is other text. A date is its Unix time [s]."""
     text = text.strip()
     # With another decimal character a point groups thousands, or the map is wrong: no number either way.
     plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
     if _NUMBER.fullmatch(plain):
         return float(plain)
-    return float("nan") if text.lower() in _MISSING else None
+    if text.lower() in _MISSING:
+        return float("nan")
+    date = _DATE.fullmatch(text)
+    return _unix_time(*date.groups()) if date else None
+
+
+def _unix_time(day: str, clock: str, fraction: str | None, zone: str | None) -> float | None:
+    """Seconds since 1970; UTC unless the date says otherwise; nothing if there is no such day."""
+    offset = "+00:00" if zone in (None, "Z") else f"{zone[:3]}:{zone[-2:]}"
+    try:
+        whole = datetime.fromisoformat(f"{day}T{clock}{offset}").timestamp()
+    except ValueError:
+        return None
+    return whole + float(f"0.{fraction or 0}")
 
 
 def read_text(file: Path, options: Csv) -> Table:
