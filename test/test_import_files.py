@@ -41,6 +41,9 @@ def test_no_header(tmp_path: Path) -> None:
     assert list(found.column("c3")) == [-1.0, -2.0]
     named = read_table(file, Csv(delimiter="\t", header_rows=0, columns=("t", "x", "F")))
     assert list(named.column("x")) == [3.5, 3.6]
+    for options in (Csv(delimiter="\t"), Csv(delimiter="\t", columns=("t", "x", "F"))):  # else a row would be lost in silence
+        with pytest.raises(MapFileError, match=r"line 1: the header holds numbers, expected .* csv\.header_rows: 0"):
+            read_table(file, options)
 
 
 def test_metadata_several_header_rows_a_header_that_comes_again_and_a_footer(tmp_path: Path) -> None:

@@ -188,7 +188,8 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
         side = next((side for side in ("left", "right") if tells(name, side)), None)
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
-        line = re.sub(r"\W+", "_", re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1]), flags=re.ASCII).strip("_").lower()
+        plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1])
+        line = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_").lower()
         return f"pressure/{line if line[:1].isalpha() else f'line_{line}'}", "the name or unit tells of pressure"
     if kind == "torque":
         return "measured_torque", "the name or unit tells of torque or force"
@@ -259,7 +260,8 @@ def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
 
 
 def _pressure_unit(most: float) -> tuple[str, str]:
-    unit, other = ("Pa", "kPa") if most > 3e4 else ("kPa", "psi") if most > 1000.0 else ("bar", "psi") if most > 60.0 else ("MPa", "bar")
+    ranges = ((3e4, "Pa", "kPa"), (1e3, "kPa", "psi"), (60.0, "bar", "psi"), (0.0, "MPa", "bar"))
+    unit, other = next((unit, other) for least, unit, other in ranges if most >= least)
     return unit, f"GUESSED: up to {most:.4g}; if not, then {other}"
 
 

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -85,10 +86,10 @@ def read_rows(file: Path, options: Csv) -> Iterator[Row]:
             raise MapFileError(f"{file}: cannot be read as {options.encoding}: {error.reason}; {hint}") from error
 
 
-def _lines(file: Path, stream: Iterator[str]) -> Iterator[str]:
+def _lines(file: Path, stream: TextIO) -> Iterator[str]:
     """Lines, none of which fills the memory."""
     count = 0
-    while line := stream.readline(_MAX_LINE):  # type: ignore[attr-defined]
+    while line := stream.readline(_MAX_LINE):
         count += 1
         if len(line) == _MAX_LINE:
             raise MapFileError(f"{file}: line {count}: is longer than {_MAX_LINE} characters, expected a table")
@@ -97,6 +98,10 @@ def _lines(file: Path, stream: Iterator[str]) -> Iterator[str]:
 
 def _titles(file: Path, options: Csv, header: Sequence[Row], first: Row) -> list[str]:
     """A name for each column, as written; trailing commas make no column."""
+    cells = _trimmed(header[0][1]) if header else []
+    if cells and all(map(_NUMBER.fullmatch, cells)) and any("." in cell for cell in cells):  # 1, 2, 3 may be names
+        wanted = "expected names of columns, or csv.header_rows: 0 in the map"
+        raise MapFileError(f"{file}: line {header[0][0]}: the header holds numbers, {wanted}")
     if options.columns is not None:
         return list(options.columns)
     if not header:
@@ -167,7 +172,8 @@ class _Columns:
         if row[0].strip() in self.leads and _trimmed(row) in self.header:
             self.left_out["repeated header rows"] += 1
             return None
-        if "text_rows" in self.options.allow and all(number(cell, self.options.decimal) is None for cell in row if cell.strip()):
+        filled = (cell for cell in row if cell.strip())
+        if "text_rows" in self.options.allow and all(number(cell, self.options.decimal) is None for cell in filled):
             self.left_out["rows without a number"] += 1
             return None
         if len(row) < width and "short_rows" in self.options.allow:

@@ -55,8 +55,8 @@ def unit_in(text: str, whole: bool = False) -> str | None:
     text = text.strip().replace("µ", "u").replace("μ", "u")
     bracketed = re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", text)
     parts = re.split(r"[\s_]+", text)
-    candidates = [*bracketed, text] if whole else [*bracketed, "_".join(parts[-2:]), *parts[-1:]] if len(parts) > 1 else bracketed
-    for candidate in candidates:
+    ends = [text] if whole else ["_".join(parts[-2:]), parts[-1]] if len(parts) > 1 else []
+    for candidate in (*bracketed, *ends):
         unit = UNIT_OF.get(re.sub(r"\s+", "_", candidate.strip()).lower())
         if unit is not None:
             return unit
