@@ -257,16 +257,28 @@ def vehicle_(
 
 @command("import")
 def import_(
-    table: Annotated[Path, typer.Argument(help="CSV, Parquet (.parquet) or MATLAB (.mat) file")],
-    map_file: Annotated[Path, typer.Option("--map", help="which column is which channel, and its unit (YAML)")],
-    out: Annotated[Path, typer.Option("--out", help="bag folder to write")],
+    table: Annotated[Path, typer.Argument(help="CSV, JSON, npz, Parquet, HDF5 or MATLAB file, by its ending")],
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="which column is which channel, and its unit (YAML)")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="bag folder to write")] = None,
+    propose: Annotated[
+        bool, typer.Option("--propose", help="write a first map (to --map, or TABLE_map.yaml here) and say what was guessed")
+    ] = False,
     storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
     as_json: Json = False,
 ) -> None:
     """Turn a table into a bag with the standard topics; counts rates, gaps and outliers, repairs nothing."""
-    from lugre_steering.importing.show import show_import
+    from lugre_steering.importing.propose import propose as write_map
+    from lugre_steering.importing.show import show_import, show_proposal
     from lugre_steering.importing.write import import_table
 
+    if propose:
+        proposal = write_map(table, map_file or Path(f"{table.stem}_map.yaml"))
+        print_json(proposal) if as_json else show_proposal(output(), proposal)
+        return
+    if map_file is None or out is None:
+        raise DataError(f"import {table}: needs --map FILE and --out DIR; --propose writes a first map")
     result = import_table(table, map_file, out, storage)
     print_json(result) if as_json else show_import(output(), result)
 

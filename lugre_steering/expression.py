@@ -98,7 +98,8 @@ class _Check:
             return ast.BinOp(left, node.op, self.visit(node.right, depth + 1, isinstance(node.op, ast.Pow)))
         if isinstance(node, ast.Call):
             return self.call(node, depth)
-        hint = "a power is written **" if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor) else f"expected {_LANGUAGE}"
+        power = isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor)
+        hint = "a power is written **" if power else f"expected {_LANGUAGE}"
         raise self.fail(node, f"'{_short(node)}' is not allowed; {hint}")
 
     def number(self, node: ast.Constant, exponent: bool) -> int | float:
@@ -157,5 +158,5 @@ def _clip(text: str, length: int = 120) -> str:
 
 def _listed(names: Collection[str]) -> str:
     """Names for a message: all of a few, some of many."""
-    shown = list(names)[:20]
-    return ", ".join(shown) + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "") if shown else "none"
+    shown = ", ".join(list(names)[:20])
+    return f"{shown} and {len(names) - 20} more" if len(names) > 20 else shown or "none"

@@ -19,8 +19,8 @@ from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import import_table, load_map, read_table
+from lugre_steering.importing.channels import outliers
 from lugre_steering.importing.map import UNITS, Csv, to_si
-from lugre_steering.importing.write import outliers
 from lugre_steering.vehicle import load
 
 VEHICLE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
@@ -176,7 +176,7 @@ def test_parquet_without_pyarrow_says_what_to_install(tmp_path: Path, monkeypatc
     def absent(name: str) -> None:
         raise ImportError(name)
 
-    monkeypatch.setattr("lugre_steering.importing.table.importlib.import_module", absent)
+    monkeypatch.setattr("lugre_steering.importing.arrays.importlib.import_module", absent)
     with pytest.raises(MapFileError, match=r"d\.parquet: needs pyarrow.*lugre_steering\[import\]"):
         read_table(write(tmp_path, "d.parquet", "x"))
 
@@ -195,7 +195,7 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         (GOOD.replace("column: a", "colum: a"), "colum'.*did you mean 'column'"),
         (GOOD.replace("angle/left", "angle/middle"), "got 'angle/middle', expected angle/left"),
         (GOOD.replace("angle/left", "pressure"), "got 'pressure', expected angle/left"),
-        (GOOD.replace("column: a,", "column: a, polynomial: [1.0], of: a,"), "exactly one of column, polynomial, cylinder"),
+        (GOOD.replace("column: a,", "column: a, polynomial: [1.0], of: a,"), "exactly one of column, polynomial, expression"),
         (GOOD.replace("column: a,", "polynomial: [1.0],"), "angle/left.of': got nothing"),
         (GOOD.replace("time: {column: t}\n", ""), "key 'time': got nothing"),
         (GOOD.replace("column: t", "column: t, unit: m"), "key 'time.unit': got 'm'"),
@@ -333,8 +333,3 @@ def test_outliers_are_not_found_in_clean_data() -> None:
         np.zeros(9),
     ):
         assert outliers(clean).size == 0
-
-
-def test_the_shipped_example_map_is_read() -> None:
-    found = load_map(Path(__file__).parents[1] / "config" / "emps_map.yaml")
-    assert set(found.channels) == {"angle/left", "measured_torque"}

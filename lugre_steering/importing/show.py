@@ -23,6 +23,25 @@ def show_import(console: Console, result: Mapping[str, Any]) -> None:
         notes = "; ".join(_notes(channel)) or "-"
         table.add_row(channel["channel"], str(channel["samples"]), rate, time, value, notes)
     console.print(table)
+    for what, count in result["left_out"].items():
+        console.print(f"left out: {count} {what}")
+
+
+def show_proposal(console: Console, result: Mapping[str, Any]) -> None:
+    """What was taken for what, and why; what was not used; what is still to be done."""
+    table = Table(title=f"{result['table']} -> {result['map']}", title_justify="left")
+    for heading in ("taken for", "column", "unit", "why"):
+        table.add_column(heading, overflow="fold")
+    for guess in (*result["clocks"], *result["channels"]):
+        table.add_row(guess["key"], guess["column"], guess["unit"], guess["why"])
+    for column, bits in result["signed"].items():
+        table.add_row("signed", column, f"{bits} bits", "whole numbers near zero and near the largest, nothing between")
+    for row in result["unused"]:
+        table.add_row("-", row["column"], "-", row["why"])
+    console.print(table)
+    for reason in result["format"]:
+        console.print(reason)
+    console.print(f"not yet usable: {result['problem']}" if result["problem"] else "the map can be used; check each line of it first")
 
 
 def _notes(channel: Mapping[str, Any]) -> list[str]:
@@ -37,4 +56,4 @@ def _notes(channel: Mapping[str, Any]) -> list[str]:
         notes.append(f"{len(gaps)} gaps, longest {end - begin:.3g} s at {begin:.4g} s")
     if spikes := channel["outliers_s"]:
         notes.append(f"{len(spikes)} outliers, first at {spikes[0]:.4g} s")
-    return notes
+    return [*notes, *channel["doubts"]]

@@ -1,0 +1,109 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the unit that a map states can be true: angles and their rates tell by a factor of 57, the rest by range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lugre_steering.errors import MapFileError
+from lugre_steering.importing.channels import Imported
+from lugre_steering.importing.map import ImportMap
+from lugre_steering.recording import Array
+
+DEGREES = 180.0 / math.pi
+_SHARE = 0.01
+"""So many samples say nothing about the range of a channel: they may be outliers."""
+_ALIKE = 0.1
+"""Relative deviation of a ratio from 57.3 that still means degrees for radians."""
+_CORRELATED = 0.9
+_MIN_SAMPLES = 20
+
+_PRESSURES_PA = (2e4, 2e8)
+"""Where the highest pressure of a hydraulic machine lies."""
+_AIR_DEGC = (-60.0, 80.0)
+
+
+def check_units(file: Path, mapping: ImportMap, channels: Mapping[str, Imported]) -> None:
+    """Refuse angles whose unit cannot be true."""
+    angles = {name: channel for name, channel in channels.items() if channel.unit == "rad"}
+    for name, channel in angles.items():
+        low, high = _range(channel.value)
+        unit = mapping.channels[name].unit
+        if unit in ("rad", "mrad") and (high - low > 2.0 * math.pi or max(-low, high) > 2.0 * math.pi):
+            raise MapFileError(
+                f"{file}: channel {name}: the unit '{unit}' makes it {low:.4g} ... {high:.4g} rad, "
+                "expected less than a turn (6.28 rad); is the column in deg?"
+            )
+        if channel.rate is not None and (ratio := _ratio(*_moved(channel))) is not None:
+            _refuse_degrees(file, name, f"rate/{name.removeprefix('angle/')}", ratio)
+    if len(angles) == 2 and len({channel.value.size for channel in angles.values()}) == 1:
+        left, right = angles.values()
+        if (ratio := _ratio(left.value - left.value.mean(), right.value - right.value.mean())) is not None:
+            _refuse_degrees(file, left.name, right.name, ratio)
+
+
+def doubts(mapping: ImportMap, channel: Imported, others: Iterable[Imported]) -> list[str]:
+    """What is odd about the numbers of a channel, but possible."""
+    low, high = float(np.min(channel.value)), float(np.max(channel.value))
+    begin, end = channel.time_s.min(), channel.time_s.max()
+    apart = [other.name for other in others if other.time_s.min() > end or other.time_s.max() < begin]
+    found = [f"no time in common with {', '.join(apart)}: clocks of different zero?"] if apart else []
+    unit = mapping.channels[channel.name].unit
+    if channel.unit == "rad":
+        low, high = _range(channel.value)
+        if max(-low, high) > (math.pi if unit == "deg" else 0.5 * math.pi):
+            found.append(f"{math.degrees(low):.0f} ... {math.degrees(high):.0f} deg: is the unit {unit}, and the zero right?")
+        if unit == "deg" and 0.0 < high - low < math.radians(3.0):
+            found.append(f"travels {math.degrees(high - low):.2g} deg only: is the unit deg?")
+        ratio = None if channel.rate is None else _ratio(*_moved(channel))
+        if ratio is not None and not 0.8 < ratio < 1.25:
+            found.append(f"moves {ratio:.3g} times what its rate says")
+    elif channel.unit == "Pa":
+        if max(-low, high) > 0.0 and not _PRESSURES_PA[0] <= max(-low, high) <= _PRESSURES_PA[1]:
+            found.append(f"up to {max(-low, high):.3g} Pa: is the unit {unit}?")
+    elif channel.unit == "degC" and not _AIR_DEGC[0] <= low <= high <= _AIR_DEGC[1]:
+        found.append(f"{low:.3g} ... {high:.3g} degC: is the unit {unit}?")
+    return found
+
+
+def _range(value: Array) -> tuple[float, float]:
+    """Where all but a few values lie."""
+    low, high = np.quantile(value, [_SHARE / 2, 1.0 - _SHARE / 2])
+    return float(low), float(high)
+
+
+def _moved(channel: Imported) -> tuple[Array, Array]:
+    """Angle covered between samples, by the angle and by its rate, where both are known."""
+    assert channel.rate is not None
+    step, turned = np.diff(channel.time_s), np.diff(channel.value)
+    by_rate = 0.5 * (channel.rate[1:] + channel.rate[:-1]) * step
+    known = np.isfinite(by_rate) & (step > 0.0)
+    # Sums over about a hundredth of the recording: single steps are mostly the resolution of the sensor.
+    edges = np.arange(0, int(known.sum()), max(1, int(known.sum()) // 100))
+    if edges.size < _MIN_SAMPLES:
+        return np.empty(0), np.empty(0)
+    return np.add.reduceat(turned[known], edges), np.add.reduceat(by_rate[known], edges)
+
+
+def _ratio(value: Array, other: Array) -> float | None:
+    """How many times ``other`` the ``value`` is, where both surely tell of the same motion."""
+    if value.size < _MIN_SAMPLES or not value.any() or not other.any():
+        return None
+    correlation = float(value @ other / math.sqrt((value @ value) * (other @ other)))
+    if abs(correlation) < _CORRELATED:
+        return None
+    return math.copysign(math.sqrt((value @ value) / (other @ other)), correlation)
+
+
+def _refuse_degrees(file: Path, name: str, other: str, ratio: float) -> None:
+    for factor, first, second in ((DEGREES, name, other), (1.0 / DEGREES, other, name)):
+        if abs(abs(ratio) / factor - 1.0) < _ALIKE:
+            raise MapFileError(
+                f"{file}: channel {first}: moves {DEGREES:.0f} times as far as {second} says, expected the same; "
+                f"{first} is in deg and not in rad, or {second} the other way round"
+            )

@@ -1,0 +1,133 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How a CSV file is written, guessed from its first rows."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+
+from lugre_steering.errors import MapFileError
+from lugre_steering.importing.map import WHITESPACE, Csv
+from lugre_steering.importing.text import number
+from lugre_steering.importing.words import unit_in
+
+_BYTES = 1 << 20
+_LINES = 400
+_DELIMITERS = (",", ";", "\t", "|", WHITESPACE)
+_COMMENTS = "#%!"
+_RUN = 5
+"""The data begin at a row of numbers of which most of so many are, itself included."""
+
+
+def sniff(file: Path) -> tuple[Csv, list[str]]:
+    """Options to read the file with, and a reason for each that is not the default."""
+    encoding, text = _decoded(file)
+    lines = list(islice(text.splitlines(), _LINES))
+    if "\0" in text or not lines:
+        raise MapFileError(f"{file}: holds no text, expected a table")
+    marks = Counter(line[0] for line in lines if line[:1] and line[0] in _COMMENTS)
+    comment = max(marks, key=marks.__getitem__) if marks else "#"
+    delimiter, decimal = max(
+        ((d, c) for d in _DELIMITERS for c in (".", ",") if d != c), key=lambda way: _score(lines, comment, *way)
+    )
+    rows = [(i, cells) for i, cells in _split(lines, comment, delimiter) if any(cells)]
+    begin = _begin(rows, decimal)
+    if begin is None:
+        raise MapFileError(f"{file}: no row of numbers among the first {len(lines)} lines, expected a table")
+    width = Counter(len(cells) for _, cells in rows[begin:]).most_common(1)[0][0]
+    top = begin
+    while top > 0 and _is_title(rows[top - 1][1], width, decimal):
+        top -= 1
+    header = [cells for _, cells in rows[top:begin]]
+    skip = rows[top][0] - 1 if any(line.strip() and line[0] != comment for line in lines[: rows[top][0] - 1]) else 0
+    name_row = 1 + max(range(len(header)), key=lambda i: (not _is_units(header[i]), _count(header[i]), -i), default=0)
+    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), encoding=encoding)
+    return options, _reasons(options, header)
+
+
+def _decoded(file: Path) -> tuple[str, str]:
+    with file.open("rb") as stream:
+        raw = stream.read(_BYTES)
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16", raw.decode("utf-16", errors="ignore")
+    try:
+        return "utf-8", raw.decode("utf-8-sig", errors="strict" if len(raw) < _BYTES else "ignore")
+    except UnicodeDecodeError:
+        return "latin-1", raw.decode("latin-1")
+
+
+def _split(lines: Sequence[str], comment: str, delimiter: str) -> list[tuple[int, list[str]]]:
+    kept = [(i, line) for i, line in enumerate(lines, 1) if not line.startswith(comment)]
+    if delimiter == WHITESPACE:
+        return [(i, line.split()) for i, line in kept]
+    try:
+        return [(i, next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])) for i, line in kept]
+    except csv.Error:
+        return []
+
+
+def _score(lines: Sequence[str], comment: str, delimiter: str, decimal: str) -> int:
+    """Numbers less other text, in rows of the usual number of cells; one column is no table."""
+    rows = [cells for _, cells in _split(lines, comment, delimiter)]
+    width = Counter(len(_filled(cells)) for cells in rows if _is_data(cells, decimal)).most_common(1)
+    if not width or width[0][0] < 2:
+        return -1
+    cells = [cell for row in rows if len(_filled(row)) == width[0][0] for cell in row if cell.strip()]
+    return sum(1 if number(cell, decimal) is not None else -1 for cell in cells)
+
+
+def _filled(cells: Sequence[str]) -> list[str]:
+    """Without what trailing commas make."""
+    end = max((i for i, cell in enumerate(cells, 1) if cell.strip()), default=0)
+    return list(cells[:end])
+
+
+def _is_data(cells: Sequence[str], decimal: str) -> bool:
+    filled = [cell for cell in cells if cell.strip()]
+    return bool(filled) and 2 * sum(number(cell, decimal) is not None for cell in filled) >= len(filled)
+
+
+def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
+    """Index of the first of several rows of numbers."""
+    for i in range(len(rows)):
+        run = [cells for _, cells in rows[i : i + _RUN]]
+        widest = max(len(_filled(cells)) for cells in run)
+        data = [_is_data(cells, decimal) and 2 * len(_filled(cells)) > widest for cells in run]
+        if data[0] and 2 * sum(data) > len(run):
+            return i
+    return None
+
+
+def _is_title(cells: Sequence[str], width: int, decimal: str) -> bool:
+    """A row of words as wide as the data; remarks of a logger are narrower."""
+    filled = [cell for cell in cells if cell.strip()]
+    wide = len(cells) >= width - 1 and 2 * len(filled) >= width and len(_filled(cells)) <= width
+    return wide and all(number(cell, decimal) is None for cell in filled)
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell.strip(" -[]()")]
+    return bool(filled) and 2 * sum(unit_in(cell, whole=True) is not None for cell in filled) > len(filled)
+
+
+def _count(cells: Sequence[str]) -> int:
+    return sum(bool(cell.strip()) for cell in cells)
+
+
+def _reasons(options: Csv, header: Sequence[Sequence[str]]) -> list[str]:
+    found = []
+    if options.delimiter != "," or options.decimal != ".":
+        found.append(f"delimiter {options.delimiter!r} and decimal '{options.decimal}' make the most cells numbers")
+    if options.encoding != "utf-8":
+        found.append(f"encoding {options.encoding}: the file is not UTF-8")
+    if options.skip_rows:
+        found.append(f"{options.skip_rows:.0f} lines above the column names are left out")
+    if not header:
+        found.append("the first row holds numbers, so the columns are called c1, c2, ...: name them with csv.columns")
+    if len(header) > 1:
+        found.append(f"{len(header)} header rows, names in row {options.name_row:.0f} of them")
+    return found

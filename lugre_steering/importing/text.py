@@ -1,0 +1,223 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of text: CSV and its kin. What a row may lack is said in the map; any other text among numbers is refused."""
+
+from __future__ import annotations
+
+import csv
+import re
+from array import array
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from lugre_steering.errors import MapFileError
+from lugre_steering.importing.map import WHITESPACE, Csv
+from lugre_steering.importing.table import MAX_COLUMNS, MAX_NUMBERS, Table
+
+Row = tuple[int, list[str]]
+
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE | re.ASCII)
+"""A number as loggers write it; float() would take the underscores of Python too."""
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?\s*(Z|[-+]\d\d:?\d\d)?", re.ASCII)
+"""Date and time as ISO 8601 has them."""
+_MISSING = ("", "nan", "-nan", "na", "n/a", "null", "none")
+_MAX_LINE = 1 << 20
+_BLOCK = 4096
+
+
+def number(text: str, decimal: str = ".") -> float | None:
+    """A cell as a number, NaN if it says that there is none, nothing if it is other text. A date is its Unix time [s]."""
+    text = text.strip()
+    # With another decimal character a point groups thousands, or the map is wrong: no number either way.
+    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
+    if _NUMBER.fullmatch(plain):
+        return float(plain)
+    if text.lower() in _MISSING:
+        return float("nan")
+    date = _DATE.fullmatch(text)
+    return _unix_time(*date.groups()) if date else None
+
+
+def _unix_time(day: str, clock: str, fraction: str | None, zone: str | None) -> float | None:
+    """Seconds since 1970; UTC unless the date says otherwise; nothing if there is no such day."""
+    offset = "+00:00" if zone in (None, "Z") else f"{zone[:3]}:{zone[-2:]}"
+    try:
+        whole = datetime.fromisoformat(f"{day}T{clock}{offset}").timestamp()
+    except ValueError:
+        return None
+    return whole + float(f"0.{fraction or 0}")
+
+
+def read_text(file: Path, options: Csv) -> Table:
+    """The columns of a CSV file."""
+    rows = read_rows(file, options)
+    count = int(options.header_rows)
+    header = [row for _, row in zip(range(count), rows, strict=False)]
+    first = next(rows, None)
+    if first is None:
+        wanted = f"{count} header rows and rows of numbers" if count != 1 else "a row of column names and rows of numbers"
+        raise MapFileError(f"{file}: has {len(header)} rows, expected {wanted}")
+    titles = _titles(file, options, header, first)
+    return _Columns(file, options, titles, header).read(first, rows)
+
+
+def read_rows(file: Path, options: Csv) -> Iterator[Row]:
+    """Line number and cells of each row below ``skip_rows`` that is neither empty nor a comment."""
+    with file.open(encoding="utf-8-sig" if options.encoding == "utf-8" else options.encoding, newline="") as stream:
+        lines = _lines(file, stream)
+        if options.delimiter == WHITESPACE:
+            rows: Iterator[Row] = ((i, line.split()) for i, line in enumerate(lines, 1))
+        else:
+            reader = csv.reader(lines, delimiter=options.delimiter, skipinitialspace=True)
+            rows = ((reader.line_num, row) for row in reader)
+        try:
+            for line, row in rows:
+                if line > options.skip_rows and any(row) and not row[0].startswith(options.comment):
+                    yield line, row
+        except csv.Error as error:
+            raise MapFileError(f"{file}: line {reader.line_num}: is not CSV: {error}") from error
+        except UnicodeDecodeError as error:
+            hint = "expected csv.encoding latin-1, cp1252 or utf-16 in the map"
+            raise MapFileError(f"{file}: cannot be read as {options.encoding}: {error.reason}; {hint}") from error
+
+
+def _lines(file: Path, stream: TextIO) -> Iterator[str]:
+    """Lines, none of which fills the memory."""
+    count = 0
+    while line := stream.readline(_MAX_LINE):
+        count += 1
+        if len(line) == _MAX_LINE:
+            raise MapFileError(f"{file}: line {count}: is longer than {_MAX_LINE} characters, expected a table")
+        yield line
+
+
+def _titles(file: Path, options: Csv, header: Sequence[Row], first: Row) -> list[str]:
+    """A name for each column, as written; trailing commas make no column."""
+    cells = _trimmed(header[0][1]) if header else []
+    if cells and all(map(_NUMBER.fullmatch, cells)) and any("." in cell for cell in cells):  # 1, 2, 3 may be names
+        wanted = "expected names of columns, or csv.header_rows: 0 in the map"
+        raise MapFileError(f"{file}: line {header[0][0]}: the header holds numbers, {wanted}")
+    if options.columns is not None:
+        return list(options.columns)
+    if not header:
+        return [f"c{i + 1}" for i in range(len(_trimmed(first[1])))]
+    line, row = header[int(options.name_row) - 1]
+    titles = _trimmed(row)
+    if len(titles) > MAX_COLUMNS:
+        raise MapFileError(f"{file}: line {line}: has {len(titles)} columns, expected at most {MAX_COLUMNS}")
+    return titles
+
+
+def _trimmed(row: Sequence[str]) -> list[str]:
+    cells = [cell.strip() for cell in row]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _distinct(titles: Sequence[str]) -> list[str]:
+    """Names by which columns are asked for: an unnamed one by its place, [3]; one of several alike by its turn, a[2]."""
+    counts, turn, names = Counter(titles), Counter[str](), []
+    for place, title in enumerate(titles, 1):
+        turn[title] += 1
+        names.append(f"[{place}]" if not title else f"{title}[{turn[title]}]" if counts[title] > 1 else title)
+    return names
+
+
+class _Columns:
+    """Takes rows by blocks: text costs ten times the memory of numbers."""
+
+    def __init__(self, file: Path, options: Csv, titles: Sequence[str], header: Sequence[Row]) -> None:
+        self.file, self.options, self.titles = file, options, list(titles)
+        self.names = _distinct(titles)
+        self.header = [_trimmed(row) for _, row in header]
+        self.leads = {row[0] for row in self.header if row}
+        self.values = [array("d") for _ in self.names]
+        self.unusable: dict[str, str] = {
+            title: f"column '{title}' occurs twice; expected '{title}[1]', '{title}[2]', ... in the map"
+            for title, count in Counter(titles).items() if count > 1 and title
+        }  # fmt: skip
+        self.left_out: Counter[str] = Counter()
+        self.rows = 0
+
+    def read(self, first: Row, rows: Iterator[Row]) -> Table:
+        block = [kept] if (kept := self._row(first)) else []
+        for row in rows:
+            if kept := self._row(row):
+                block.append(kept)
+            if len(block) == _BLOCK:
+                self._take(block)
+                block = []
+        if block:
+            self._take(block)
+        if not self.rows:
+            raise MapFileError(f"{self.file}: has no rows of numbers below the header")
+        columns = {
+            name: np.frombuffer(column, np.float64)
+            for name, column in zip(self.names, self.values, strict=True) if name not in self.unusable
+        }  # fmt: skip
+        return Table(self.file, columns, {}, self.unusable, self._units(), dict(self.left_out))
+
+    def _row(self, found: Row) -> Row | None:
+        """The cells of the columns; nothing if the row is to be left out."""
+        line, row = found
+        width = len(self.titles)
+        if len(row) > width and not any(cell.strip() for cell in row[width:]):
+            row = row[:width]  # trailing commas
+        if row[0].strip() in self.leads and _trimmed(row) in self.header:
+            self.left_out["repeated header rows"] += 1
+            return None
+        filled = (cell for cell in row if cell.strip())
+        if "text_rows" in self.options.allow and all(number(cell, self.options.decimal) is None for cell in filled):
+            self.left_out["rows without a number"] += 1
+            return None
+        if len(row) < width and "short_rows" in self.options.allow:
+            self.left_out["short rows (what they lack counts as missing)"] += 1
+            row = row + [""] * (width - len(row))
+        if len(row) != width:
+            hint = "; csv.allow: [short_rows] takes what is lacking as missing" if len(row) < width else ""
+            raise MapFileError(f"{self.file}: line {line}: has {len(row)} cells, expected {width} as in the header{hint}")
+        return line, row
+
+    def _take(self, block: Sequence[Row]) -> None:
+        self.rows += len(block)
+        for place, cells in enumerate(zip(*(row for _, row in block), strict=True)):
+            if self.names[place] not in self.unusable:
+                self.values[place].extend(self._numbers(place, cells, block))
+        if sum(map(len, self.values)) > MAX_NUMBERS:
+            raise MapFileError(f"{self.file}: has more than {MAX_NUMBERS} cells; split it")
+
+    def _numbers(self, place: int, cells: Sequence[str], block: Sequence[Row]) -> Sequence[float]:
+        """The cells of one column. One that holds text is unusable, which does no harm unless somebody asks for it."""
+        text, decimal = "".join(cells), self.options.decimal
+        if decimal == "." and text.isascii() and "_" not in text:
+            try:
+                return list(map(float, cells))
+            except ValueError:
+                pass
+        found = []
+        for (line, _), cell in zip(block, cells, strict=True):
+            value = number(cell, decimal)
+            if value is None:
+                if "text_cells" not in self.options.allow:
+                    where = f"line {line}, column '{self.names[place]}'"
+                    self.unusable[self.names[place]] = (
+                        f"{where}: got '{cell[:60]}', expected a number (decimal '{decimal}') or an empty cell"
+                    )
+                    self.values[place] = array("d", self.values[place][:0])
+                    return []
+                self.left_out["cells of text (count as missing)"] += 1
+                value = float("nan")
+            found.append(value)
+        return found
+
+    def _units(self) -> dict[str, str]:
+        """What the other header rows say; which are units is for the proposal to find out."""
+        others = [row for i, row in enumerate(self.header, 1) if i != self.options.name_row]
+        columns = zip(self.names, *(row + [""] * (len(self.names) - len(row)) for row in others), strict=False)
+        return {name: " ".join(filter(None, cells)) for name, *cells in columns if any(cells)}

@@ -1,0 +1,170 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Proposed maps: what is guessed for files whose content is known, whether it says so, and that it works."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from typer.testing import CliRunner
+
+from lugre_steering.cli import app
+from lugre_steering.errors import MapFileError
+from lugre_steering.importing import import_table, load_map
+from lugre_steering.importing.propose import propose
+
+T = np.arange(0.0, 20.0, 0.01)
+ANGLE, RATE = np.radians(30.0) * np.sin(T), np.radians(30.0) * np.cos(T)
+
+
+def csv_of(folder: Path, columns: dict[str, np.ndarray], delimiter: str = ",", decimal: str = ".") -> Path:
+    path = folder / "log.csv"
+    rows = [[f"{x:.15g}".replace(".", decimal) for x in row] for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(delimiter.join(row) for row in [list(columns), *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def proposal(table: Path) -> dict:
+    """What is proposed, after importing with it."""
+    map_file = table.with_name("map.yaml")
+    found = propose(table, map_file)
+    assert found["problem"] is None, found["problem"]
+    import_table(table, map_file, table.with_name("bag"))
+    return found | {"text": map_file.read_text(encoding="utf-8")}
+
+
+def units(found: dict) -> dict[str, tuple[str, str]]:
+    return {guess["key"]: (guess["column"], guess["unit"]) for guess in (*found["clocks"], *found["channels"])}
+
+
+@pytest.mark.parametrize("angle_unit", ["rad", "deg"])
+@pytest.mark.parametrize("rate_unit", ["rad/s", "deg/s"])
+@pytest.mark.parametrize(("time_unit", "factor"), [("s", 1.0), ("ms", 1e3), ("us", 1e6)])
+def test_units_are_told_from_numbers_alone(tmp_path: Path, angle_unit: str, rate_unit: str, time_unit: str, factor: float) -> None:
+    columns = {
+        "time": T * factor,
+        "steering_angle": np.degrees(ANGLE) if angle_unit == "deg" else ANGLE,
+        "steering_rate": np.degrees(RATE) if rate_unit == "deg/s" else RATE,
+        "pressure_1": 120.0 + T, "torque": 900.0 * np.sign(RATE), "ambient_temp": 293.0 + 0.1 * T,
+    }  # fmt: skip
+    found = proposal(csv_of(tmp_path, columns))
+    assert units(found) == {
+        "time": ("time", time_unit), "angle/left": ("steering_angle", angle_unit), "rate/left": ("steering_rate", rate_unit),
+        "pressure/pressure_1": ("pressure_1", "bar"), "measured_torque": ("torque", "N m"), "air_temperature": ("ambient_temp", "K"),
+    }  # fmt: skip
+    why = {guess["key"]: guess["why"] for guess in found["channels"]}
+    assert "GUESSED" in why["measured_torque"]
+    assert "times the angle" in why["rate/left"]
+    for reason in why.values():
+        assert reason in found["text"]
+
+
+def test_stated_units_are_taken_and_commands_are_not(tmp_path: Path) -> None:
+    columns = {
+        "t [ms]": 1e3 * T, "angle left [mrad]": 1e3 * ANGLE, "angle_right_deg": np.degrees(ANGLE), "target angle": ANGLE,
+        "Force (kN)": T, "p cap (MPa)": T, "motor_enabled": np.ones_like(T), "foo": T[::-1],
+    }  # fmt: skip
+    found = proposal(csv_of(tmp_path, columns, ";", ","))
+    assert units(found) == {
+        "time": ("t [ms]", "ms"), "angle/left": ("angle left [mrad]", "mrad"), "angle/right": ("angle_right_deg", "deg"),
+        "measured_torque": ("Force (kN)", "kN"), "pressure/p_cap": ("p cap (MPa)", "MPa"),
+    }  # fmt: skip
+    assert {row["column"] for row in found["unused"]} == {"target angle", "motor_enabled", "foo"}
+    assert "the name tells nothing known; 0 ... 19.99" in found["text"]
+    assert "csv: {delimiter: ;, decimal: ','}" in found["text"]
+
+
+def test_a_logger_with_metadata_unit_row_repeated_header_short_rows_and_another_encoding(tmp_path: Path) -> None:
+    rows = [f"{10 * i};{str(0.5 * i).replace('.', ',')};{100 + i};" for i in range(60)]
+    rows[30:30] = ["Zeit;Lenkwinkel links;Druck A;"]
+    rows[40] = rows[40].split(";")[0] + ";1,5"
+    head = ["Logger 3000;Version 2", "Datum;22.11.2026", "", "Zeit;Lenkwinkel links;Druck A;", "[ms];[°];[bar];"]
+    (tmp_path / "log.csv").write_bytes("\r\n".join([*head, *rows, "Ende der Messung"]).encode("latin-1"))
+    found = proposal(tmp_path / "log.csv")
+    assert units(found) == {
+        "time": ("Zeit", "ms"), "angle/left": ("Lenkwinkel links", "deg"), "pressure/druck_a": ("Druck A", "bar")
+    }  # fmt: skip
+    options = load_map(tmp_path / "map.yaml").csv
+    assert (options.delimiter, options.decimal, options.skip_rows, options.header_rows) == (";", ",", 3, 2)
+    assert (options.encoding, options.allow) == ("latin-1", ("short_rows", "text_rows"))
+    assert "1 repeated header rows" in found["format"]
+
+
+def test_two_clocks_in_one_file(tmp_path: Path) -> None:
+    table = tmp_path / "log.csv"
+    slow = [f"{0.1 * i:.1f},{100 + i}" if i < 40 else "," for i in range(400)]
+    table.write_text("t1,p1 [bar],t2,angle\n" + "".join(f"{a},{0.01 * i:.2f},{10 + 0.1 * i}\n" for i, a in enumerate(slow)))
+    proposal(table)
+    mapping = load_map(tmp_path / "map.yaml")
+    assert (mapping.clock("pressure/p1").column, mapping.clock("angle/left").column) == ("t1", "t2")
+
+
+def test_unix_time_needs_no_epoch(tmp_path: Path) -> None:
+    found = proposal(csv_of(tmp_path, {"stamp": 1.7e12 + np.round(1e3 * T), "angle": ANGLE}))
+    assert units(found)["time"] == ("stamp", "ms")
+    assert load_map(tmp_path / "map.yaml").epoch_s == 0.0
+
+
+def test_signed_integers_and_single_numbers(tmp_path: Path) -> None:
+    duty = np.round(300 * np.sin(T)).astype(int) & 0xFFFF
+    entries = [{"timestamp": t, "position": a, "duty": int(d)} for t, a, d in zip(T, ANGLE, duty, strict=True)]
+    (tmp_path / "log.json").write_text(json.dumps({"mass": 0.5, "entries": entries}))
+    found = proposal(tmp_path / "log.json")
+    assert found["signed"] == {"entries.duty": 16}
+    assert "mass = 0.5" in found["text"]
+
+
+def test_a_table_without_names_is_not_guessed_at(tmp_path: Path) -> None:
+    (tmp_path / "log.txt").write_text("".join(f"{10 * i}\t{i % 7}\t{i % 3}\n" for i in range(50)))
+    found = propose(tmp_path / "log.txt", tmp_path / "map.yaml")
+    assert found["channels"] == []
+    assert "expected at least one channel" in found["problem"]
+    text = (tmp_path / "map.yaml").read_text()
+    assert "header_rows: 0" in text
+    assert "#   c2: the name tells nothing known; 0 ... 6" in text
+
+
+def test_no_column_that_rises_asks_for_a_rate(tmp_path: Path) -> None:
+    savemat(tmp_path / "d.mat", {"angle": ANGLE})
+    found = propose(tmp_path / "d.mat", tmp_path / "map.yaml")
+    assert "key 'time'" in found["problem"]
+    text = (tmp_path / "map.yaml").read_text().replace("# time: {rate_Hz: 100}", "time: {rate_Hz: 100}")
+    (tmp_path / "map.yaml").write_text(text)
+    (row,) = import_table(tmp_path / "d.mat", tmp_path / "map.yaml", tmp_path / "bag")["channels"]
+    assert row["rate_Hz"] == pytest.approx(100.0)
+
+
+def test_names_that_would_break_the_map_do_not(tmp_path: Path) -> None:
+    columns = {"time": T, "angle: {x}\n- #'\"left": ANGLE, "odd\nschema: other": T[::-1]}
+    (tmp_path / "d.json").write_text(json.dumps({name: list(values) for name, values in columns.items()}))
+    found = proposal(tmp_path / "d.json")
+    assert units(found)["angle/left"][0] == "angle: {x}\n- #'\"left"
+
+
+@pytest.mark.parametrize("text", ["", "\0\0\0\0", "only words\nand more\n", "a,b\n", "\n\n\n"])
+def test_what_is_no_table_is_refused_and_no_map_is_written(tmp_path: Path, text: str) -> None:
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(MapFileError, match=r"log\.csv"):
+        propose(tmp_path / "log.csv", tmp_path / "map.yaml")
+    assert not (tmp_path / "map.yaml").exists()
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    table = csv_of(tmp_path, {"time": T, "angle": np.degrees(ANGLE)})
+    said = CliRunner().invoke(app, ["import", str(table), "--propose"])
+    assert said.exit_code == 0, said.output
+    assert "radians would" in said.output
+    assert load_map(tmp_path / "log_map.yaml").channels["angle/left"].unit == "deg"
+    again = CliRunner().invoke(app, ["import", str(table), "--propose"])
+    assert again.exit_code == 2
+    assert "exists already" in again.output
+    as_json = CliRunner().invoke(app, ["import", str(table), "--propose", "--map", "other.yaml", "--json"])
+    assert json.loads(as_json.stdout)["channels"][0]["unit"] == "deg"
+    neither = CliRunner().invoke(app, ["import", str(table)])
+    assert neither.exit_code == 2
+    assert "needs --map FILE and --out DIR; --propose writes a first map" in neither.output
