@@ -13,6 +13,7 @@ import numpy as np
 import yaml
 
 from lugre_steering.errors import VehicleFileError
+from lugre_steering.files import MAKER, VEHICLE_MARK, write_text
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
 from lugre_steering.vehicle.effects import each_once, with_effects
@@ -20,12 +21,18 @@ from lugre_steering.vehicle.sections import Initial, Vehicle
 from lugre_steering.vehicle.tables import embed_tables, with_pavement
 
 SCHEMA = "lugre_steering/vehicle/1"
+END = "..."
+"""YAML's own sign for the end of a document."""
 
 
 def load(path: str | Path) -> Vehicle:
     """Read and check a vehicle file; relative paths in it are relative to the file."""
     file = Path(path)
-    return from_mapping(Reader(file, VehicleFileError).load(), file)
+    reader = Reader(file, VehicleFileError)
+    text = reader.text()
+    if text.startswith(VEHICLE_MARK) and text.split()[-1] != END:
+        raise VehicleFileError(f"{file}: is cut off: a file that {MAKER} has written ends with the line '{END}'")
+    return from_mapping(reader.parse(text), file)
 
 
 def from_mapping(data: object, file: Path) -> Vehicle:
@@ -49,10 +56,12 @@ def _with_initial(vehicle: Vehicle) -> Vehicle:
 
 
 def save(vehicle: Vehicle, path: str | Path) -> None:
-    """Write a vehicle file that stands alone; keys left at None and empty defaults are not written."""
-    Path(path).write_text(
-        yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120), encoding="utf-8"
-    )
+    """Write a vehicle file that stands alone; keys left at None and empty defaults are not written.
+
+    Its first and last lines tell who wrote it and that nothing is missing: most of its beginnings would be valid vehicles.
+    """
+    content = yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120)
+    write_text(f"{VEHICLE_MARK}; not whole without the three dots of its last line\n{content}{END}\n", Path(path))
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:
