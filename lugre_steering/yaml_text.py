@@ -39,7 +39,7 @@ class Loader(yaml.SafeLoader):
         """Values in each finished node, by its identity."""
 
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
-        event = self.peek_event()
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         alias = isinstance(event, yaml.AliasEvent)
         if not alias and event.tag not in (None, "!"):
             raise _refusal(f"the tag '{event.tag}' is not allowed", event)
