@@ -24,11 +24,11 @@ _SEAL_BYTES = _SEAL().digest_size
 _told: set[str] = set()
 
 
-class _Damaged(Exception):
+class _DamagedError(Exception):
     """A kept file is not what was written."""
 
 
-class _SealedFile(caching.IndexDataCacheFile):  # type: ignore[misc]
+class _SealedFile(caching.IndexDataCacheFile):
     """Index and data files of one function, each sealed when written and looked at before it is read."""
 
     def _load_index(self) -> Any:
@@ -54,12 +54,12 @@ class _SealedFile(caching.IndexDataCacheFile):  # type: ignore[misc]
             os.unlink(self._index_path)
 
 
-class _KeptCode(caching.FunctionCache):  # type: ignore[misc]
+class _KeptCode(caching.FunctionCache):
     """Numba's cache of one function; no trouble with its files ever reaches the caller, who then compiles."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file = _SealedFile(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
+        self._cache_file: _SealedFile = _SealedFile(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -72,7 +72,7 @@ class _KeptCode(caching.FunctionCache):  # type: ignore[misc]
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
             super().save_overload(sig, data)
-        except (OSError, _Damaged) as error:
+        except (OSError, _DamagedError) as error:
             _tell(f"compiled code cannot be kept in {_folder()} ({getattr(error, 'strerror', error)}): every start compiles")
 
 
@@ -91,7 +91,7 @@ def keep_safely() -> None:
         _tell(f"compiled code cannot be kept in {_folder() or 'any folder'}: every start compiles")
         return caching.NullCache()
 
-    dispatcher.FunctionCache = cache_of
+    dispatcher.FunctionCache = cache_of  # type: ignore[attr-defined]
 
 
 def _folder() -> str:
@@ -99,13 +99,13 @@ def _folder() -> str:
 
 
 def _check(path: str) -> None:
-    """Nothing if the file is whole; ``_Damaged`` if not. One that is not there is Numba's business."""
+    """Nothing if the file is whole; ``_DamagedError`` if not. One that is not there is Numba's business."""
     try:
         content = Path(path).read_bytes()
     except FileNotFoundError:
         return
     if len(content) <= _SEAL_BYTES or _SEAL(content[:-_SEAL_BYTES]).digest() != content[-_SEAL_BYTES:]:
-        raise _Damaged(f"{path}: damaged")
+        raise _DamagedError(f"{path}: damaged")
 
 
 def _tell(text: str) -> None:

@@ -37,6 +37,8 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
     for effect in result["effects"]:
         parameters = ", ".join(f"{name} = {words.number(value)}" for name, value in effect["parameters"].items())
         console.print(f"effect {effect['id']}: {parameters} (SI)")
+    for warning in result["warnings"]:
+        console.print(f"warning: {warning['statement']}")
 
 
 def draw_footprint(vehicle: Vehicle, out: Path) -> Path:

@@ -10,6 +10,8 @@ import re
 import typing
 
 from lugre_steering.schema import Reader
+from lugre_steering.vehicle.loads import load_moment
+from lugre_steering.vehicle.rubber import known_range
 from lugre_steering.vehicle.sections import SIDES, DmaTable, Hydraulics, MasterCurve, Rubber, Vehicle
 
 UNITS = {"rad": "N m", "m": "N"}
@@ -120,9 +122,6 @@ def _check_track(vehicle: Vehicle, reader: Reader) -> None:
             pair = getattr(rollers.levers, item.name)
             if len(pair) != 2 or sum(pair) <= 0.0:
                 raise fail(f"track.rollers.levers.{item.name}", list(pair), "two distances that are not both zero")
-    # Imported late because the loads are those of a vehicle.
-    from lugre_steering.vehicle.loads import load_moment
-
     if load_moment(vehicle.axle, vehicle.track) <= 0.0:
         expected = "a loaded roller away from the hinge (or track.hinge_offset_m other than 0), else friction has no arm"
         raise fail("track.rollers.x_m", list(rollers.x_m), expected)
@@ -145,9 +144,6 @@ def _check_rubber(vehicle: Vehicle, rubber: Rubber, reader: Reader) -> None:
         raise fail(section, [len(column) for column in columns], "three columns of equal length, at least 3 rows")
     if not all(a < b for a, b in zip(columns[0], columns[0][1:], strict=False)):
         raise fail(f"{section}.{axis}", list(columns[0]), "strictly increasing values")
-    # Imported late because the moduli are those of a vehicle's rubber.
-    from lugre_steering.vehicle.rubber import known_range
-
     low, high = known_range(rubber)
     law = vehicle.friction or vehicle.contact
     law_section = "friction" if vehicle.friction else "contact"

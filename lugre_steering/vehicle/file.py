@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,12 @@ from typing import Any
 import numpy as np
 import yaml
 
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.errors import ImplausibleWarning, VehicleFileError
 from lugre_steering.files import MAKER, VEHICLE_MARK, write_text
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
 from lugre_steering.vehicle.effects import each_once, with_effects
+from lugre_steering.vehicle.plausible import plausibility
 from lugre_steering.vehicle.sections import Initial, Vehicle
 from lugre_steering.vehicle.tables import embed_tables, with_pavement
 
@@ -26,13 +28,19 @@ END = "..."
 
 
 def load(path: str | Path) -> Vehicle:
-    """Read and check a vehicle file; relative paths in it are relative to the file."""
+    """Read and check a vehicle file; relative paths in it are relative to the file.
+
+    What is possible and unlike any real vehicle is warned of (``ImplausibleWarning``).
+    """
     file = Path(path)
     reader = Reader(file, VehicleFileError)
     text = reader.text()
     if text.startswith(VEHICLE_MARK) and text.split()[-1] != END:
         raise VehicleFileError(f"{file}: is cut off: a file that {MAKER} has written ends with the line '{END}'")
-    return from_mapping(reader.parse(text), file)
+    vehicle = from_mapping(reader.parse(text), file)
+    for doubt in plausibility(vehicle):
+        warnings.warn(f"{file}: {doubt.statement}", ImplausibleWarning, stacklevel=2)
+    return vehicle
 
 
 def from_mapping(data: object, file: Path) -> Vehicle:

@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import Axle, Track
 from lugre_steering.vehicle.loads import roller_loads
+from lugre_steering.vehicle.sections import Axle, Track
 
 
 def peak_pressure(axle: Axle, track: Track, contact_area_m2: float) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import Axle, Track
+from lugre_steering.vehicle.sections import Axle, Track
 
 
 def vertical_load(axle: Axle, track: Track) -> float:

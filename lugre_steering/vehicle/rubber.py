@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import Rubber, Wlf
+from lugre_steering.vehicle.sections import Rubber, Wlf
 
 TABLE_STEP_K = 0.1
 WORKING_DEGC = (-40.0, 150.0)
