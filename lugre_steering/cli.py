@@ -121,7 +121,7 @@ def doubts_told_once() -> Iterator[None]:
             else:
                 show(message, category, *place, **options)
 
-        warnings.showwarning = tell  # type: ignore[assignment]
+        warnings.showwarning = tell
         yield
 
 

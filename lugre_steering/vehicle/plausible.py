@@ -39,12 +39,15 @@ class Usual:
     high: float
     unit: str
     why: str
+    of: str = ""
+    """What the key amounts to, where that is judged and not its own value."""
 
     def doubts(self, value: float | None) -> Iterator[Doubt]:
         """One if the value lies elsewhere; None, a value not given, raises none."""
         if value is not None and not self.low <= value <= self.high:
-            span = f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
-            yield Doubt(self.key, value, f"{self.key}: {value:.4g} is unlike any real vehicle, expected {span}: {self.why}")
+            got, span = (f"{numbers} {self.unit}".strip() for numbers in (f"{value:.4g}", f"{self.low:g} to {self.high:g}"))
+            of = f"{self.of} of " if self.of else ""
+            yield Doubt(self.key, value, f"{self.key}: {of}{got} is unlike any real vehicle, expected {span}: {self.why}")
 
 
 KEYS = (
@@ -74,20 +77,20 @@ KEYS = (
     Usual("sensors.angle_resolution_deg", 0.0, 0.5, "deg", "angle sensors resolve 0.001 to 0.1 deg"),
     Usual("sensors.angle_noise_deg", 0.0, 0.5, "deg", "angle sensors scatter by 0.001 to 0.1 deg"),
 )
-MODULUS = Usual("rubber", 2e5, 5e8, "Pa", "the storage modulus of tread rubber at work is 1 to 50 MPa")
-LOSS = Usual("rubber", 0.005, 3.0, "", "loss over storage modulus of tread rubber at work is 0.05 to 1")
-GYRATION = Usual("track.yaw_inertia_kgm2", 0.05, 1.5, "m", "the radius of gyration that it gives the assembly lies within the track")
-REACH = Usual("track.rollers.x_m", 0.1, 4.0, "m", "the outermost roller of a track is 0.2 to 3 m from the hinge")
-PRESSURE = Usual("rubber.contact_area_m2", 5e3, 1e6, "Pa", "the mean ground pressure that it gives is 10 to 500 kPa")
-YIELDING = Usual("friction.stiffness_Nm_per_deg", 1e-3, 0.3, "m", "rollers move by 1 to 300 mm before the rubber slides")
-RATIO = Usual("friction.static", 1.0, 2.0, "times coulomb", "rubber sticks hardly better than it slides")
+MODULUS = Usual("rubber", 2e5, 5e8, "Pa", "that of tread rubber at work is 1 to 50 MPa", "a storage modulus")
+LOSS = Usual("rubber", 0.005, 3.0, "", "that of tread rubber at work is 0.05 to 1", "a loss over storage modulus")
+GYRATION = Usual("track.yaw_inertia_kgm2", 0.05, 1.5, "m", "the mass of a track lies within it", "a radius of gyration")
+REACH = Usual("track.rollers.x_m", 0.1, 4.0, "m", "tracks are 0.4 to 6 m long", "an outermost roller at a distance")
+PRESSURE = Usual("rubber.contact_area_m2", 5e3, 1e6, "Pa", "rubber tracks press with 10 to 500 kPa", "a mean ground pressure")
+YIELDING = Usual("friction.stiffness_Nm_per_deg", 1e-3, 0.3, "m", "tread and carcass give by 1 to 300 mm before the rubber slides", "a presliding distance")
+RATIO = Usual("friction.static", 1.0, 2.0, "times the sliding friction", "rubber sticks little better than it slides", "a level")
 SENSED = Usual("sensors.pressure_range_Pa", 1e6, 1e8, "Pa", "steering hydraulics work at 5 to 35 MPa")
-NOISE = Usual("sensors.pressure_noise_Pa", 0.0, 0.05, "times the range", "pressure sensors scatter by 0.01 to 1 % of it")
+NOISE = Usual("sensors.pressure_noise_Pa", 0.0, 0.05, "times the range", "pressure sensors scatter by 0.01 to 1 % of it", "a scatter")
 CAPACITY = Usual(
-    "hydraulics.cylinders", 0.1, 100.0, "times the friction", "at the full range of the sensors they turn the tracks, if not with ease"
+    "hydraulics.cylinders", 0.1, 100.0, "times the friction", "cylinders are made to turn the tracks", "a torque at full range"
 )
 BORE = Usual("bore_m", 0.015, 0.4, "m", "steering cylinders are 25 to 200 mm wide")
-ARM = Usual("knuckle_m", 0.01, 1.5, "m", "the arm of the cylinder at zero angle is 0.05 to 0.5 m")
+ARM = Usual("knuckle_m", 0.01, 1.5, "m", "cylinders act at 0.05 to 0.5 m from the hinge", "an arm at zero angle")
 
 
 def plausibility(vehicle: Vehicle) -> tuple[Doubt, ...]:
