@@ -82,8 +82,10 @@ LOSS = Usual("rubber", 0.005, 3.0, "", "that of tread rubber at work is 0.05 to 
 GYRATION = Usual("track.yaw_inertia_kgm2", 0.05, 1.5, "m", "the mass of a track lies within it", "a radius of gyration")
 REACH = Usual("track.rollers.x_m", 0.1, 4.0, "m", "tracks are 0.4 to 6 m long", "an outermost roller at a distance")
 PRESSURE = Usual("rubber.contact_area_m2", 5e3, 1e6, "Pa", "rubber tracks press with 10 to 500 kPa", "a mean ground pressure")
-YIELDING = Usual("friction.stiffness_Nm_per_deg", 1e-3, 0.3, "m", "tread and carcass give by 1 to 300 mm before the rubber slides", "a presliding distance")
-RATIO = Usual("friction.static", 1.0, 2.0, "times the sliding friction", "rubber sticks little better than it slides", "a level")
+YIELDING = Usual(
+    "friction.stiffness_Nm_per_deg", 1e-3, 0.3, "m", "tread and carcass give by millimetres before rubber slides", "a presliding distance"
+)
+RATIO = Usual("friction.static", 1.0, 2.0, "times sliding friction", "rubber sticks little better than it slides", "a level")
 SENSED = Usual("sensors.pressure_range_Pa", 1e6, 1e8, "Pa", "steering hydraulics work at 5 to 35 MPa")
 NOISE = Usual("sensors.pressure_noise_Pa", 0.0, 0.05, "times the range", "pressure sensors scatter by 0.01 to 1 % of it", "a scatter")
 CAPACITY = Usual(
