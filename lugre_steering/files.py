@@ -81,17 +81,24 @@ def new_folder(final: Path, *, replace: bool = False) -> Iterator[Path]:
 
     The folder given does not exist yet. With ``replace`` an earlier ``final`` gives way, else it is a ``FileExistsError``.
     """
+    if not replace:
+        _refuse_existing(final)
     with temporary_folder(final.parent) as temporary:
         filling = temporary / final.name
         yield filling
         for path in filling.rglob("*"):
             _sync(path)
-        if replace and final.exists():
-            final.rename(temporary / f"{final.name}.earlier")
+        if not replace:
+            _refuse_existing(final)
         elif final.exists():
-            raise FileExistsError(errno.EEXIST, "exists already", str(final))
+            final.rename(temporary / f"{final.name}.earlier")
         filling.rename(final)
         _sync(final.parent)
+
+
+def _refuse_existing(file: Path) -> None:
+    if os.path.lexists(file):
+        raise FileExistsError(errno.EEXIST, "exists already", str(file))
 
 
 @contextmanager
