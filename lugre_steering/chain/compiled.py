@@ -14,7 +14,8 @@ from typing import Any
 
 import numba
 from llvmlite import ir
-from numba import njit, types
+from numba import njit as njit  # for all that is compiled and kept: importing it from here arranges where and how
+from numba import types
 from numba.extending import intrinsic
 
 from lugre_steering.chain.cache import keep_safely
