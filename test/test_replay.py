@@ -346,7 +346,7 @@ def test_angle_topic_without_usable_samples_is_an_error(tmp_path: Path) -> None:
     bag = make.write(tmp_path / "run", sorted(messages, key=lambda row: row[2]))
     with pytest.raises(BagError, match="angle/left: 0 samples used, 50 not_finite"):
         replay([bag], VEHICLE, tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_joint_of_another_name_is_named(tmp_path: Path) -> None:
