@@ -346,14 +346,14 @@ def effects(
 ) -> None:
     """List the physics that diagnosis knows, or explain one effect: law, source, parameters, how it shows."""
     from lugre_steering.diagnosis import effect_card as card
-    from lugre_steering.effects import catalogue
+    from lugre_steering.effects import registry
 
     if not effect_id:
         if out is not None:
             raise DataError("effects --out: needs the id of one effect; 'lugre-steering effects' lists them")
-        print_json([card.describe(e) for e in catalogue.CATALOGUE.values()]) if as_json else card.show_list(output())
+        print_json([card.describe(e) for e in registry.CATALOGUE.values()]) if as_json else card.show_list(output())
         return
-    effect = catalogue.effect(effect_id)
+    effect = registry.effect(effect_id)
     traces = card.traces(effect)
     result = card.explain(effect, traces, card.draw(traces, out) if out is not None and traces else None)
     print_json(result) if as_json else card.show_effect(output(), effect, result)

@@ -95,22 +95,6 @@ def in_words(vehicle: Vehicle, tree: Any, key: str = "") -> Any:
     return words(vehicle, tree) if isinstance(tree, str) and key in _PROSE else tree
 
 
-_JOINT_TITLES = {
-    "yaw_inertia": "Inertia of the moving parts",
-    "viscous_friction": "Viscous friction",
-    "slope_bias": "Constant offset",
-    "direction_asymmetry": "Friction differs between the two directions",
-    "kingpin_jacking": "Gravity or another conservative torque of the angle",
-    "time_delay": "Torque stamped late or early",
-    "pressure_lag": "Slow torque sensor or filter",
-    "linkage_compliance": "Elastic transmission between sensor and joint",
-    "backlash": "Free play between sensor and joint",
-    "surface_patch": "Friction differs within a range or from a time on",
-    "cylinder_friction": "Friction of seals and bearings",
-    "end_stop": "Elastic end stop",
-}
-
-
 def title(vehicle: Vehicle, effect: Effect) -> str:
     """The title of a catalogue entry in words that fit this vehicle: a single joint has no tracks and no kingpin."""
-    return effect.title if vehicle.contact is None else _JOINT_TITLES.get(effect.id, effect.title)
+    return effect.title if vehicle.contact is None else effect.joint_title or effect.title

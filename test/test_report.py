@@ -27,7 +27,7 @@ from lugre_steering.diagnosis import effect_card as card
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.report.page import Written, render, write_report
 from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle, load
 

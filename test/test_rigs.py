@@ -26,7 +26,7 @@ from lugre_steering.data.dataset import prepare
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.report.page import write_report
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.estimator import Estimator
 from lugre_steering.fitting.problem import Problem

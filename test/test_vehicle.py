@@ -23,14 +23,13 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import ImplausibleWarning, LugreSteeringError, VehicleFileError
 from lugre_steering.live.table import read_options
 from lugre_steering.schema import Reader
 from lugre_steering.sheet.derived import derive
 from lugre_steering.simulate.manoeuvres import from_yaml
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
-from lugre_steering.vehicle.effects import WINDOWS
 from lugre_steering.vehicle.plausible import plausibility
 from lugre_steering.vehicle.sections import Initial, Topics
 
@@ -203,7 +202,7 @@ def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
             values = {p.name: p.unscaled(p.scaled(getattr(p, bound))) for p in effect.parameters}
             if effect.per_line:
                 values = {"main_a": next(iter(values.values()))}
-            for low, high in WINDOWS.get(effect.id, ()):  # the ends of a range are not equal
+            for low, high in effect.places:  # the ends of a range are not equal
                 values |= {high: values[low] + 0.1} if bound == "low" else {low: values[high] - 0.1}
             if effect.observable:
                 from_mapping(with_effects((effect.id, values)), FILE)

@@ -15,32 +15,27 @@ from scipy.integrate import solve_ivp
 
 from lugre_steering.bench.kernel_c import CLoop
 from lugre_steering.chain.lanes import torque_sets
-from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.step import Records, torque_side
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
 from lugre_steering.vehicle import load
 from lugre_steering.vehicle.model import build_model
+from lugre_steering.vehicle.tables import limit_device
 
 RATE_HZ = 100.0
 SETS = 512
 BASELINE = "Numba kernel, baseline"
-# Where a typical size alone would leave an effect idle: inside the angles, times and torques of the manoeuvre.
-_PLACED = {
-    "end_stop_engage_angle": 0.3,
-    "surface_patch_angle_low": 0.0,
-    "surface_patch_angle_high": 0.2,
-    "surface_patch_time_start": 5.0,
-    "surface_patch_time_end": 30.0,
-    "relief_saturation_ceiling": 35_000.0,
-}
 
 
 def every_effect() -> dict[str, float]:
     """A typical value of every effect parameter of the chain, by field of the parameter record."""
-    typical = {f"{effect.id}_{p.name}": p.scale for effect in CATALOGUE.values() for p in effect.parameters}
-    return {field: _PLACED.get(field, typical[field]) for field in EFFECT_FIELDS}
+    return {
+        f"{effect.id}_{p.name}": p.typical
+        for effect in CATALOGUE.values()
+        if effect.hooks and not effect.per_line
+        for p in effect.parameters
+    }
 
 
 def manoeuvre(duration_s: float) -> tuple[Array, Array, Array]:
@@ -149,7 +144,8 @@ def best_time(task: Callable[[], object], repeats: int) -> float:
 
 def measure() -> list[dict[str, object]]:
     """One row per way: name, nanoseconds per step and track, largest error relative to the torque range."""
-    model = build_model(load(config_folder() / "test_vehicle.yaml"))
+    vehicle = load(config_folder() / "test_vehicle.yaml")
+    model = build_model(vehicle)
     p, rubber = model.parameters[0], model.rubber
     long, short = manoeuvre(60.0), manoeuvre(20.0)
     still = np.zeros(long[0].size)
@@ -164,9 +160,10 @@ def measure() -> list[dict[str, object]]:
     def kernel(parameters: Records) -> Callable[[], Array]:
         return lambda: torque_side(parameters, rubber, *long, still)
 
-    neutral, one, every = p.copy(), p.copy(), p.copy()
-    neutral["end_stop_engage_angle"] = one["end_stop_engage_angle"] = 0.3  # without a stiffness it does nothing
-    one["end_stop_stiffness"] = 5e4
+    stopped = vehicle.replace(effects=(limit_device(),))
+    one, lean = build_model(stopped).parameters[0], build_model(stopped, lean=True).parameters[0]
+    neutral, every = p.copy(), p.copy()
+    neutral["soil_shear_span"] = 0.1  # a shape: without its amplitude it does nothing, but the stages are passed
     for field, value in every_effect().items():
         every[field] = value
     loop = CLoop.build()
@@ -175,6 +172,7 @@ def measure() -> list[dict[str, object]]:
         "C loop, gcc -O3": kernel(p) if loop is None else lambda: loop.torque_side(p, rubber, *long),
         "Numba kernel, effect stages in place, neutral": kernel(neutral),
         "Numba kernel, one effect on (end stop)": kernel(one),
+        "Numba kernel composed for a file with the end stop": kernel(lean),
         "Numba kernel, all effects on at once": kernel(every),
     }
     # By turns, so that all see the same machine.

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lugre_steering.calibration.estimate import Estimate, physical_jacobian
 from lugre_steering.fitting.problem import GAIN, KINGPIN, Calibration, Problem
 from lugre_steering.recording import Array
-from lugre_steering.vehicle.model import Model
 
 SENSITIVITY = Calibration("temperature_sensitivity", (), 0.15, -0.6, 0.6)
 """Exponent on the rubber table's ratios: how strongly stiffness and friction follow the temperature."""
@@ -129,7 +128,7 @@ def _column(problem: Problem, result: Estimate, calibration: Calibration) -> Arr
     """Change of the predicted torque per relative change of one sheet value (n,) [N m]."""
     moved = copy.copy(problem)
     if calibration is SENSITIVITY:
-        moved.model = Model(problem.model.parameters, problem.model.rubber ** (1.0 + STEP))
+        moved.model = replace(problem.model, rubber=problem.model.rubber ** (1.0 + STEP))
         x = result.x
     else:
         moved.calibrations = (*problem.calibrations, calibration)

@@ -27,7 +27,7 @@ def _keep_compiled_code() -> None:
     Numba looks at the file of the cached function only and would run stale code after an edit of a stage it calls.
     """
     package = Path(__file__).resolve().parent.parent
-    sources = [*sorted((package / "chain").glob("*.py")), *sorted((package / "estimator").glob("*.py"))]
+    sources = [file for room in ("chain", "effects", "estimator") for file in sorted((package / room).glob("*.py"))]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     for folder in _cache_folders():
         try:
@@ -76,6 +76,8 @@ def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (si
 
 law = njit(fastmath={"contract"}, error_model="numpy")
 """Decorator of every law of the chain: fused multiply-adds; divisions without the check that blocks vectorisation."""
+LAW_OPTIONS: Any = {"fastmath": {"contract"}, "error_model": "numpy"}
+"""The same for what is compiled by way of ``overload``."""
 
 
 @law

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
-from lugre_steering.chain.contact import bristle, bristle_work, stribeck
+from lugre_steering.chain.bristle import bristle, bristle_work, stribeck
 from lugre_steering.chain.heat import LONG, short_heat
 from lugre_steering.chain.step import Records, has_effects, torque_side
 from lugre_steering.recording import Array

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 
 MAX_RATE_HZ = 125.0
 GAP_S = 0.25

@@ -18,16 +18,16 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import correlate
 from scipy.stats import theilslopes
 
-from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, angle_noise, prepare
-from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.sensors import delay_s, lag_s
 
 BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
 
@@ -402,12 +402,12 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
     stride = max(1, round(1.0 / SKEW_RATE_HZ / step))
     dt = stride * step
 
-    known = sensor_correction(vehicle)
+    known_delay, known_lag = delay_s(vehicle), lag_s(vehicle)
 
     def seen(trial: Model) -> Array:
         """Torque of a model as sensors show it whose delay and lag the vehicle file knows."""
         torque = _torques(trial, run).sum(axis=0)
-        return lagged(np.interp(run.time - known.delay_s, run.time, torque), step, known.lag_s)
+        return lagged(np.interp(run.time - known_delay, run.time, torque), step, known_lag)
 
     def slope(torque: Array) -> Array:
         return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))

@@ -20,8 +20,8 @@ from lugre_steering.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.result import finite
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.fingerprint import candidates
-from lugre_steering.effects.catalogue import CATALOGUE
 from lugre_steering.effects.entry import Effect
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.files import output_folder
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
@@ -112,7 +112,7 @@ def describe(effect: Effect) -> dict[str, Any]:
     entry = {
         "id": effect.id, "stage": effect.stage, "tier": effect.tier, "title": effect.title, "equation": effect.equation,
         "trace": effect.trace, "coordinate": effect.coordinate, "source": effect.source, "rivals": list(effect.rivals),
-        "observable": effect.observable, "needs": effect.needs or None, "per_line": effect.per_line,
+        "observable": effect.observable, "needs": effect.not_recorded or None, "per_line": effect.per_line,
         "parameters": [
             {"name": p.name, "unit": p.unit, "meaning": p.meaning, "typical": p.scale, "low": p.low, "high": p.high,
              "optional": p.optional}
@@ -196,7 +196,7 @@ def show_list(console: Console) -> None:
         if stage and effect.stage != stage:
             table.add_section()
         stage = effect.stage
-        shows = effect.trace if effect.observable else Text(f"not observable: needs {effect.needs}", "yellow")
+        shows = effect.trace if effect.observable else Text(f"not observable: needs {effect.not_recorded}", "yellow")
         table.add_row(effect.id, effect.stage, str(effect.tier), effect.title, shows)
     console.print(table)
     console.print("'lugre-steering effects ID' explains one; with --out DIR it draws its signature.", highlight=False)
@@ -215,7 +215,7 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         ("told by", effect.coordinate),
         ("source", effect.source),
         ("easily taken for", ", ".join(effect.rivals)),
-        ("would need", effect.needs),
+        ("would need", effect.not_recorded),
     ):
         if text:
             facts.add_row(name, text)

@@ -1,11 +1,16 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a catalogue entry is: plain data that names physics, says where it acts and how it shows in a recording."""
+"""What an effect is: data that names physics, says where it acts and how it shows in a recording, and its laws."""
 
 from __future__ import annotations
 
+import inspect
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from lugre_steering.recording import Array
 
 STAGES = ("motion", "contact", "thermal", "parallel_torque", "measurement")
 
@@ -31,6 +36,12 @@ class Parameter:
     relative_to: str = ""
     optional: bool = False
     """Refinement of the shape: zero (or as the vehicle sheet has it) in the screen, fitted only once the effect is accepted."""
+    example: float | None = None
+    """A value at which it acts in an ordinary double cycle, where ``scale`` would leave it idle."""
+
+    @property
+    def typical(self) -> float:
+        return self.scale if self.example is None else self.example
 
     @property
     def is_shape(self) -> bool:
@@ -54,12 +65,30 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Seen:
+    """What a recording shows of itself to an effect that chooses its own variants: mean angle of the tracks (n,) and lowest
+    and highest angle of any [rad], longest recording [s], torque per pressure of each line (lines, n) [N m/Pa] and
+    measured torque (n,) [N m]."""
+
+    theta: Array
+    lowest: float
+    highest: float
+    longest: float
+    gains: Array
+    torque: Array
+
+
+Variant = Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Effect:
     """Physics that the baseline leaves out.
 
     ``equation`` in the field's notation, ``source`` the primary literature, ``trace`` how it looks in a residual,
-    ``coordinate`` the axis along which it tells itself, ``rivals`` the entries it is easily taken for, ``needs`` what an
-    unobservable one would take to be seen (empty: observable with the standard topics).
+    ``coordinate`` the axis along which it tells itself, ``rivals`` the entries it is easily taken for. ``hooks`` are its
+    laws by the place where they act (``chain.compose.HOOKS``); ``memory`` is what they remember, with its value at the
+    start (a number, numbers, or the name of a baseline parameter).
     """
 
     id: str
@@ -71,11 +100,40 @@ class Effect:
     trace: str
     coordinate: str
     parameters: tuple[Parameter, ...] = ()
+    hooks: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    memory: Mapping[str, float | str | tuple[float, ...]] = field(default_factory=dict)
     rivals: tuple[str, ...] = ()
-    needs: str = ""
+    needs: tuple[str, ...] = ()
+    """Sections of the vehicle file without which it means nothing: 'hydraulics', 'rubber'."""
+    not_recorded: str = ""
+    """What the standard topics would lack to show it; such an effect is offered, never named."""
     per_line: bool = False
     """The single amplitude exists once per pressure line; the parameter is then named like the line."""
+    places: tuple[tuple[str, str], ...] = ()
+    """Pairs of parameters that are the ends of a range; neither given: everywhere."""
+    counts_from_start: bool = False
+    """Begun late, it leaves another trace than the end of the same always there (heat, path, time and age are remembered)."""
+    never_late: bool = False
+    """It has its own window in time, or acts at the start only."""
+    joint_title: str = ""
+    """Title for a single joint, which has no tracks and no kingpin."""
+    variants: Callable[[Seen], Sequence[Variant]] | None = None
+    """Its shapes as a recording suggests them, in place of the grids."""
+    acts_by: tuple[str, ...] = ()
+    """Parameters any of which makes it act, where that is more than its plain amplitudes."""
 
     @property
     def observable(self) -> bool:
-        return not self.needs
+        return not self.not_recorded
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        """Parameters any of which makes it act: neither shapes, nor refinements, nor ends of ranges (unless declared)."""
+        ends = {name for pair in self.places for name in pair}
+        plain = (p.name for p in self.parameters if not p.is_shape and not p.optional and p.name not in ends)
+        return self.acts_by or tuple(plain)
+
+    def law(self, hook: str, values: Mapping[str, float], **quantities: Any) -> Any:
+        """A law without memory as plain NumPy arithmetic: its own parameters from ``values`` (0 where absent)."""
+        plain = getattr(self.hooks[hook], "py_func", self.hooks[hook])
+        return plain(*(quantities.get(name, values.get(name, 0.0)) for name in inspect.signature(plain).parameters))

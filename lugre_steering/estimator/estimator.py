@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from lugre_steering.chain.hydraulics import CylinderTable, gauge_offset
-from lugre_steering.chain.layout import OUTPUT, STATE
+from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
-from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import admit
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
@@ -26,7 +24,9 @@ from lugre_steering.estimator.torque import advance
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
 from lugre_steering.vehicle.model import build_model
+from lugre_steering.vehicle.sensors import delay_s, lag_s
 
 LINE_RING = 8192
 PENDING_RING = 8192
@@ -157,8 +157,7 @@ def _label(kind: Kind, name: str) -> str:
 
 
 def _new_core(vehicle: Vehicle, options: Options) -> Core:
-    model = build_model(vehicle)
-    correction: SensorCorrection = sensor_correction(vehicle)
+    model = build_model(vehicle, lean=True)
     sides = len(vehicle.sides)
     config = np.zeros(1, CONFIG)
     config["pair_tolerance_ns"] = round(options.pair_tolerance_s * 1e9)
@@ -171,9 +170,8 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
     config["pressure_gain"] = vehicle.sensors.pressure_gain
-    config["delay_ns"] = round(correction.delay_s * 1e9)
-    config["lag"] = correction.lag_s
-    config["arm_linear"], config["arm_quadratic"] = correction.arm_linear, correction.arm_quadratic
+    config["delay_ns"] = round(delay_s(vehicle) * 1e9)
+    config["lag"] = lag_s(vehicle)
     config["effects"] = any(has_effects(p) for p in model.parameters)
     config["horizon"] = options.feed_forward_horizon_s
     config["message"] = -1
@@ -186,8 +184,6 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
             row["index"] = vehicle.sides.index(channel.name)
         elif channel.kind in (Kind.PRESSURE, Kind.TORQUE):
             row["index"] = lines
-            row["offset"] = correction.offset_Pa.get(channel.name, 0.0)
-            row["drift"] = correction.drift_Pa_s.get(channel.name, 0.0)
             lines += 1
     if vehicle.hydraulics is not None:
         table = CylinderTable(vehicle.hydraulics, vehicle.sides)
@@ -198,7 +194,8 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
         config=config,
         channels=channels,
         parameters=np.concatenate(model.parameters),
-        state=np.zeros(sides, STATE),
+        line_parameters=model.lines if vehicle.hydraulics is not None else np.zeros(lines, model.composition.lines),
+        state=np.zeros(sides, model.composition.state),
         motion=np.zeros(sides, MOTION),
         trust=np.zeros(sides, TRUST),
         output=np.zeros(sides, OUTPUT),
@@ -213,6 +210,6 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
         plan_ns=np.zeros(PLAN_POINTS, np.int64),
         plan_theta=np.zeros((sides, PLAN_POINTS)),
         scratch_value=np.zeros(lines),
-        scratch_state=np.zeros(1, STATE),
+        scratch_state=np.zeros(1, model.composition.state),
         scratch_output=np.zeros(1, OUTPUT),
     )

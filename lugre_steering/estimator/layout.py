@@ -50,8 +50,6 @@ CONFIG = np.dtype(
         ("pressure_gain", np.float64),
         ("delay_ns", np.int64),
         ("lag", np.float64),
-        ("arm_linear", np.float64),
-        ("arm_quadratic", np.float64),
         ("horizon", np.float64),
         ("start_ns", np.int64),
         ("lagged", np.float64),
@@ -76,8 +74,6 @@ CHANNEL = np.dtype(
         ("period_ns", np.int64),  # from the last but one accepted sample to the last
         ("head", np.int64),  # samples stored so far in the ring of this line or side
         ("cursor", np.int64),  # first ring sample that may still be needed
-        ("offset", np.float64),  # sensor offset [Pa]
-        ("drift", np.float64),  # sensor drift [Pa/s]
         ("reasons", np.int64, (len(REASONS),)),
     ]
 )
@@ -99,6 +95,7 @@ class Core(NamedTuple):
     config: Records
     channels: Records
     parameters: Records
+    line_parameters: Records
     state: Records
     motion: Records
     trust: Records

@@ -7,6 +7,7 @@ from __future__ import annotations
 from numba import njit
 
 from lugre_steering.chain.hydraulics import moment_arm
+from lugre_steering.chain.step import arm_factor, line_error
 
 
 @njit
@@ -25,7 +26,7 @@ def measured_torque(core, e, value):
         if core.lines[i, 1] >= 0:
             force -= value[core.lines[i, 1]] * core.areas[i, 1]
         arm = moment_arm(theta, core.geometry[i, 1], core.geometry[i, 2], core.geometry[i, 3], core.geometry[i, 4])
-        torque += force * arm * (1.0 + c.arm_linear * theta + c.arm_quadratic * theta * theta)
+        torque += force * arm * arm_factor(core.parameters[side], theta)
     return torque * c.pressure_gain
 
 
@@ -61,7 +62,7 @@ def form_residuals(core, first_line, residuals, count):
                 before_ns = core.line_ns[line, (cursor - 1) % ring]
                 before = core.line_value[line, (cursor - 1) % ring]
                 p = before + (after - before) * ((at_ns - before_ns) / (after_ns - before_ns))
-            value[line] = p - c.gauge_offset - ch.offset - ch.drift * (at_ns - c.start_ns) * 1e-9
+            value[line] = p - c.gauge_offset - line_error(core.line_parameters[line], (at_ns - c.start_ns) * 1e-9)
         c.pending_first = (c.pending_first + 1) % core.pending.size
         c.pending_count -= 1
         if not usable:

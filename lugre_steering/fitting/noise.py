@@ -19,7 +19,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 from scipy.signal import butter, sosfiltfilt
 
-from lugre_steering.chain.step import REST_RATE_RAD_S
+from lugre_steering.chain.baseline import REST_RATE_RAD_S
 from lugre_steering.data.dataset import Run, angle_noise, motion
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads

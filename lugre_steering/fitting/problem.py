@@ -13,12 +13,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.layout import EFFECT_FIELDS
 from lugre_steering.chain.step import torque_in_phases
 from lugre_steering.data.dataset import Run
-from lugre_steering.effects.catalogue import effect as catalogue_entry
 from lugre_steering.effects.entry import Effect, Parameter
+from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, build_model
@@ -191,9 +191,8 @@ class Problem:
                     acting["air_temperature"] = air
             for candidate, values in effects:
                 for name, value in values.items() if candidate.start(bag) <= start else ():
-                    field = f"{candidate.effect.id}_{name}"
-                    if field in EFFECT_FIELDS:
-                        acting[field] = value
+                    if not candidate.effect.per_line:
+                        acting[f"{candidate.effect.id}_{name}"] = value
             phases.append((start, acting))
         total = np.zeros(run.time.size)
         for side in range(run.theta.shape[0]):
@@ -214,31 +213,26 @@ class Problem:
         given = {candidate.label for candidate, _ in here}
         for candidate, values in [*(effect for effect in self.standing if effect[0].label not in given), *here]:
             start = candidate.start(bag)
-            changed = self._through_sensor(run, candidate, values, torque, start)
-            torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
+            if candidate.effect.hooks.keys() & SENSOR_HOOKS:
+                changed = self._through_sensor(run, candidate, values, torque, start)
+                torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
         return torque / self.gain(x)
 
     def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array, start: float) -> Array:
-        """Apply one sensor effect: lag, delay, line offset or drift, arm error (see effects.sensors for the live form)."""
-        name = candidate.effect.id
-        if name == "pressure_lag":
-            changed = lagged(torque, run.time[1] - run.time[0], values["tau"])
-        elif name == "time_delay":
-            changed = np.interp(run.time - values["delay"], run.time, torque)
-        elif name in ("pressure_offset", "pressure_drift"):
-            gain = run.torque_per_line[self._lines.index(candidate.line)]
-            drifting = np.maximum(run.time - max(start, 0.0), 0.0)
-            changed = torque + gain * (values["offset"] if name == "pressure_offset" else values["drift"] * drifting)
-        elif name == "angle_offset":
-            changed = torque + values["offset"] * run.side_slope.sum(axis=0)
-        elif name == "angle_scale":
-            changed = torque + values["scale"] * (run.theta * run.side_slope).sum(axis=0)
-        elif name == "moment_arm_error":
-            factor = values.get("linear", 0.0) * run.theta + values.get("quadratic", 0.0) * run.theta**2
-            changed = torque - (factor * run.side_torque).sum(axis=0)
-        else:
-            changed = torque
-        return np.asarray(changed)
+        """Apply one sensor effect by its laws; errors of angles and arms act through the slopes and parts of the measured torque."""
+        known = candidate.effect
+        if "lag" in known.hooks:
+            torque = lagged(torque, run.time[1] - run.time[0], known.law("lag", values))
+        if "delay" in known.hooks:
+            torque = np.interp(run.time - known.law("delay", values), run.time, torque)
+        if "line" in known.hooks:
+            elapsed = np.maximum(run.time - max(start, 0.0), 0.0)
+            torque = torque + run.torque_per_line[self._lines.index(candidate.line)] * known.law("line", values, elapsed=elapsed)
+        if "angle" in known.hooks:
+            torque = torque + ((run.theta - known.law("angle", values, theta=run.theta)) * run.side_slope).sum(axis=0)
+        if "arm" in known.hooks:
+            torque = torque - ((known.law("arm", values, theta=run.theta) - 1.0) * run.side_torque).sum(axis=0)
+        return np.asarray(torque)
 
     def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:
         return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects), range(len(self.runs))))

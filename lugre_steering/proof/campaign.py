@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, ZONED
 from lugre_steering.proof.sensors import NoiseKind

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lugre_steering.chain.hydraulics import line_gains
-from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.cylinders import line_gains
+from lugre_steering.vehicle.sensors import arm_factor
 
 RETURN_PRESSURE_PA = 0.7e6
 
@@ -19,11 +19,9 @@ def total_gains(vehicle: Vehicle, theta: Array) -> Array:
     """Torque on the steering axis per pressure of each line [N m/Pa] (lines, n), both tracks together; theta (sides,
     n) [rad].
 
-    With the effect moment_arm_error the true arms differ from the drawing by 1 + a theta + b theta**2, as diagnosis
-    assumes.
+    The true arms are those of the drawing times what the effects of the vehicle file say.
     """
-    correction = sensor_correction(vehicle)
-    factor = 1.0 + correction.arm_linear * theta + correction.arm_quadratic * theta * theta
+    factor = arm_factor(vehicle, theta) * np.ones_like(theta)
     gains: Array = (line_gains(vehicle, theta) * factor[:, None, :]).sum(axis=0)
     return gains
 

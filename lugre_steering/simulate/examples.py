@@ -13,9 +13,9 @@ from pathlib import Path
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.simulate.command import load_vehicle
 from lugre_steering.simulate.manoeuvres import BUILT_IN, motion_of
-from lugre_steering.simulate.paper.double_cycle import END_STOP
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
+from lugre_steering.vehicle.tables import limit_device
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def write_example(example: Example, folder: Path) -> None:
     """Write one example as ``folder/<name>``."""
     vehicle = load_vehicle(None)
     if example.stop:
-        vehicle = vehicle.replace(effects=(END_STOP,))
+        vehicle = vehicle.replace(effects=(limit_device(),))
     sensing = dataclasses.replace(
         sensing_of(vehicle),
         angle_rate_Hz=example.angle_rate_Hz,
@@ -52,7 +52,7 @@ def write_example(example: Example, folder: Path) -> None:
         seed=example.seed,
     )
     run = simulate(vehicle, motion_of(BUILT_IN[example.manoeuvre], vehicle), sensing)
-    hidden = f"with a hidden elastic end stop {END_STOP.parameters}" if example.stop else "nothing hidden"
+    hidden = f"with a hidden elastic end stop {limit_device().parameters}" if example.stop else "nothing hidden"
     write_bag(folder / example.name, run, f"{example.manoeuvre}, config/test_vehicle.yaml, {hidden}", example.storage)
 
 

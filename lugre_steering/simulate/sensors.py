@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.chain.hydraulics import gauge_offset
 from lugre_steering.chain.lag import lagged
-from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, IntArray, Signal
 from lugre_steering.simulate.manoeuvres import STEP_S
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.cylinders import gauge_offset
+from lugre_steering.vehicle.sensors import delay_s, lag_s, line_error
 
 _RANGES = {
     "angle_rate_Hz": (1.0, 1000.0),
@@ -75,11 +75,10 @@ def sense_pressure(
     """What the sensor of one line records of true gauge pressures (n,) [Pa]: lag, late stamps, offset and drift if
     the vehicle
     has these effects, then noise and quantisation."""
-    correction = sensor_correction(vehicle)
-    seen = lagged(pressure, STEP_S, correction.lag_s)
+    seen = lagged(pressure, STEP_S, lag_s(vehicle))
     at = instants(float(time[-1]), sensing.pressure_rate_Hz, sensing.jitter_s, rng)
-    value = np.interp(at - correction.delay_s, time, seen) + gauge_offset(vehicle)
-    value += correction.offset_Pa.get(line, 0.0) + correction.drift_Pa_s.get(line, 0.0) * at
+    value = np.interp(at - delay_s(vehicle), time, seen) + gauge_offset(vehicle)
+    value += line_error(vehicle, line, at)
     value += sensing.pressure_noise_Pa * rng.standard_normal(at.size)
     limit = vehicle.sensors.pressure_range_Pa
     if float(value.max()) > limit:
@@ -93,10 +92,9 @@ def sense_pressure(
 def sense_torque(time: Array, torque: Array, vehicle: Vehicle, sensing: Sensing, rng: np.random.Generator) -> Signal:
     """What the torque sensor records of the true torque (n,) [N m]: lag and late stamps if the vehicle has them, noise."""
     assert vehicle.torque_sensor is not None
-    correction = sensor_correction(vehicle)
-    seen = lagged(torque, STEP_S, correction.lag_s)
+    seen = lagged(torque, STEP_S, lag_s(vehicle))
     at = instants(float(time[-1]), sensing.pressure_rate_Hz, sensing.jitter_s, rng)
-    value = np.interp(at - correction.delay_s, time, seen)
+    value = np.interp(at - delay_s(vehicle), time, seen)
     return Signal(at, value + vehicle.torque_sensor.noise_Nm * rng.standard_normal(at.size))
 
 

@@ -13,12 +13,12 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
-from lugre_steering.effects.sensors import true_angle
 from lugre_steering.errors import BagError
 from lugre_steering.files import new_folder
 from lugre_steering.recording import TRUTH, Array, IntArray, Kind
 from lugre_steering.simulate.run import Simulated
 from lugre_steering.simulate.sensors import nanoseconds
+from lugre_steering.vehicle.sensors import true_angle
 
 START_NS = 1_780_000_000 * 10**9
 """Stamp of the first message: fixed, so that equal simulations give equal bytes."""

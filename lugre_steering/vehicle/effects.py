@@ -8,13 +8,13 @@ import math
 from collections.abc import Callable, Iterable
 from functools import partial
 
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
 
-WINDOWS = {"surface_patch": (("angle_low", "angle_high"), ("time_start", "time_end"))}
-"""Parameters that are the ends of a range; neither given: everywhere."""
+OF_CYLINDERS = frozenset({"arm", "line"})
+"""Hooks that nothing reads where the torque itself is measured."""
 
 
 def add_effect(
@@ -27,12 +27,12 @@ def add_effect(
     effect = CATALOGUE.get(added.id)
     if effect is None:
         raise fail("id", added.id, f"an effect of the catalogue; {suggestion(added.id, list(CATALOGUE))}")
-    if effect.needs:
-        raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.needs}")
+    if not effect.observable:
+        raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.not_recorded}")
     if effect.stage == "thermal" and vehicle.rubber is None:
         raise fail("id", added.id, "a vehicle with the section 'rubber' for a thermal effect")
-    if added.id == "moment_arm_error" and vehicle.hydraulics is None:
-        raise fail("id", added.id, "a vehicle with the section 'hydraulics', whose cylinders have arms")
+    if OF_CYLINDERS & effect.hooks.keys() and vehicle.hydraulics is None:
+        raise fail("id", added.id, "a vehicle with the section 'hydraulics', whose cylinders have arms and lines")
     before = next((entry for entry in vehicle.effects if entry.id == added.id), None)
     ranges = {p.name: (p.low, p.high) for p in effect.parameters}
     if effect.per_line:
@@ -51,7 +51,7 @@ def add_effect(
     missing = [key for key, (low, high) in ranges.items() if key not in added.parameters and not low <= 0.0 <= high]
     if missing or not added.parameters:
         raise fail("parameters", added.parameters, f"values of {', '.join(missing or ranges) or 'a pressure line'}")
-    for low_key, high_key in WINDOWS.get(added.id, ()):
+    for low_key, high_key in effect.places:
         low, high = added.parameters.get(low_key, 0.0), added.parameters.get(high_key, 0.0)
         if (low, high) != (0.0, 0.0) and not low < high:
             raise fail(f"parameters.{high_key}", added.parameters.get(high_key), f"more than {low_key} ({low:g}), both of a window given")

@@ -7,39 +7,50 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from lugre_steering.chain.layout import EFFECT_FIELDS
+import numpy as np
+
+from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.step import Records, new_parameters
+from lugre_steering.effects.registry import composed, effect
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.loads import load_moment, vertical_load
 from lugre_steering.vehicle.rubber import ratio_table
+from lugre_steering.vehicle.sections import Vehicle
 
 
 @dataclass(frozen=True)
 class Model:
-    """What the compiled chain needs of a vehicle: one parameter record per side (alike) and the rubber table."""
+    """What the compiled chain needs of a vehicle: one parameter record per side (alike), one per pressure line, and the
+    rubber table."""
 
+    composition: Composition
     parameters: tuple[Records, ...]
+    lines: Records
     rubber: Array
 
 
-def build_model(vehicle: Vehicle) -> Model:
-    """Parameter records with the vehicle's chain effects in place."""
-    record = new_parameters()
+def build_model(vehicle: Vehicle, *, lean: bool = False) -> Model:
+    """Parameter records with the vehicle's effects at their values; the others are in place and neutral, or left out (``lean``)."""
+    composition = composed(entry.id for entry in vehicle.effects) if lean else composed()
+    record = new_parameters(composition)
+    lines = np.zeros(len(vehicle.hydraulics.lines) if vehicle.hydraulics is not None else 0, composition.lines)
     values = baseline_parameters(vehicle)
     contact = vehicle.friction or vehicle.contact
     assert contact is not None
     rubber, values["table_low"], values["table_step"] = ratio_table(
         vehicle.rubber, contact.reference_temperature_degC, contact.temperature_law
     )
-    for effect in vehicle.effects:
-        for name, value in effect.parameters.items():
-            field = f"{effect.id}_{name}"
-            if field in EFFECT_FIELDS:
-                values[field] = value
+    for entry in vehicle.effects:
+        known = effect(entry.id)
+        for name, value in entry.parameters.items():
+            if known.per_line:
+                assert vehicle.hydraulics is not None
+                lines[f"{entry.id}_{known.parameters[0].name}"][vehicle.hydraulics.lines.index(name)] = value
+            else:
+                values[f"{entry.id}_{name}"] = value
     for field, value in values.items():
         record[field] = value
-    return Model(tuple(record.copy() for _ in vehicle.sides), rubber)
+    return Model(composition, tuple(record.copy() for _ in vehicle.sides), lines, rubber)
 
 
 def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:

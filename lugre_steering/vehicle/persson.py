@@ -17,8 +17,8 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.special import erf
 
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import Rubber
 from lugre_steering.vehicle.rubber import ComplexArray, friction_measure, moduli
+from lugre_steering.vehicle.sections import Rubber
 
 Modulus = Callable[[Array], ComplexArray]
 """Complex modulus [Pa] over the frequency [Hz]."""

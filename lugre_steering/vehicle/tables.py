@@ -13,7 +13,7 @@ import yaml
 from lugre_steering.files import read_text
 from lugre_steering.resources import config_folder
 from lugre_steering.schema import Reader
-from lugre_steering.vehicle.sections import Vehicle
+from lugre_steering.vehicle.sections import EffectEntry, Vehicle
 
 LONGEST_TABLE = 1_000_000
 """Bytes. A measured table has some thousand."""
@@ -91,3 +91,9 @@ def with_pavement(vehicle: Vehicle, reader: Reader) -> Vehicle:
     if static < coulomb:
         raise reader.fail("friction.static", static, f"at least friction.coulomb ({coulomb:g})")
     return vehicle.replace(friction=dataclasses.replace(friction, static=static, coulomb=coulomb))
+
+
+def limit_device() -> EffectEntry:
+    """The elastic stop of the shipped examples and of the simulated published experiments."""
+    entry = yaml.safe_load((config_folder() / "limit_device.yaml").read_text(encoding="utf-8"))
+    return EffectEntry(entry["id"], entry["parameters"])

@@ -75,6 +75,6 @@ def encoder(theta: Array, seed: int, noise_deg: float = 0.01, resolution_deg: fl
 
 def final_state(parameters: Records, rubber: Array, *motion: Array) -> Records:
     """State after a run."""
-    state = new_state()
+    state = new_state(parameters)
     run_side(parameters, rubber, *motion, state)
     return state

@@ -11,14 +11,16 @@ import pytest
 from chain_support import baseline, double_cycle, swing
 
 from lugre_steering.bench.kernel import every_effect
-from lugre_steering.chain.layout import BASELINE_FIELDS, EFFECT_FIELDS
+from lugre_steering.chain.compose import HOOKS, SENSOR_HOOKS
+from lugre_steering.chain.layout import BASELINE_FIELDS
 from lugre_steering.chain.step import Records, new_state, run_side, torque_side
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE, composed
 from lugre_steering.recording import Array
 
-CHAIN_EFFECTS = sorted(
-    {e.id for e in CATALOGUE.values() if any(f"{e.id}_{p.name}" in EFFECT_FIELDS for p in e.parameters)}
-)
+EFFECT_FIELDS = composed().effect_fields
+STEPWISE = {*HOOKS} - {*SENSOR_HOOKS} | {"angle"}
+CHAIN_EFFECTS = sorted(e.id for e in CATALOGUE.values() if e.hooks.keys() & STEPWISE)
+CHAIN_FIELDS = [f for f in EFFECT_FIELDS if any(f.startswith(f"{effect}_") for effect in CHAIN_EFFECTS)]
 
 
 def cycle() -> tuple[Array, Array, Array, Array]:
@@ -52,10 +54,12 @@ def change(a: Array, b: Array) -> float:
 
 def test_every_effect_field_belongs_to_a_chain_effect() -> None:
     assert set(every_effect()) == set(EFFECT_FIELDS)
-    assert all(any(field.startswith(f"{effect}_") for effect in CHAIN_EFFECTS) for field in EFFECT_FIELDS)
+    sensors = {e.id for e in CATALOGUE.values() if e.hooks and not e.per_line} - {*CHAIN_EFFECTS}
+    assert sensors == {"time_delay", "pressure_lag", "moment_arm_error"}
+    assert len(CHAIN_FIELDS) == len(EFFECT_FIELDS) - 4
 
 
-@pytest.mark.parametrize("field", EFFECT_FIELDS)
+@pytest.mark.parametrize("field", CHAIN_FIELDS)
 def test_every_effect_parameter_acts(field: str) -> None:
     _, rubber = baseline()
     motion = cycle()
@@ -152,7 +156,7 @@ def test_whole_record_equals_pieces_with_a_saved_state(effect: str) -> None:
         p = with_all() if effect == "all" else with_effect(effect)
     motion = cycle()
     whole = run_side(p, rubber, *motion)
-    state = new_state()
+    state = new_state(p)
     run_side(p, rubber, *(column[:1200] for column in motion), state)
     file = io.BytesIO()
     np.save(file, state)
@@ -160,7 +164,7 @@ def test_whole_record_equals_pieces_with_a_saved_state(effect: str) -> None:
     restored = np.load(file)
     rest = run_side(p, rubber, *(column[1200:] for column in motion), restored, motion[0][1199])
     np.testing.assert_array_equal(rest, whole[1200:])
-    state = new_state()
+    state = new_state(p)
     for i in range(300):
         one = run_side(p, rubber, *(column[i : i + 1] for column in motion), state, motion[0][max(i - 1, 0)])
         assert one[0] == whole[i]

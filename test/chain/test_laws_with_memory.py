@@ -29,7 +29,7 @@ def test_contacts_age_by_the_law_of_rice_and_ruina() -> None:
     steady = 0.02 * np.log1p(0.06 / rate / 1.5)
     assert gain[time < 10.0][-1] == pytest.approx(steady, rel=0.02)
     state = final_state(parameters, rubber, *(part[time < 10.0 + rest] for part in motion))
-    assert float(state["age"][0]) == pytest.approx(0.06 / rate + rest, rel=0.02)
+    assert float(state["static_ageing_age"][0]) == pytest.approx(0.06 / rate + rest, rel=0.02)
 
 
 def test_trapped_oil_leaks_at_rest_and_is_refilled_in_motion() -> None:

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from chain_support import vehicle
 
-from lugre_steering.chain.hydraulics import cylinder_length, gauge_offset, line_gains, moment_arm
+from lugre_steering.chain.hydraulics import cylinder_length, moment_arm
 from lugre_steering.vehicle import Axle, Levers, Rollers, Track
+from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.loads import load_moment, roller_loads, roller_radii, vertical_load
 
 AXLE = Axle(80_000.0, 6.0, 0.09, 3.6, 2.1)

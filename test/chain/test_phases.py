@@ -34,7 +34,7 @@ def test_phases_of_the_same_parameters_are_no_phases() -> None:
 
 def test_the_state_is_carried_over_like_by_two_runs() -> None:
     before, after, rubber = late(heat_partition_ground_share=0.5)
-    state, time = new_state(), MOTION[0]
+    state, time = new_state(before), MOTION[0]
     first = run_side(before, rubber, *(part[~LATER] for part in MOTION), state)["torque"]
     second = run_side(after, rubber, *(part[LATER] for part in MOTION), state, float(time[~LATER][-1]))["torque"]
     found = torque_in_phases([(-np.inf, before), (START_S, after)], rubber, *MOTION)
@@ -53,7 +53,7 @@ def test_path_and_time_of_a_late_effect_count_from_its_beginning(effect: str, va
     assert not change[~LATER].any()
     assert change[LATER][0] < 1e-2 * change.max()
     state = final_state(before, rubber, *(part[~LATER] for part in MOTION))
-    state["time"] = state["slip"] = 0.0
+    state["time"] = 0.0
     fresh = run_side(after, rubber, *(part[LATER] for part in MOTION), state, float(MOTION[0][~LATER][-1]))["torque"]
     np.testing.assert_allclose(found[LATER], fresh, rtol=1e-12, atol=1e-6)
 

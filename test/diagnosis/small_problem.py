@@ -8,7 +8,7 @@ import numpy as np
 
 from lugre_steering.calibration import coverage
 from lugre_steering.data.dataset import prepare
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.simulate.command import load_vehicle
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep

@@ -17,7 +17,7 @@ from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.search import fingerprint, locate
 from lugre_steering.diagnosis.search.build_up import Search
 from lugre_steering.diagnosis.search.fingerprint import Score
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import split
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise

@@ -18,7 +18,7 @@ from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.diagnosis.search import fingerprint
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import BagError
 from lugre_steering.proof.simulator import Case, CaseData, Concealed, load_sheet, simulate_case, write_case
 from lugre_steering.recording import Recording, Signal

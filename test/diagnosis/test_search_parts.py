@@ -13,7 +13,7 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from lugre_steering.diagnosis.conclude import experiment, limits, verify
 from lugre_steering.diagnosis.search import build_up, fingerprint, flexible, foreign, ties, trial
 from lugre_steering.diagnosis.search.fingerprint import Score
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import noise, split
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem

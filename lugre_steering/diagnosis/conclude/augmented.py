@@ -12,7 +12,6 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
-from lugre_steering.vehicle.effects import WINDOWS
 
 
 def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]], heldout_rmse: float) -> Vehicle:
@@ -25,7 +24,7 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, An
         if not candidate.active_in(last) or candidate.start(last) > problem.runs[last].time[-1]:
             continue
         keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}
-        for low, high in WINDOWS.get(candidate.effect.id, ()):
+        for low, high in candidate.effect.places:
             ends = {key: keep.pop(key, 0.0) for key in (low, high)}
             if ends[low] < ends[high]:  # else everywhere
                 keep |= ends

@@ -19,7 +19,7 @@ from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.diagnosis.search import onset
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
 
 CONTRADICTED = 0.02

@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.search.build_up import Search
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import Split

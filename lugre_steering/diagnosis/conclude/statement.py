@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 
 
 def at_end(effect: Mapping[str, Any]) -> list[tuple[str, float, str]]:

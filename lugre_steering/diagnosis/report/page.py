@@ -20,7 +20,7 @@ from lugre_steering import units
 from lugre_steering.calibration.calibrate import KEYS
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.result import Diagnosis
-from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.files import write_text
 from lugre_steering.fitting.problem import calibrations_for

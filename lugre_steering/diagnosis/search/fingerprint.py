@@ -16,28 +16,14 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.diagnosis.search import onset
-from lugre_steering.effects.catalogue import CATALOGUE
-from lugre_steering.effects.entry import Effect
+from lugre_steering.effects.entry import Seen
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.recording import Array
 
-WINDOW_EDGES = 9
-HYDRAULIC = (
-    "moment_arm_error", "relief_saturation", "line_loss_linear", "line_loss_quadratic", "back_pressure", "trapped_pressure",
-    "cylinder_friction",
-)  # fmt: skip
-"""Nothing of a joint that is driven and measured without oil (friction between drive and joint is its own friction)."""
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
-REMEMBERED = ("thermal", "motion")
-AT_ONCE = ("time_delay",)
-COUNTING = ("wear_polishing", "pressure_drift", "soil_shear", "static_ageing")
-"""Stages and further effects that, begun late, leave another trace than the end of the same always there: heat is remembered for
-minutes, an angle that shifts turns the contact (stamps do not), and path, time, berm and age count from the beginning."""
-NEVER_LATE = ("surface_patch", "mullins_softening")
-"""Has its own time window; acts on the first sweep."""
-CEILINGS = (0.8, 0.88, 0.92, 0.95, 0.975, 1.0, 1.02, 1.04, 1.07)
 
 
 @dataclass(frozen=True)
@@ -82,13 +68,14 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
     for effect in CATALOGUE.values():
-        if not effect.observable or effect.id in without or not _applies(problem, effect):
+        if not effect.observable or effect.id in without or any(getattr(problem.vehicle, section) is None for section in effect.needs):
             continue
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
-        if effect.id == "surface_patch":
-            found += _windows(problem, effect)
-        elif effect.id == "relief_saturation":
-            found += _ceilings(problem, effect)
+        if effect.variants is not None:
+            for shapes in effect.variants(_seen(problem)):
+                ends = {name for pair in effect.places for name in pair}
+                unset = tuple(name for name in free if name not in shapes and name not in ends)
+                found.append(Candidate(effect, tuple(shapes.items()), free=unset))
         elif effect.per_line:
             lines = problem.vehicle.hydraulics.lines if problem.vehicle.hydraulics is not None else ()
             found += [Candidate(effect, (), line, free=free) for line in lines]
@@ -102,17 +89,6 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
     return found
 
 
-def _applies(problem: Problem, effect: Effect) -> bool:
-    """Thermal effects need rubber; hydraulic ones need hydraulics; nothing else is excluded beforehand."""
-    if effect.stage == "thermal" and problem.vehicle.rubber is None:
-        return False
-    return not (effect.id in HYDRAULIC and problem.vehicle.hydraulics is None)
-
-
-def _remembered(effect: Effect) -> bool:
-    return (effect.stage in REMEMBERED and effect.id not in AT_ONCE) or effect.id in COUNTING
-
-
 def _unit(problem: Problem, relative_to: str) -> float:
     if relative_to == "max_angle":
         return max(float(np.max(np.abs(run.theta))) for run in problem.runs)
@@ -123,40 +99,15 @@ def _unit(problem: Problem, relative_to: str) -> float:
     return 1.0
 
 
-def _windows(problem: Problem, effect: Effect) -> list[Candidate]:
-    """Angle windows and time windows; each is tried in all bags and in single ones."""
-    free = ("change",)
-    low = min(float(run.theta.min()) for run in problem.runs)
-    high = max(float(run.theta.max()) for run in problem.runs)
-    edges = np.linspace(low - 0.01, high + 0.01, WINDOW_EDGES)
-    found = [
-        Candidate(effect, (("angle_low", float(a)), ("angle_high", float(b))), free=free)
-        for a, b in itertools.combinations(edges, 2)
-        if b - a < 0.99 * (edges[-1] - edges[0])
-    ]
-    times = np.linspace(-1.0, max(float(run.time[-1]) for run in problem.runs) + 1.0, WINDOW_EDGES)
-    found += [
-        Candidate(effect, (("time_start", float(a)), ("time_end", float(b))), free=free)
-        for a, b in itertools.combinations(times, 2)
-        if b - a < 0.99 * (times[-1] - times[0])
-    ]
-    return found
-
-
-def _ceilings(problem: Problem, effect: Effect) -> list[Candidate]:
-    """A relief pressure limits the torque by the arms of the cylinders toward the push, which the vehicle sheet knows."""
-    theta = np.concatenate([run.theta.mean(axis=0) for run in problem.runs])
-    gains = np.concatenate([run.torque_per_line for run in problem.runs], axis=1)
-    toward = np.concatenate([theta, -theta])
-    held = np.concatenate([np.maximum(gains, 0.0).sum(axis=0), np.maximum(-gains, 0.0).sum(axis=0)])
-    middle, slope, curvature = np.polynomial.polynomial.polyfit(toward, held, 2)
-    arms = (("arm_slope", float(slope / middle)), ("arm_curvature", float(curvature / middle)))
-    arm = np.where(problem.measured > 0.0, held[: theta.size], held[theta.size :]) / middle
-    pushed = arm > 0.0
-    if not pushed.any():
-        return []
-    top = float(np.percentile(np.abs(problem.measured[pushed]) / arm[pushed], 99.9))  # the largest values hold noise
-    return [Candidate(effect, (("ceiling", top * share), *arms)) for share in CEILINGS]
+def _seen(problem: Problem) -> Seen:
+    return Seen(
+        theta=np.concatenate([run.theta.mean(axis=0) for run in problem.runs]),
+        lowest=min(float(run.theta.min()) for run in problem.runs),
+        highest=max(float(run.theta.max()) for run in problem.runs),
+        longest=max(float(run.time[-1]) for run in problem.runs),
+        gains=np.concatenate([run.torque_per_line for run in problem.runs], axis=1),
+        torque=problem.measured,
+    )
 
 
 def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Candidate, first: float | None = None) -> Array:
@@ -203,10 +154,10 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
                 alone = replace(candidate, bags=(bag,))
                 part = score_columns(alone, columns * (problem.bag == bag)[:, None], basis, residuals, energy)
                 found += [part] if part is not None else []
-        if candidate.bags is None and candidate.effect.id not in NEVER_LATE:
+        if candidate.bags is None and not candidate.effect.never_late:
             for start, after in zip(starts, begun, strict=True):
                 late = replace(candidate, since=start)
-                if _remembered(candidate.effect):
+                if candidate.effect.counts_from_start:
                     changed = signature(problem, fit, base, late) * weight[:, None]
                 else:
                     changed = columns * after[:, None]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from lugre_steering.chain.hydraulics import gauge_offset
 from lugre_steering.recording import Array, Kind
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.actuation import total_gains
@@ -25,12 +24,11 @@ from lugre_steering.simulate.paper.bench import (
 )
 from lugre_steering.simulate.paper.outcome import Check, Curve, Outcome, Panel
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
-from lugre_steering.vehicle import EffectEntry
+from lugre_steering.vehicle.cylinders import gauge_offset
+from lugre_steering.vehicle.tables import limit_device
 
 TOLERANCE = 0.015
 EQUAL = 0.005
-END_STOP = EffectEntry("end_stop", {"engage_angle": 0.50, "stiffness": 1.2e5, "cubic_stiffness": 1.0e7, "loss": 0.2})
-"""Elastic limit device of the simulated vehicle: engages at 0.50 rad of a track, about 9 kN m at the limit."""
 RATES_DEG_S = (2.0, 4.0, 6.0, 8.0, 10.0)
 PARTS = ("elastic", "damping", "aligning")
 
@@ -203,12 +201,12 @@ def limit_stop(bench: Bench) -> Outcome:
     """Measured torque rises above the model while the tracks are held at the limits (the paper's figure 9,
     tc-td-te)."""
     motion = motion_of(BUILT_IN["double-cycle"], bench.vehicle)
-    run = simulate(bench.vehicle.replace(effects=(END_STOP,)), motion, sensing_of(bench.vehicle))
+    run = simulate(bench.vehicle.replace(effects=(limit_device(),)), motion, sensing_of(bench.vehicle))
     stamp_s, measured = cylinder_torque(run)
     improved, plain = plant.run(bench.vehicle, motion), plant.run(original(bench.vehicle), motion)
     residual = measured - np.interp(stamp_s, motion.time, improved.torque)
     inner = np.interp(stamp_s, motion.time, np.abs(motion.theta).max(axis=0))
-    floor = float(np.sqrt(np.mean(residual[inner < END_STOP.parameters["engage_angle"]] ** 2)))
+    floor = float(np.sqrt(np.mean(residual[inner < limit_device().parameters["engage_angle"]] ** 2)))
     stop = run.truth.part("parallel")
     rows, risen = [], []
     for i, (a, b) in enumerate(zip(sweeps(motion)[:4], sweeps(motion)[1:], strict=False)):
@@ -262,7 +260,7 @@ def limit_stop(bench: Bench) -> Outcome:
             ),
         ),
     )
-    size = ", ".join(f"{name} {value:g}" for name, value in END_STOP.parameters.items())
+    size = ", ".join(f"{name} {value:g}" for name, value in limit_device().parameters.items())
     notes = (
         "no field recording of the paper is available: the black curve is this project's own simulation with an "
         "elastic end stop "

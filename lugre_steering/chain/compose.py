@@ -1,0 +1,327 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From effects to records and one readable, compiled step.
+
+The signature of a law is its wiring: each argument names a memory or a parameter of the effect, a quantity of the step or
+a baseline parameter, looked for in that order. A law returns its part, then every memory that it named (lists, which it
+changes in place, are not returned). What the parts make together is fixed by the hook.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import linecache
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from lugre_steering.chain import baseline, bristle, heat
+from lugre_steering.chain.compiled import law
+from lugre_steering.chain.layout import BASELINE_FIELDS, STATE_FIELDS
+from lugre_steering.chain.template import SENSED, STEP, WIND_UP
+from lugre_steering.errors import LugreSteeringError
+
+Law = Callable[..., Any]
+
+
+class Parametric(Protocol):
+    """A parameter as the composer sees it."""
+
+    @property
+    def name(self) -> str: ...
+
+
+class Physics(Protocol):
+    """An effect as the composer sees it; see ``effects.entry.Effect``."""
+
+    @property
+    def id(self) -> str: ...
+    @property
+    def parameters(self) -> Sequence[Parametric]: ...
+    @property
+    def memory(self) -> Mapping[str, float | str | tuple[float, ...]]: ...
+    @property
+    def hooks(self) -> Mapping[str, Law]: ...
+    @property
+    def amplitudes(self) -> Sequence[str]: ...
+    @property
+    def per_line(self) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Hook:
+    """A place in the chain: what is done there with the ``part`` of a law, and what the laws there may read.
+
+    ``given`` maps quantities to expressions of the step; those of ``EARLIER`` hooks are known as well.
+    """
+
+    put: str
+    does: str
+    given: Mapping[str, str]
+
+
+_ALWAYS = {
+    "theta": "theta", "omega": "omega", "alpha": "alpha", "dt": "dt", "time": "s.time", "temperature": "s.temperature",
+    "z": "s.z", "z_max": "s.z_max", "direction": "s.direction", "last_torque": "s.torque", "last_load": "s.load",
+}  # fmt: skip
+"""Angle [rad], rate [rad/s], acceleration [rad/s2], sampling interval [s], time [s], tread rubber [degC], bristle deflection
+and its largest so far [rad], sign of the last contact motion, torque and load of the last step [N m]."""
+
+HOOKS = {
+    "angle": Hook("theta = {part}", "true angle [rad] for the measured one, ``theta``", {"theta": "theta"}),
+    "friction_temperature": Hook("hotter += {part}", "what friction feels above the rubber temperature [K]", _ALWAYS),
+    "wind_up": Hook("angle, slope = angle + {part}[0], slope + {part}[1]",
+                    "angle lost between sensor and track [rad] under ``torque``, and its slope [rad/(N m)]", {"torque": "torque"}),
+    "tangent": Hook("faster += {part}", "relative change of the presliding stiffness",
+                    {"d_theta": "d_theta", "turned": "turned", "sign": "sign", "resting": "resting", "dwell": "s.dwell",
+                     "stiffness": "stiffness", "length": "length", "friction_ratio": "friction_ratio"}),
+    "level": Hook("factor *= {part}", "factor on the friction level", {}),
+    "ageing": Hook("aged += {part}", "what is added to the friction level, as a share of Coulomb friction", {}),
+    "contact": Hook("elastic, z_next, work = {part}", "in place of the bristle: elastic torque [N m], its deflection [rad] and what "
+                    "sliding dissipates [J] while it is drawn by ``drawn`` [rad]", {"g": "g", "drawn": "drawn"}),
+    "viscous": Hook("viscous += {part}", "torque of the contact that heats the rubber [N m]", {"elastic": "elastic", "damping": "damping"}),
+    "elastic": Hook("elastic *= {part}", "factor on the elastic torque", {"viscous": "viscous"}),
+    "heat_in": Hook("energy *= {part}", "factor on the friction heat that enters the rubber", {"energy": "energy"}),
+    "air": Hook("air += {part}", "what is added to the air temperature [K]", {}),
+    "heat_out": Hook("s.temperature = {part}", "rubber temperature [degC] after this law", {"air": "air"}),
+    "torque": Hook("parallel += {part}", "torque beside the contact [N m]", {"z": "z_next"}),
+    "loss": Hook("lost += {part}", "torque lost in cylinders and lines [N m]", {"load": "load"}),
+    "limit": Hook("torque = {part}", "torque that the hydraulics can hold [N m]", {"torque": "torque"}),
+    "arm": Hook("factor *= {part}", "true moment arm over that of the drawing", {"theta": "theta"}),
+    "line": Hook("error += {part}", "what the sensor of one line reads too much [Pa], ``elapsed`` [s] after the start",
+                 {"elapsed": "elapsed"}),
+    "delay": Hook("", "by how much pressures are stamped late [s]", {}),
+    "lag": Hook("", "time constant of the pressure sensors [s]", {}),
+}  # fmt: skip
+"""Every place where an effect may act, in the order of the step; the last five belong to the sensors."""
+
+_STEPWISE = tuple(name for name in HOOKS if name not in ("angle", "wind_up", "arm", "line", "delay", "lag"))
+SENSOR_HOOKS = ("angle", "arm", "line", "delay", "lag")
+
+
+@dataclass(frozen=True)
+class Composition:
+    """Records and compiled functions of a set of effects; ``text`` is the step module, ``name`` tells it from all others."""
+
+    name: str
+    text: str
+    parameters: np.dtype[np.void]
+    state: np.dtype[np.void]
+    lines: np.dtype[np.void]
+    step: Law
+    arm_factor: Law
+    line_error: Law
+
+    @property
+    def effect_fields(self) -> tuple[str, ...]:
+        """Parameters of the effects in the record of a track."""
+        assert self.parameters.names is not None
+        return self.parameters.names[len(BASELINE_FIELDS) : -1]
+
+
+_made: dict[str, Composition] = {}
+
+
+def composition_of(name: str) -> Composition:
+    """The composition of that name, made earlier in this process."""
+    return _made[name]
+
+
+def name_of(fields: Sequence[str]) -> str:
+    """The name of the composition whose records have these fields: it stands last."""
+    return fields[-1]
+
+
+def compose(effects: Sequence[Physics]) -> Composition:
+    """The step of the baseline with the given effects in place, in their order."""
+    laws = {f"{effect.id}__{hook}": function for effect in effects for hook, function in effect.hooks.items()}
+    text = _text(effects)
+    sources = [text, *(_source(function) for function in laws.values())]
+    name = f"composed_{hashlib.sha256(chr(0).join(sources).encode()).hexdigest()[:12]}"
+    if name in _made:
+        return _made[name]
+    scope: dict[str, Any] = {
+        "math": math, "ratios": baseline.ratios, "aligning": baseline.aligning, "REST_RATE_RAD_S": baseline.REST_RATE_RAD_S,
+        "stribeck": bristle.stribeck, "bristle": bristle.bristle, "bristle_work": bristle.bristle_work, "heat": heat.heat,
+        "LEAST_LEVEL": 0.05, "WIND_UP_ITERATIONS": 12, "law": law, **laws,
+    }  # fmt: skip
+    file = f"<{name}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # so that tracebacks and tools can show it
+    exec(compile(text, file, "exec"), scope)
+    _made[name] = Composition(
+        name,
+        text,
+        np.dtype([(field, np.float64) for field in (*BASELINE_FIELDS, *_parameter_fields(effects, per_line=False), name)]),
+        np.dtype([*((field, np.float64) for field in STATE_FIELDS), *_memory_fields(effects)]),
+        np.dtype([(field, np.float64) for field in (*_parameter_fields(effects, per_line=True), name)]),
+        scope["step"],
+        scope["arm_factor"],
+        scope["line_error"],
+    )
+    return _made[name]
+
+
+def check(effect: Physics) -> None:
+    """Refuse an effect whose wiring leads nowhere: unknown hooks and names, parameters and memory that no law reads."""
+    read = set()
+    for hook, function in effect.hooks.items():
+        if hook not in HOOKS:
+            raise LugreSteeringError(f"effect '{effect.id}': hooks: got '{hook}', expected one of {', '.join(HOOKS)}")
+        for name in _arguments(function):
+            _wire(effect, hook, name)
+            read.add(name)
+    own = [p.name for p in effect.parameters] + list(effect.memory)
+    if doubled := sorted({name for name in own if own.count(name) > 1}):
+        raise LugreSteeringError(f"effect '{effect.id}': {', '.join(doubled)}: expected each name once among parameters and memory")
+    if effect.hooks and (idle := [name for name in own if name not in read]):
+        raise LugreSteeringError(f"effect '{effect.id}': {', '.join(idle)}: no law reads it; expected an argument of that name")
+
+
+def _arguments(function: Law) -> tuple[str, ...]:
+    return tuple(inspect.signature(getattr(function, "py_func", function)).parameters)
+
+
+def _source(function: Law) -> str:
+    plain = getattr(function, "py_func", function)
+    try:
+        return inspect.getsource(plain)
+    except OSError:
+        return repr(plain.__code__.co_code) + repr(plain.__code__.co_consts)
+
+
+def _known(hook: str) -> dict[str, str]:
+    """Quantities that laws of a hook may read, with their expressions in the step."""
+    if hook not in _STEPWISE:
+        return dict(HOOKS[hook].given)
+    known: dict[str, str] = {}
+    for name in _STEPWISE:
+        known |= HOOKS[name].given
+        if name == hook:
+            break
+    return known
+
+
+def _wire(effect: Physics, hook: str, name: str) -> str:
+    """The expression of the step that an argument of a law stands for."""
+    record = "q" if effect.per_line else "p"
+    known = _known(hook)
+    if name in effect.memory:
+        return f"s.{effect.id}_{name}"
+    if any(p.name == name for p in effect.parameters):
+        return f"{record}.{effect.id}_{name}"
+    if name in known:
+        return known[name]
+    if name in BASELINE_FIELDS and hook not in ("line", "delay", "lag"):
+        return f"p.{name}"
+    own = [p.name for p in effect.parameters] + list(effect.memory)
+    raise LugreSteeringError(
+        f"effect '{effect.id}': law '{hook}': got the argument '{name}', expected one of its own ({', '.join(own) or 'none'}), a quantity "
+        f"known there ({', '.join(known) or 'none'}) or a parameter of the baseline ({', '.join(BASELINE_FIELDS)})"
+    )
+
+
+def _guard(effect: Physics) -> str:
+    """Whether an effect acts: any of its amplitudes differs from zero."""
+    record = "q" if effect.per_line else "p"
+    return " or ".join(f"{record}.{effect.id}_{name} != 0.0" for name in effect.amplitudes)
+
+
+def _call(effect: Physics, hook: str) -> list[str]:
+    """Lines that call the law of an effect and put its part, and its memory, where they belong."""
+    arguments = _arguments(effect.hooks[hook])
+    call = f"{effect.id}__{hook}({', '.join(_wire(effect, hook, name) for name in arguments)})"
+    kept = [f"s.{effect.id}_{name}" for name in arguments if name in effect.memory and not isinstance(effect.memory[name], tuple)]
+    put = HOOKS[hook].put
+    if not kept and put.count("{part}") == 1:
+        return [put.format(part=call)]
+    return [f"{', '.join(['part', *kept])} = {call}", put.format(part="part")]
+
+
+def _acting(effects: Sequence[Physics], hook: str) -> list[Physics]:
+    return [effect for effect in effects if hook in effect.hooks]
+
+
+def _slot(effects: Sequence[Physics], hook: str) -> Iterator[str]:
+    """Lines for the slot of a hook in the step."""
+    acting = _acting(effects, hook)
+    if acting and hook != "angle" and hook not in _STEPWISE:
+        for effect in acting:
+            yield f"if {_guard(effect)}:"
+            yield from (f"    {line}" for line in _call(effect, hook))
+    elif acting:
+        yield "if effects:"
+        for effect in acting:
+            yield f"    if {_guard(effect)}:"
+            yield from (f"        {line}" for line in _call(effect, hook))
+
+
+def _instead(effects: Sequence[Physics], hook: str) -> list[str]:
+    """Branches in place of a block of the step, each with its condition."""
+    if hook == "wind_up":
+        guards = [_guard(effect) for effect in _acting(effects, hook)]
+        if not guards:
+            return []
+        solved = ["d_theta = wound_increment(p, s, theta, stiffness, length)", "s.contact_angle += d_theta"]
+        return [f"if effects and ({' or '.join(guards)}):", *(f"    {line}" for line in solved)]
+    lines = []
+    for i, effect in enumerate(_acting(effects, hook)):
+        lines.append(f"{'elif' if i else 'if'} effects and ({_guard(effect)}):")
+        work = "work = (work + 0.5 * stiffness * (z_next * z_next - z * z)) / faster"
+        lines += [f"    {line}" for line in (*_call(effect, hook), work)]
+    return lines
+
+
+def _text(effects: Sequence[Physics]) -> str:
+    """The step module."""
+    memory = [
+        f"s.{effect.id}_{name} = " + (f"p.{start}" if isinstance(start, str) else repr(start))
+        for effect in effects
+        for name, start in effect.memory.items()
+        if not isinstance(start, tuple) and start != 0.0
+    ]
+    winding = _filled(WIND_UP, {"wind_up": list(_slot(effects, "wind_up"))}) if _acting(effects, "wind_up") else ""
+    slots = {hook: list(_slot(effects, hook)) for hook in HOOKS if hook not in ("wind_up", "contact", "delay", "lag")}
+    slots |= {hook: _instead(effects, hook) for hook in ("wind_up", "contact")}
+    slots |= {"memory": memory, "wind_up_laws": [*winding.splitlines(), "", ""] if winding else []}
+    text = _filled(STEP, slots) + "\n\n" + _filled(SENSED, slots)
+    header = '"""One step of one track, composed of: ' + (", ".join(effect.id for effect in effects) or "the baseline alone") + '."""\n\n'
+    return header + re.sub(r"^def (?!step\(|arm_factor\(|line_error\()", "@law\ndef ", text, flags=re.MULTILINE)
+
+
+def _filled(template: str, slots: Mapping[str, Sequence[str]]) -> str:
+    """The template with lines in the places of its slots; a block behind an empty ``<name> else:`` stands alone."""
+    out: list[str] = []
+    dedent = 0
+    for line in template.splitlines():
+        indent = len(line) - len(line.lstrip())
+        if line.strip() and indent < dedent:
+            dedent = 0
+        slot = re.fullmatch(r"\s*<(\w+)>( else:)?", line)
+        if slot is None:
+            out.append(line[4:] if dedent else line)
+            continue
+        lines = slots.get(slot.group(1), [])
+        out += [" " * indent + item if item else "" for item in lines]
+        if slot.group(2):
+            if lines:
+                out.append(" " * indent + "else:")
+            else:
+                dedent = indent + 4
+    return "\n".join(out).rstrip() + "\n"
+
+
+def _parameter_fields(effects: Sequence[Physics], per_line: bool) -> list[str]:
+    return [f"{effect.id}_{p.name}" for effect in effects if effect.per_line == per_line for p in effect.parameters]
+
+
+def _memory_fields(effects: Sequence[Physics]) -> list[tuple[Any, ...]]:
+    return [
+        (f"{effect.id}_{name}", np.float64, (len(start),)) if isinstance(start, tuple) else (f"{effect.id}_{name}", np.float64)
+        for effect in effects
+        for name, start in effect.memory.items()
+    ]

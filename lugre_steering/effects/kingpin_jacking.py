@@ -1,0 +1,38 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Jacking torque of the inclined kingpin."""
+
+from __future__ import annotations
+
+import math
+
+from lugre_steering.chain.compiled import law
+from lugre_steering.effects.entry import Effect, Parameter
+
+
+@law
+def torque(theta, amplitude, second_harmonic, even):
+    """amplitude sin(theta) + second_harmonic sin(2 theta) + even sin(theta)**2 [N m]."""
+    sine = math.sin(theta)
+    return sine * (amplitude + 2.0 * second_harmonic * math.cos(theta)) + sine * sine * even
+
+
+EFFECT = Effect(
+    id="kingpin_jacking",
+    stage="parallel_torque",
+    tier=1,
+    title="Jacking torque of the inclined kingpin",
+    equation="M = amplitude sin(theta) + second_harmonic sin(2 theta) + even sin(theta)^2",
+    source="Reimpell, Stoll, Betzler, The Automotive Chassis (2001); Pacejka, Tire and Vehicle Dynamics, ch. 9",
+    trace="the mean of both sweep branches is a function of the angle",
+    coordinate="steering angle",
+    parameters=(
+        Parameter("amplitude", "N m", "of one track", 500.0, -5e4, 5e4),
+        Parameter("second_harmonic", "N m", "of one track", 300.0, -5e4, 5e4, optional=True),
+        Parameter("even", "N m", "caster part of one track", 300.0, -5e4, 5e4, optional=True),
+    ),
+    hooks={"torque": torque},
+    acts_by=("amplitude", "second_harmonic", "even"),
+    rivals=("moment_arm_error", "angle_scale"),
+    joint_title="Gravity or another conservative torque of the angle",
+)

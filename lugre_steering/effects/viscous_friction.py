@@ -1,0 +1,33 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Viscous adhesion of the rubber."""
+
+from __future__ import annotations
+
+from lugre_steering.chain.compiled import law
+from lugre_steering.effects.entry import Effect, Parameter
+
+
+@law
+def viscous(omega, sigma_2, thinning):
+    """sigma_2 omega / (1 + thinning |omega|) [N m]."""
+    return sigma_2 * omega / (1.0 + thinning * abs(omega))
+
+
+EFFECT = Effect(
+    id="viscous_friction",
+    stage="contact",
+    tier=1,
+    title="Viscous adhesion of the rubber",
+    equation="M += sigma_2 omega / (1 + thinning |omega|)",
+    source="Canudas de Wit et al., IEEE TAC 40 (1995) 419; dropped by Liang et al. 2022",
+    trace="odd in the rate, zero at rest",
+    coordinate="steering rate",
+    parameters=(
+        Parameter("sigma_2", "N m s/rad", "viscous coefficient of one track", 5000.0, 0.0, 5e5),
+        Parameter("thinning", "s/rad", "inverse rate at which it has halved", 3.0, 0.0, 100.0, optional=True),
+    ),
+    hooks={"viscous": viscous},
+    rivals=("line_loss_linear",),
+    joint_title="Viscous friction",
+)
