@@ -64,7 +64,9 @@ def test_no_beginning_of_a_saved_vehicle_is_a_vehicle(tmp_path: Path) -> None:
     save(load(SHEET), whole)
     content = whole.read_bytes()
     assert is_ours(whole)
-    for length in range(len(content) - 1):  # the last character is the end of the last line
+    line_ends = [i for i, byte in enumerate(content) if byte == ord("\n")]  # where most of what is left would be valid
+    # The last character is the end of the last line.
+    for length in sorted({*line_ends[:-1], *range(0, len(content) - 1, 23), *range(len(content) - 6, len(content) - 1)}):
         cut.write_bytes(content[:length])
         with pytest.raises(VehicleFileError):
             load(cut)
@@ -189,7 +191,7 @@ def test_a_picture_of_others_stays_and_ours_is_replaced(
     (out / name).unlink()
     assert command(*arguments, "--out", out) == (0, "")
     assert is_ours(out / name)
-    if arguments[0] != "simulate":  # bags are never replaced
+    if arguments[0] == "vehicle":  # bags are never replaced
         assert command(*arguments, "--out", out) == (0, "")
 
 
