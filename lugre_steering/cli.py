@@ -10,6 +10,7 @@ import inspect
 import json
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -22,7 +23,7 @@ from rich.markup import escape
 from rich.progress import Progress, TaskID
 
 from lugre_steering import __version__
-from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -112,6 +113,23 @@ def step_bar(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
         bar.update(task, completed=len(steps))
 
 
+@contextmanager
+def doubts_told_once() -> Iterator[None]:
+    """Doubts about a vehicle file as one line each on stderr, however often it is read; other warnings as ever."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("once", ImplausibleWarning)
+        show = warnings.showwarning
+
+        def tell(message: Warning | str, category: type[Warning], *place: Any, **options: Any) -> None:
+            if issubclass(category, ImplausibleWarning):
+                print(f"lugre-steering: warning: {message}", file=sys.stderr)
+            else:
+                show(message, category, *place, **options)
+
+        warnings.showwarning = tell
+        yield
+
+
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
     print(json.dumps(result, indent=2, allow_nan=False))
@@ -128,7 +146,8 @@ def command(name: str | None = None) -> Callable[[F], F]:
                     from lugre_steering.effects.registry import add_files
 
                     add_files(own_effects)
-                return function(*arguments, **options)
+                with doubts_told_once():
+                    return function(*arguments, **options)
             except LugreSteeringError as error:
                 print(f"lugre-steering: {error}", file=sys.stderr)
                 raise typer.Exit(2) from None

@@ -11,6 +11,10 @@ class VehicleFileError(LugreSteeringError):
     """A vehicle file, or a table it points to, cannot be used as it is."""
 
 
+class ImplausibleWarning(UserWarning):
+    """A value in a vehicle file is possible, and unlike that of any real vehicle."""
+
+
 class MapFileError(LugreSteeringError):
     """An import map, or the table it describes, cannot be used as it is."""
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-import re
 import types
 import typing
 from collections.abc import Mapping, Sequence
@@ -17,28 +16,11 @@ from typing import Any, TypeVar
 
 import yaml
 
+from lugre_steering import yaml_text
 from lugre_steering.errors import LugreSteeringError
+from lugre_steering.files import read_text
 
 T = TypeVar("T")
-
-
-class Loader(yaml.SafeLoader):
-    """SafeLoader that also reads 25.0e6 and 1e4 as numbers (YAML 1.2), as every engineer means them, and refuses a key
-    that stands twice, of which only the last would count."""
-
-    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        node = super().compose_mapping_node(anchor)
-        seen = set()
-        for key, _ in node.value:
-            if (key.tag, str(key.value)) in seen and key.tag != "tag:yaml.org,2002:merge":
-                raise yaml.composer.ComposerError(None, None, f"the key '{key.value}' stands twice", key.start_mark)
-            seen.add((key.tag, str(key.value)))
-        return node
-
-
-Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
-)
 
 
 def quantity(
@@ -63,11 +45,22 @@ class Reader:
 
     def load(self) -> object:
         """Plain data of the file."""
+        return self.parse(self.text())
+
+    def text(self) -> str:
+        """The file as it is."""
         try:
-            return yaml.load(self.file.read_text(encoding="utf-8"), Loader=Loader)
+            return read_text(self.file, yaml_text.LONGEST)
         except OSError as error:
             raise self.error(f"{self.file}: cannot be read: {error.strerror or error}") from error
-        except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: 2020-13-45, or not UTF-8
+        except ValueError as error:  # not UTF-8, too long, or a NUL in the name
+            raise self.error(f"{self.file}: is not valid YAML: {error}") from error
+
+    def parse(self, text: str) -> object:
+        """Plain data of the file's text."""
+        try:
+            return yaml_text.parse(text)
+        except (yaml.YAMLError, ValueError) as error:  # ValueError: 2020-13-45
             raise self.error(f"{self.file}: is not valid YAML: {' '.join(str(error).split())}") from error
 
     def fail(self, key: str, value: object, expected: str) -> LugreSteeringError:

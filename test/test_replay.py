@@ -346,7 +346,7 @@ def test_angle_topic_without_usable_samples_is_an_error(tmp_path: Path) -> None:
     bag = make.write(tmp_path / "run", sorted(messages, key=lambda row: row[2]))
     with pytest.raises(BagError, match="angle/left: 0 samples used, 50 not_finite"):
         replay([bag], VEHICLE, tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_joint_of_another_name_is_named(tmp_path: Path) -> None:
@@ -542,6 +542,37 @@ def test_a_summary_or_picture_of_others_is_never_overwritten(tmp_path: Path, fil
     with pytest.raises(BagError, match=f"{file}: exists and is not an earlier result"):
         replay([bag], VEHICLE, tmp_path / "out")
     assert (tmp_path / "out" / file).read_text() == '{"schema": "mine"}'
+
+
+def test_a_file_put_into_an_earlier_result_is_never_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = make.write(tmp_path / "run", drive(2.0))
+    replay([bag], VEHICLE, tmp_path / "out")
+    notes = tmp_path / "out" / "run" / "notes.txt"
+    notes.write_text("mine")
+    with pytest.raises(BagError, match=f"{notes}: exists and is not an earlier result"):
+        replay([bag], VEHICLE, tmp_path / "out")
+    assert notes.read_text() == "mine"
+    notes.unlink()
+    push = Estimator.push_block
+
+    def put_meanwhile(*arguments: Any) -> Any:
+        notes.write_text("mine")
+        return push(*arguments)
+
+    monkeypatch.setattr(Estimator, "push_block", put_meanwhile)
+    with pytest.raises(BagError, match=f"{notes}: exists and is not an earlier result"):
+        replay([bag], VEHICLE, tmp_path / "out")
+    assert notes.read_text() == "mine"
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"run", "run.png", "summary.json"}
+
+
+def test_a_picture_put_in_the_place_of_ours_is_never_replaced(tmp_path: Path) -> None:
+    bag = make.write(tmp_path / "run", drive(2.0))
+    replay([bag], VEHICLE, tmp_path / "out")
+    (tmp_path / "out" / "run.png").write_bytes(b"mine")
+    with pytest.raises(BagError, match=r"run\.png: exists and is not an earlier result"):
+        replay([bag], VEHICLE, tmp_path / "out")
+    assert (tmp_path / "out" / "run.png").read_bytes() == b"mine"
 
 
 def test_a_result_can_be_replayed_and_its_old_outputs_are_replaced(tmp_path: Path) -> None:

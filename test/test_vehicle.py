@@ -5,8 +5,13 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
+import shutil
 import tempfile
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -15,11 +20,17 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from lugre_steering.cli import app
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.errors import ImplausibleWarning, LugreSteeringError, VehicleFileError
+from lugre_steering.live.table import read_options
 from lugre_steering.schema import Reader
+from lugre_steering.sheet.derived import derive
+from lugre_steering.simulate.manoeuvres import from_yaml
 from lugre_steering.vehicle import EffectEntry, Vehicle, from_mapping, load, pavements, save
+from lugre_steering.vehicle.plausible import plausibility
 from lugre_steering.vehicle.sections import Initial, Topics
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -229,7 +240,7 @@ MISTAKES = [
     ("axel", {}, "did you mean 'axle'"),
     ("axle", REMOVE, "this section"),
     ("axle", 3.0, "a mapping"),
-    ("axle.load_N", -1.0, "above 0"),
+    ("axle.load_N", -1.0, "from 1 to"),
     ("axle.load_N", "90 kN", "a plain number"),
     ("axle.load_N", True, "a plain number"),
     ("axle.load_N", math.nan, "finite"),
@@ -251,7 +262,7 @@ MISTAKES = [
     ("rubber.dma_csv", "a\0b", "a readable CSV file"),
     ("rubber.dma_csv", REMOVE, "exactly one of dma_csv"),
     ("rubber.dma", {"temperature_degC": [1.0]}, "not both"),
-    ("rubber.density_kg_m3", 0.0, "above 0"),
+    ("rubber.density_kg_m3", 0.0, "from 100 to"),
     ("hydraulics", REMOVE, "exactly one of 'hydraulics' and 'torque_sensor'"),
     ("torque_sensor", {}, "exactly one of 'hydraulics' and 'torque_sensor'"),
     ("hydraulics.lines", ["main_a", "main_a"], "distinct"),
@@ -352,7 +363,7 @@ def test_broken_tables(tmp_path: Path) -> None:
         (head + "-90,1e6\n", "line 2"),
         (head + "-90,1e6,1e5\n90,1e6,1e5\n", "at least 3 rows"),
         (head + "-90,1e6,1e5\n95,1e6,1e5\n90,1e6,1e5\n", "strictly increasing"),
-        (head + "-90,1e6,1e5\n0,-1,1e5\n90,1e6,1e5\n", "above 0"),
+        (head + "-90,1e6,1e5\n0,-1,1e5\n90,1e6,1e5\n", "from 100 to"),
     ):
         table.write_text(text)
         with pytest.raises(VehicleFileError, match=expectation):
@@ -416,3 +427,143 @@ def test_any_bytes_give_a_vehicle_or_a_clear_error(noise: bytes, position: int) 
         except VehicleFileError as error:
             message = str(error)
         assert str(file) in message
+
+
+# ------------------------------------------------------------- plausibility
+
+
+@pytest.mark.parametrize("file", sorted(CONFIG.glob("*vehicle.yaml")) + sorted(CONFIG.glob("*example.yaml")), ids=lambda f: f.stem)
+def test_the_shipped_vehicles_raise_no_doubt(file: Path) -> None:
+    assert plausibility(load(file)) == ()
+
+
+IMPOSSIBLE = [
+    ("rubber.density_kg_m3", 1.12),
+    ("rubber.specific_heat_J_kgK", 1.75),
+    ("rubber.tread_thickness_m", 12e-6),
+    *((key, 1e-308) for key in (
+        "track.width_m", "friction.stiffness_Nm_per_deg", "rubber.density_kg_m3", "rubber.specific_heat_J_kgK",
+        "rubber.tread_thickness_m", "rubber.contact_area_m2",
+    )),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "value"), IMPOSSIBLE)
+def test_what_no_matter_can_be_is_refused(key: str, value: float) -> None:
+    with pytest.raises(VehicleFileError, match=f"key '{key}': got"):
+        from_mapping(changed(SHEET, key, value), FILE)
+
+
+UNLIKELY = [
+    ("friction.stiffness_Nm_per_deg", 5393.7e3),  # N m/deg from N mm/deg
+    ("friction.stiffness_Nm_per_deg", 5.3937),  # from kN m/deg
+    ("rubber.density_kg_m3", 112.0),
+    ("rubber.specific_heat_J_kgK", 418.0),  # from kcal
+    ("rubber.tread_thickness_m", 0.0012),
+    ("rubber.contact_area_m2", 42.0),  # from dm2
+    ("rubber.contact_area_m2", 0.0042),
+    ("track.weight_N", 62e3),
+    ("track.yaw_inertia_kgm2", 0.095),  # from t m2
+    ("axle.load_N", 90.0),  # from kN
+    ("axle.kingpin_inclination_deg", 40.0),
+    ("friction.reference_temperature_degC", -60.0),
+    ("sensors.pressure_range_Pa", 25e3),  # from kPa
+    ("sensors.pressure_noise_Pa", 1.5e7),
+    ("initial.air_temperature_degC", 77.0),  # from F
+]
+
+
+@pytest.mark.parametrize(("key", "value"), UNLIKELY)
+def test_what_no_real_vehicle_has_is_doubted_and_loads(key: str, value: float) -> None:
+    doubts = plausibility(from_mapping(changed(SHEET, key, value), FILE))
+    assert key in [doubt.key for doubt in doubts]
+    assert all("unlike any real vehicle" in doubt.statement for doubt in doubts)
+
+
+def test_other_rigs_may_be_of_any_size() -> None:
+    tiny = changed(changed(JOINT, "contact.static_torque_Nm", 1.2e-9), "contact.coulomb_torque_Nm", 1e-9)
+    assert plausibility(from_mapping(changed(tiny, "contact.stiffness_Nm_per_deg", 1e-9), FILE)) == ()
+
+
+def test_doubts_are_told_once_on_stderr_and_stand_in_the_result(tmp_path: Path) -> None:
+    text = FILE.read_text().replace("1120.0", "112.0").replace("rubber_dma", f"{CONFIG}/rubber_dma")
+    (tmp_path / "odd.yaml").write_text(text)
+    drive = "segments: [{hold: {duration_s: 1.0}}, {sweep: {to_deg: 1.0, rate_deg_s: 2.0}}]"
+    (tmp_path / "drive.yaml").write_text(drive)
+    odd, out = str(tmp_path / "odd.yaml"), str(tmp_path / "out")
+    done = CliRunner().invoke(app, ["vehicle", odd, "--json"])
+    (told,) = json.loads(done.stdout)["warnings"]
+    assert (told["key"], told["value"]) == ("rubber.density_kg_m3", 112.0)
+    assert done.stderr == f"lugre-steering: warning: {odd}: {told['statement']}\n"
+    assert CliRunner().invoke(app, ["simulate", str(tmp_path / "drive.yaml"), "--vehicle", odd, "--out", out]).stderr == done.stderr
+    with pytest.warns(ImplausibleWarning, match="112 kg/m3"):
+        load(odd)
+
+
+# ------------------------------------------------------------------ numbers
+
+
+@pytest.mark.parametrize("number", ["010", "1:30", "0x10", "1_000", "00.5", "0b1", "1e", "+-1"])
+def test_a_number_that_could_be_another_is_refused(tmp_path: Path, number: str) -> None:
+    file = tmp_path / "v.yaml"
+    text = FILE.read_text().replace("rubber_dma", f"{CONFIG}/rubber_dma")
+    file.write_text(text.replace("damping_ratio: 0.5", f"damping_ratio: {number}"))
+    with pytest.raises(VehicleFileError, match=r"'track\.damping_ratio': got .*expected a plain number"):
+        load(file)
+
+
+@pytest.mark.parametrize("number", ["1", "+1", "1.0", "1.", "0.1e1", "10e-1", "1E0", ".5e+0", "1.e0"])
+def test_decimal_numbers_are_what_they_show(tmp_path: Path, number: str) -> None:
+    (tmp_path / "n.yaml").write_text(f"a: {number}")
+    assert Reader(tmp_path / "n.yaml", VehicleFileError).load() == {"a": float(number)}
+
+
+def test_what_stands_in_a_file_named_as_table_is_not_shown(tmp_path: Path) -> None:
+    (tmp_path / "shadow").write_text("root:$6$secret:19000\n")
+    with pytest.raises(VehicleFileError) as caught:
+        from_mapping(changed(SHEET, "rubber.dma_csv", "shadow"), tmp_path / "v.yaml")
+    assert "secret" not in str(caught.value)
+    assert "temperature_degC" in str(caught.value)
+
+
+# -------------------------------------------------------------------- fuzz
+
+
+PARAMETERS = (CONFIG / "estimator_parameters.yaml").read_bytes()
+DRIVE = b"segments: [{hold: {duration_s: 1.0}}, {sweep: {to_deg: 1.0, rate_deg_s: 2.0}}]\n"
+PIECES = [b"&a ", b"*a", b"<<: ", b"[", b"]", b"{", b"}", b"- ", b"? ", b": ", b"!!int ", b"!x ", b"|\n", b"'", b'"', b"...\n", b"---\n",
+          b"%YAML 1.1\n", b"1e999", b"-0", b".nan", b"~", b"=", b"2020-01-01", b"\t", b"\xef\xbb\xbf", b"\x85", b"# "]  # fmt: skip
+hostile = st.lists(st.tuples(st.integers(0, 4000), st.sampled_from(PIECES) | st.binary(max_size=6)), min_size=1, max_size=4)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.sampled_from([(FILE.read_bytes(), load), (PARAMETERS, read_options), (DRIVE, from_yaml)]), hostile)
+def test_any_text_gives_a_result_or_one_line(given: tuple[bytes, Callable[[Path], Any]], inserted: list[tuple[int, bytes]]) -> None:
+    """Vehicle, parameter and manoeuvre files with YAML's own signs put anywhere."""
+    text, read = given
+    for at, piece in inserted:
+        at %= len(text)
+        text = text[:at] + piece + text[at:]
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", ImplausibleWarning)
+        shutil.copy(CONFIG / "rubber_dma_10hz.csv", folder)
+        (Path(folder) / "f.yaml").write_bytes(text)
+        said = "f.yaml"
+        try:
+            read(Path(folder) / "f.yaml")
+        except LugreSteeringError as error:
+            said = str(error)
+    assert "f.yaml" in said
+    assert "\n" not in said
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.sampled_from([path for path in paths(SHEET) if not isinstance(path[-1], int)]), st.floats() | st.integers(-(10**40), 10**40))
+def test_any_number_anywhere_gives_a_finite_sheet_or_one_line(path: tuple[Any, ...], number: float) -> None:
+    sheet = copy.deepcopy(SHEET)
+    node = sheet
+    for key in path[:-1]:
+        node = node[key]
+    node[path[-1]] = number
+    with suppress(VehicleFileError):
+        json.dumps(derive(from_mapping(sheet, FILE)), allow_nan=False)

@@ -39,8 +39,8 @@ from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estima
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import inspect
-from lugre_steering.earlier import earlier_result, write_record
 from lugre_steering.errors import DataError
+from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
@@ -137,30 +137,28 @@ def calibrate(
     ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
     """
     vehicle = load(vehicle_file)
-    earlier_result(out, "calibration.json", SCHEMA, FILES, vehicle_file)
-    recordings = read_recordings(bags, vehicle.channels, progress)
     calibrations = chosen(vehicle, free, fix, prior or {})
-    done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
-    result = {
-        "schema": SCHEMA,
-        "tool_version": __version__,
-        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        "bags": [str(bag) for bag in bags],
-        "vehicle": str(vehicle_file),
-        **done.result,
-    }
-    progress("writing")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        # The record comes first: if the rest is interrupted, it tells the next attempt that all this is ours.
-        write_record(result, out / "calibration.json")
-        for name in FILES:  # of an earlier run: they would not belong to this record
-            (out / name).unlink(missing_ok=True)
-        save(with_provenance(done.vehicle, result), out / "calibrated.yaml")
-        result["picture"], result["picture_note"] = _picture(done, out / "calibration.png")
-        write_record(result, out / "calibration.json")
-    except OSError as error:
-        raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
+    with output_folder(out):
+        earlier_result(out, "calibration.json", SCHEMA, FILES, vehicle_file)
+        recordings = read_recordings(bags, vehicle.channels, progress)
+        done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
+        result = {
+            "schema": SCHEMA,
+            "tool_version": __version__,
+            "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+            "bags": [str(bag) for bag in bags],
+            "vehicle": str(vehicle_file),
+            **done.result,
+        }
+        progress("writing")
+        try:
+            for name in FILES:  # of an earlier run: they would not belong to this record
+                (out / name).unlink(missing_ok=True)
+            save(with_provenance(done.vehicle, result), out / "calibrated.yaml")
+            result["picture"], result["picture_note"] = _picture(done, out / "calibration.png")
+            write_record(result, out / "calibration.json")
+        except OSError as error:
+            raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     return result
 
 

@@ -14,8 +14,11 @@ from typing import Any
 
 import numba
 from llvmlite import ir
-from numba import njit, types
+from numba import njit as njit  # for all that is compiled and kept: importing it from here arranges where and how
+from numba import types
 from numba.extending import intrinsic
+
+from lugre_steering.chain.cache import keep_safely
 
 
 def _keep_compiled_code() -> None:
@@ -51,6 +54,7 @@ def _cache_folders() -> Iterator[Path]:
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
     _keep_compiled_code()
+keep_safely()
 
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01

@@ -10,10 +10,10 @@ least squares on a banded system (Whittaker 1923 for the quadratic case; Geman a
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from lugre_steering.chain.compiled import njit
 from lugre_steering.recording import Array
 
 _DIFFERENCE = {1: (-1.0, 1.0), 3: (-1.0, 3.0, -3.0, 1.0)}

@@ -11,8 +11,8 @@ from typing import Any
 
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
 from lugre_steering.diagnosis.result import SCHEMA, picture_names
-from lugre_steering.earlier import earlier_result, not_ours, write_record
-from lugre_steering.errors import BagError, DataError, LugreSteeringError
+from lugre_steering.errors import BagError, DataError
+from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder, write_record
 from lugre_steering.vehicle import load, save
 
 STEPS = (
@@ -45,29 +45,24 @@ def run(
     for bag in bags:
         if not bag.exists():
             raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
-    pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
-    old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LugreSteeringError(
-            f"{out}: cannot be made: {error.strerror or error}; expected a writable folder"
-        ) from error
-    result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
-    try:
-        if old is not None:
-            _take_away_report(out, old)
-        write_record(result.json, out / "diagnosis.json")
-        save(result.vehicle, out / "augmented.yaml")
-    except OSError as error:
-        raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
-    if report:
-        progress("writing the report")
-        from lugre_steering.diagnosis.report.page import write_report
+    with output_folder(out):
+        pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
+        old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
+        result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
+        try:
+            if old is not None:
+                _take_away_report(out, old)
+            write_record(result.json, out / "diagnosis.json")
+            save(result.vehicle, out / "augmented.yaml")
+        except OSError as error:
+            raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
+        if report:
+            progress("writing the report")
+            from lugre_steering.diagnosis.report.page import write_report
 
-        note = write_report(result, out).note
-        if note:
-            print(f"lugre-steering: {note}", file=sys.stderr)
+            note = write_report(result, out).note
+            if note:
+                print(f"lugre-steering: {note}", file=sys.stderr)
     return result.json
 
 
@@ -76,6 +71,7 @@ def _take_away_report(out: Path, old: Mapping[str, Any]) -> None:
     try:
         names = [*(f"before_after_{bag}" for bag in old["bags"]), *(f"residual_{effect['id']}" for effect in old["effects"])]
     except (KeyError, TypeError):
-        raise not_ours(out / "diagnosis.json", "diagnosis.json") from None
+        raise not_ours(out / "diagnosis.json") from None
     for name in ("report.html", *picture_names([*names, "evidence", "heldout"])):
-        (out / name).unlink(missing_ok=True)
+        if is_ours(out / name):  # somebody may have put another there since
+            (out / name).unlink()

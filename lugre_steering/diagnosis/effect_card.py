@@ -22,12 +22,12 @@ from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.fingerprint import candidates
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.files import output_folder
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.command import make_folder
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
 from lugre_steering.vehicle import Vehicle
 
@@ -157,9 +157,8 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
         f"{values} (SI). Law: {effect.equation}. How it shows: {effect.trace}. Thin line: the part of the difference that "
         "recalibrating the baseline cannot imitate; only that part can be seen in a recording."
     )
-    make_folder(out)
     file = out / f"{effect.id}.png"
-    with figure(3 if along else 2, 1, caption, file, row_inches=2.2) as axes:
+    with output_folder(out), figure(3 if along else 2, 1, caption, file, row_inches=2.2) as axes:
         top, middle = axes[0, 0], axes[1, 0]
         top.plot(run.time, best.without * torque.scale, **MEASURED, label="without")
         top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label=f"with {effect.id}")

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -44,7 +45,11 @@ class SteeringTorqueEstimator(Node):
     def __init__(self, *, latency_window: int = LATENCY_WINDOW) -> None:
         super().__init__(NODE)
         self.settings = settings = declare(self)
-        self.vehicle = load(settings.vehicle_file)
+        with warnings.catch_warnings(record=True) as doubts:
+            warnings.simplefilter("always")
+            self.vehicle = load(settings.vehicle_file)
+        for doubt in doubts:
+            self.get_logger().warning(str(doubt.message))
         begin = time.monotonic()
         self.get_logger().info("loading compiled code (the first start compiles it, which takes up to a minute)")
         warm_up(self.vehicle, settings.options)

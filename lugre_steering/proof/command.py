@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import platform
 import secrets
 from collections.abc import Callable
@@ -18,6 +17,7 @@ import numpy
 import scipy
 
 from lugre_steering.errors import LugreSteeringError
+from lugre_steering.files import output_folder, refuse_foreign, write_record
 from lugre_steering.proof import campaign
 from lugre_steering.proof.blind import run_all, source_version
 from lugre_steering.proof.scoreboard import board
@@ -49,30 +49,28 @@ def run(
         chosen = campaign.matching(chosen, cases)
     if quick:
         chosen = campaign.quick(chosen)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LugreSteeringError(f"{out}: cannot be made: {error.strerror or error}; expected a writable folder") from error
     command = " ".join(
         ["lugre-steering prove --out DIR", f"--seed {seed}", *(["--quick"] if quick else []), *(["--peers"] if peers else [])]
         + ([f"--cases '{cases}'"] if cases is not None else [])
     )
     announce(f"{len(chosen)} cases, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
-    rows = run_all(
-        chosen, config_folder() / "test_vehicle.yaml", out / "cases.jsonl",
-        peers=peers, budget_s=QUICK_BUDGET_S if quick else None, progress=progress,
-    )  # fmt: skip
-    result = board(rows, {
-        "synthetic": True, "command": command, "seed": seed, "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
-        "planned_cases": len(chosen), "source": source_version(), "versions": _versions(),
-    })  # fmt: skip
-    (out / "scoreboard.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    try:
-        from lugre_steering.proof.figures import draw_all
-    except LugreSteeringError as error:  # raised where matplotlib is missing
-        announce(str(error))
-    else:
-        draw_all(result, out)
+    with output_folder(out):
+        refuse_foreign([out / "scoreboard.json"])
+        rows = run_all(
+            chosen, config_folder() / "test_vehicle.yaml", out / "cases.jsonl",
+            peers=peers, budget_s=QUICK_BUDGET_S if quick else None, progress=progress,
+        )  # fmt: skip
+        result = board(rows, {
+            "synthetic": True, "command": command, "seed": seed, "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+            "planned_cases": len(chosen), "source": source_version(), "versions": _versions(),
+        })  # fmt: skip
+        write_record(result, out / "scoreboard.json")
+        try:
+            from lugre_steering.proof.figures import draw_all
+        except LugreSteeringError as error:  # raised where matplotlib is missing
+            announce(str(error))
+        else:
+            draw_all(result, out)
     return result
 
 

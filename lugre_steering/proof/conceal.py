@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from lugre_steering.chain.compiled import njit
 from lugre_steering.errors import DataError
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from lugre_steering.chain.compiled import njit
 from lugre_steering.proof.rubber import LOWEST_DEGC, STEP_K, RubberTable
 from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle
 

@@ -7,10 +7,8 @@ A bag streams through in blocks; memory does not grow with its length.
 
 from __future__ import annotations
 
-import json
 import math
-import shutil
-import tempfile
+import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -23,14 +21,15 @@ import yaml
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
+from lugre_steering import yaml_text
 from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
 from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
-from lugre_steering.earlier import write_record
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
+from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
 from lugre_steering.live.plan import planned_angles
 from lugre_steering.online import Curves, Fit, Timeline, is_large, r2_words
 from lugre_steering.recording import NODE, Channel, Finding, IntArray, Kind, unused_name
@@ -63,7 +62,7 @@ def replay(
     Returns the summary. Raises ``BagError`` or ``VehicleFileError`` for input that is of no use.
     """
     vehicle = load(vehicle_file)
-    names = _names(bags, out)
+    names = _names(bags, out)  # before anything is made
     options = options or Options()
     summary: dict[str, Any] = {
         "schema": SCHEMA, "vehicle": str(vehicle_file), "torque_unit": vehicle.coordinate.force_unit,
@@ -71,13 +70,13 @@ def replay(
     }  # fmt: skip
     overall = Fit()
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        for path, name in zip(bags, names, strict=True):
-            run = _Run(path, name, vehicle, options)
-            summary["bags"].append(run.write(out, progress))
-            overall.merge(run.fit)
-            summary["overall"] = overall.result()
-            write_record(summary, out / "summary.json")
+        with output_folder(out):
+            for path, name in zip(bags, names, strict=True):
+                run = _Run(path, name, vehicle, options)
+                summary["bags"].append(run.write(out, progress))
+                overall.merge(run.fit)
+                summary["overall"] = overall.result()
+                write_record(summary, out / "summary.json")
     except OSError as error:
         raise BagError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     return summary
@@ -118,12 +117,11 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
             source = path.resolve()
             if source == result or source in result.parents or result in source.parents:
                 raise BagError(f"{path}: the result {out / name} would touch this bag; choose another --out")
-        if result.exists() and not _is_result(result):
-            raise _not_ours(out / name)
+        _refuse_foreign(out / name)
         picture = out / f"{name}.png"
-        if picture.exists() and not result.exists():  # ours only come with the bag
+        if picture.exists() and not is_ours(picture):
             raise _not_ours(picture)
-    if (out / "summary.json").exists() and not _is_summary(out / "summary.json"):
+    if (out / "summary.json").exists() and read_record(out / "summary.json", SCHEMA) is None:
         raise _not_ours(out / "summary.json")
     return names
 
@@ -132,19 +130,22 @@ def _not_ours(path: Path) -> BagError:
     return BagError(f"{path}: exists and is not an earlier result of replay; choose another --out")
 
 
-def _is_summary(file: Path) -> bool:
+def _refuse_foreign(folder: Path) -> None:
+    """``BagError`` unless nothing is there, or a bag written here and not one file beside it."""
+    if not os.path.lexists(folder):
+        return
     try:
-        return bool(json.loads(file.read_bytes())["schema"] == SCHEMA)
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
-
-
-def _is_result(folder: Path) -> bool:
-    try:
-        content = yaml.safe_load((folder / "metadata.yaml").read_bytes())
-        return bool(content["rosbag2_bagfile_information"]["custom_data"] == MARK)
-    except (OSError, yaml.YAMLError, KeyError, TypeError):
-        return False
+        content: Any = yaml_text.parse((folder / "metadata.yaml").read_text(encoding="utf-8"))
+        described = content["rosbag2_bagfile_information"]
+        own = {"metadata.yaml", *described["relative_file_paths"]}
+        ours = described["custom_data"] == MARK
+    except (OSError, ValueError, yaml.YAMLError, LookupError, TypeError):
+        ours = False
+    if not ours or folder.is_symlink():
+        raise _not_ours(folder)
+    for path in folder.iterdir():
+        if path.name not in own:
+            raise _not_ours(path)
 
 
 # -------------------------------------------------------------- one bag
@@ -169,22 +170,19 @@ class _Run:
 
     def write(self, out: Path, progress: Progress | None) -> dict[str, Any]:
         """Write the bag and the picture; returns the summary of this bag."""
-        with Bag(self.path) as bag, tempfile.TemporaryDirectory(prefix=".replay_", dir=out) as folder:
+        with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
             topics = bag.match(channels)
             for channel in self.vehicle.channels:
                 if channel.kind is Kind.ANGLE and channel not in topics:
                     found = ", ".join(sorted(bag.topics)) or "none"
                     raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
-            result = Path(folder) / self.name
             with BagWriter(result, custom_data=MARK) as writer:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
             if not self._counts["estimates"]:
                 raise BagError(f"{self.path}: no torque could be estimated ({self._counted(samples, Kind.ANGLE)})")
-            if (out / self.name).exists():
-                shutil.rmtree(out / self.name)
-            result.rename(out / self.name)
+            _refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
             findings = [*bag.findings, *self._found, *self._last_findings()]
         fit = self.fit.result()
         summary: dict[str, Any] = {

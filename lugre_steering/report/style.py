@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lugre_steering.errors import LugreSteeringError
+from lugre_steering.files import MAKER, refuse_foreign, replacing
 
 try:
     import matplotlib as mpl
@@ -71,9 +72,11 @@ def figure(
     """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to
     ``file``.
 
-    The caption is also the description inside the file. ``words`` is applied to all text (a linear axis has forces where
+    The caption is also the description inside the file, which says who made it: a picture of anybody else is never
+    replaced (``DataError``). ``words`` is applied to all text (a linear axis has forces where
     others have torques). The figure grows with its caption, so no line of it is ever cut off.
     """
+    refuse_foreign([file])
     lines = [
         line for paragraph in words(caption).split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]
     ]
@@ -92,6 +95,7 @@ def figure(
             fig.text(
                 0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333"
             )
-            fig.savefig(file, metadata={"Software": None, "Description": words(caption)})
+            with replacing(file) as stream:
+                fig.savefig(stream, format="png", metadata={"Software": MAKER, "Description": words(caption)})
         finally:
             plt.close(fig)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 from lugre_steering import units
@@ -14,10 +15,12 @@ from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.footprint import contact_lengths, peak_pressure
 from lugre_steering.vehicle.loads import load_moment, roller_loads, vertical_load
 from lugre_steering.vehicle.model import baseline_parameters
+from lugre_steering.vehicle.plausible import plausibility
 
 
 def derive(vehicle: Vehicle) -> dict[str, Any]:
-    """Quantities (name, value or values, unit) of one track or joint, the topics it listens to, and its effects."""
+    """Quantities (name, value or values, unit) of one track or joint, the topics it listens to, its effects, and what in it is
+    unlike any real vehicle."""
     quantities = [
         {"quantity": units.words(vehicle, name), "value": value, "unit": units.label(vehicle, unit)}
         for name, value, unit in (*_loads(vehicle), *_friction(vehicle), *_heat(vehicle))
@@ -27,7 +30,8 @@ def derive(vehicle: Vehicle) -> dict[str, Any]:
         for channel in vehicle.channels
     ]
     effects = [{"id": entry.id, "parameters": entry.parameters} for entry in vehicle.effects]
-    return {"vehicle": vehicle.name, "quantities": quantities, "inputs": inputs, "effects": effects}
+    warnings = [asdict(doubt) for doubt in plausibility(vehicle)]
+    return {"vehicle": vehicle.name, "quantities": quantities, "inputs": inputs, "effects": effects, "warnings": warnings}
 
 
 Quantity = tuple[str, float | list[float], str]
@@ -66,5 +70,5 @@ def _heat(vehicle: Vehicle) -> Iterator[Quantity]:
     values = baseline_parameters(vehicle)
     yield "heat capacity of the tread", values["heat_capacity"], "J/K"
     yield "warming while sliding, without cooling", values["coulomb_torque"] / values["heat_capacity"], "K/rad"
-    if values["cooling"] > 0.0:
-        yield "time constant of cooling", values["heat_capacity"] / values["cooling"], "s"
+    if values["cooling"] > 0.0 and math.isfinite(time := values["heat_capacity"] / values["cooling"]):
+        yield "time constant of cooling", time, "s"

@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.table import Table
 
 from lugre_steering.errors import DataError
+from lugre_steering.files import output_folder
 from lugre_steering.report import words
-from lugre_steering.simulate.command import make_folder
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.footprint import contact_lengths, ground_pressure, peak_pressure
 
@@ -37,6 +37,8 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
     for effect in result["effects"]:
         parameters = ", ".join(f"{name} = {words.number(value)}" for name, value in effect["parameters"].items())
         console.print(f"effect {effect['id']}: {parameters} (SI)")
+    for warning in result["warnings"]:
+        console.print(f"warning: {warning['statement']}")
 
 
 def draw_footprint(vehicle: Vehicle, out: Path) -> Path:
@@ -46,7 +48,6 @@ def draw_footprint(vehicle: Vehicle, out: Path) -> Path:
     axle, track, rubber = vehicle.axle, vehicle.track, vehicle.rubber
     if axle is None or track is None or rubber is None:
         raise DataError(f"{vehicle.name}: a footprint needs the sections 'axle', 'track' and 'rubber'")
-    make_folder(out)
     file = out / "footprint.png"
     area = rubber.contact_area_m2
     lengths, centres = contact_lengths(axle, track, area), np.array(track.rollers.x_m)
@@ -58,7 +59,7 @@ def draw_footprint(vehicle: Vehicle, out: Path) -> Path:
         f"{track.ground_pressure_exponent:g} along the track, linear across it; peak {peak_pressure(axle, track, area) / 1e5:.3g} bar. "
         "The torque counts each roller's load at its centre (lines from the hinge)."
     )
-    with figure(1, 1, caption, file, row_inches=3.6) as axes:
+    with output_folder(out), figure(1, 1, caption, file, row_inches=3.6) as axes:
         ax = axes[0, 0]
         filled = ax.contourf(x, track.hinge_offset_m + y, pressure / 1e5, levels=12, cmap="Blues")
         ax.figure.colorbar(filled, ax=ax, label="ground pressure (bar)")

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.errors import DataError
+from lugre_steering.files import output_folder, refuse_foreign, write_record
 from lugre_steering.recording import Kind
 from lugre_steering.report.available import no_pictures
 from lugre_steering.resources import config_folder
@@ -30,6 +30,8 @@ from lugre_steering.simulate.paper.outcome import Outcome
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import STORAGES, write_bag
 from lugre_steering.vehicle import Vehicle
+
+SCHEMA = "lugre_steering/experiment/1"
 
 
 def catalogue() -> list[tuple[str, str, str]]:
@@ -80,15 +82,16 @@ def run_manoeuvre(
     if folder.exists():  # said before the work, not after it
         raise DataError(f"{folder}: exists already; recordings are never overwritten, choose another --out")
     given = {name: value for name, value in sensing.items() if value is not None}
-    run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
-    make_folder(out)
-    label = f"{what}, vehicle '{vehicle.name}'"
-    write_bag(folder, run, label, storage)
     picture, note = out / f"{folder.name}.png", no_pictures()
-    if note is None:
-        from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
+    with output_folder(out):
+        refuse_foreign([picture])
+        run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
+        label = f"{what}, vehicle '{vehicle.name}'"
+        write_bag(folder, run, label, storage)
+        if note is None:
+            from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
 
-        draw_simulation(run, label, picture)
+            draw_simulation(run, label, picture)
     truth = run.truth
     return {
         "synthetic": True,
@@ -113,25 +116,21 @@ def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:
 
 def write_outcomes(what: str, outcomes: list[Outcome], out: Path) -> dict[str, Any]:
     """Table (CSV), result (JSON) and figure (PNG) of each experiment into ``out``; with several also a JSON of all."""
-    make_folder(out)
     results, note = [], no_pictures()
-    for outcome in outcomes:
-        results.append(outcome.to_json())
-        write_table(outcome, out / f"{outcome.name}.csv")
-        if note is None:
-            draw_outcome(outcome, out / f"{outcome.name}.png")
-        (out / f"{outcome.name}.json").write_text(json.dumps(results[-1], indent=2), encoding="utf-8")
-    result = {"passed": all(outcome.passed for outcome in outcomes), "picture_note": note, "experiments": results}
-    if what == ALL:
-        (out / f"{ALL}.json").write_text(json.dumps(result, indent=2), encoding="utf-8")
+    names = [*(outcome.name for outcome in outcomes), *([ALL] if what == ALL else [])]
+    with output_folder(out):
+        refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png"))
+        for outcome in outcomes:
+            results.append({"schema": SCHEMA, **outcome.to_json()})
+            write_table(outcome, out / f"{outcome.name}.csv")
+            if note is None:
+                draw_outcome(outcome, out / f"{outcome.name}.png")
+            write_record(results[-1], out / f"{outcome.name}.json")
+        passed = all(outcome.passed for outcome in outcomes)
+        result = {"schema": SCHEMA, "passed": passed, "picture_note": note, "experiments": results}
+        if what == ALL:
+            write_record(result, out / f"{ALL}.json")
     return result
-
-
-def make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError(f"{out}: cannot be made a folder ({error.strerror or error})") from error
 
 
 def show_catalogue(console: Console) -> None:

@@ -5,7 +5,6 @@ of its own."""
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
 from lugre_steering.errors import BagError
+from lugre_steering.files import new_folder
 from lugre_steering.recording import TRUTH, Array, IntArray, Kind
 from lugre_steering.simulate.run import Simulated
 from lugre_steering.simulate.sensors import nanoseconds
@@ -36,31 +36,29 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
     topic = np.repeat(np.arange(len(topics)), [stamp.size for _, _, stamp, _ in topics])
     within = np.concatenate([np.arange(stamp.size) for _, _, stamp, _ in topics])
     store = get_typestore(Stores.ROS2_JAZZY)
-    ours = False
     try:
-        writer = Writer(folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
-        if compress:
-            mode = CompressionMode.STORAGE if storage == "mcap" else CompressionMode.FILE
-            writer.set_compression(mode, CompressionFormat.ZSTD)
-        writer.set_custom_data("synthetic", label)
-        with writer:
-            ours = True
-            text = store.types[STRING](data=f"synthetic: {label}")
-            said = writer.add_connection(f"/{TRUTH}/label", STRING, typestore=store)
-            writer.write(said, START_NS, store.serialize_cdr(text, STRING))
-            # Both joints may share a topic.
-            by_name = {name: writer.add_connection(name, kind, typestore=store) for name, kind in dict(t[:2] for t in topics).items()}
-            connections = [by_name[name] for name, _, _, _ in topics]
-            for i in np.argsort(stamps, kind="stable"):
-                rows = topics[topic[i]][3]
-                writer.write(connections[topic[i]], int(stamps[i]), rows[within[i]].tobytes())
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with new_folder(folder) as filling:  # half a recording would stand in the way of the next attempt
+            writer = Writer(filling, version=9, storage_plugin=StoragePlugin[storage.upper()])
+            if compress:
+                mode = CompressionMode.STORAGE if storage == "mcap" else CompressionMode.FILE
+                writer.set_compression(mode, CompressionFormat.ZSTD)
+            writer.set_custom_data("synthetic", label)
+            with writer:
+                text = store.types[STRING](data=f"synthetic: {label}")
+                said = writer.add_connection(f"/{TRUTH}/label", STRING, typestore=store)
+                writer.write(said, START_NS, store.serialize_cdr(text, STRING))
+                # Both joints may share a topic.
+                kinds = dict(t[:2] for t in topics)
+                by_name = {name: writer.add_connection(name, kind, typestore=store) for name, kind in kinds.items()}
+                connections = [by_name[name] for name, _, _, _ in topics]
+                for i in np.argsort(stamps, kind="stable"):
+                    rows = topics[topic[i]][3]
+                    writer.write(connections[topic[i]], int(stamps[i]), rows[within[i]].tobytes())
     except WriterError as error:
-        raise BagError(f"{folder}: {str(error).removeprefix(f'{folder} ')}") from error
+        raise BagError(f"{folder}: {error}") from error
     except OSError as error:
         raise BagError(f"{folder}: cannot be written ({error.strerror or error})") from error
-    finally:
-        if ours and not (folder / "metadata.yaml").exists():  # half a recording would stand in the way of the next attempt
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 _Topic = tuple[str, str, IntArray, Bytes]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,34 @@ from typing import Any
 import numpy as np
 import yaml
 
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.errors import ImplausibleWarning, VehicleFileError
+from lugre_steering.files import MAKER, VEHICLE_MARK, write_text
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
 from lugre_steering.vehicle.effects import each_once, with_effects
+from lugre_steering.vehicle.plausible import plausibility
 from lugre_steering.vehicle.sections import Initial, Vehicle
 from lugre_steering.vehicle.tables import embed_tables, with_pavement
 
 SCHEMA = "lugre_steering/vehicle/1"
+END = "..."
+"""YAML's own sign for the end of a document."""
 
 
 def load(path: str | Path) -> Vehicle:
-    """Read and check a vehicle file; relative paths in it are relative to the file."""
+    """Read and check a vehicle file; relative paths in it are relative to the file.
+
+    What is possible and unlike any real vehicle is warned of (``ImplausibleWarning``).
+    """
     file = Path(path)
-    return from_mapping(Reader(file, VehicleFileError).load(), file)
+    reader = Reader(file, VehicleFileError)
+    text = reader.text()
+    if text.startswith(VEHICLE_MARK) and text.split()[-1] != END:
+        raise VehicleFileError(f"{file}: is cut off: a file that {MAKER} has written ends with the line '{END}'")
+    vehicle = from_mapping(reader.parse(text), file)
+    for doubt in plausibility(vehicle):
+        warnings.warn(f"{file}: {doubt.statement}", ImplausibleWarning, stacklevel=2)
+    return vehicle
 
 
 def from_mapping(data: object, file: Path) -> Vehicle:
@@ -49,10 +64,12 @@ def _with_initial(vehicle: Vehicle) -> Vehicle:
 
 
 def save(vehicle: Vehicle, path: str | Path) -> None:
-    """Write a vehicle file that stands alone; keys left at None and empty defaults are not written."""
-    Path(path).write_text(
-        yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120), encoding="utf-8"
-    )
+    """Write a vehicle file that stands alone; keys left at None and empty defaults are not written.
+
+    Its first and last lines tell who wrote it and that nothing is missing: most of its beginnings would be valid vehicles.
+    """
+    content = yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120)
+    write_text(f"{VEHICLE_MARK}; not whole without the three dots of its last line\n{content}{END}\n", Path(path))
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:

@@ -1,6 +1,10 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The sections of a vehicle file, each a frozen dataclass whose fields carry their ranges, and the vehicle made of them."""
+"""The sections of a vehicle file, each a frozen dataclass whose fields carry their ranges, and the vehicle made of them.
+
+The ranges end where no matter and no machine can be (a solid of 1 kg/m3, a tread of a few wavelengths of light). What is
+possible and yet unlike any real vehicle is the business of ``plausible.py``.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +23,11 @@ SIDES = ("left", "right")
 class Axle:
     """The steered axle; ``load_N`` without the track assemblies."""
 
-    load_N: float = positive(1e7)
+    load_N: float = quantity(1.0, 1e7)
     kingpin_inclination_deg: float = quantity(0.0, 45.0)
     kingpin_lever_arm_m: float = quantity(-1.0, 1.0)
-    wheelbase_m: float = positive(50.0)
-    kingpin_distance_m: float = positive(20.0)
+    wheelbase_m: float = quantity(0.01, 50.0)
+    kingpin_distance_m: float = quantity(0.01, 20.0)
 
 
 @dataclass(frozen=True)
@@ -55,9 +59,9 @@ class Track:
 
     rollers: Rollers
     weight_N: float = quantity(0.0, 1e6)
-    width_m: float = positive(5.0)
+    width_m: float = quantity(1e-3, 5.0)
     hinge_offset_m: float = quantity(-5.0, 5.0)
-    yaw_inertia_kgm2: float = positive(1e5)
+    yaw_inertia_kgm2: float = quantity(1e-6, 1e5)
     ground_pressure_exponent: float = quantity(2.0, 4.0, default=3.0)
     damping_ratio: float = quantity(0.0, 10.0, default=0.5)
 
@@ -66,12 +70,12 @@ class Track:
 class Friction:
     """Rubber on the pavement at ``reference_temperature_degC``; levels left out are those of the named pavement."""
 
-    stiffness_Nm_per_deg: float = positive(1e7)
-    stribeck_speed_deg_s: float = positive(1e3)
+    stiffness_Nm_per_deg: float = quantity(1e-3, 1e7)
+    stribeck_speed_deg_s: float = quantity(1e-6, 1e3)
     reference_temperature_degC: float = quantity(-80.0, 150.0)
     pavement: str = "unnamed"
-    static: float | None = positive(3.0, default=None)
-    coulomb: float | None = positive(3.0, default=None)
+    static: float | None = quantity(1e-3, 3.0, default=None)
+    coulomb: float | None = quantity(1e-3, 3.0, default=None)
     stribeck_exponent: float = positive(10.0, default=2.0)
     temperature_law: str = "loss_over_modulus"
 
@@ -80,10 +84,10 @@ class Friction:
 class Contact:
     """Friction of a single joint given directly as torques (in place of axle, track and friction)."""
 
-    static_torque_Nm: float = positive(1e8)
-    coulomb_torque_Nm: float = positive(1e8)
-    stiffness_Nm_per_deg: float = positive(1e9)
-    stribeck_speed_deg_s: float = positive(1e3)
+    static_torque_Nm: float = quantity(1e-12, 1e8)
+    coulomb_torque_Nm: float = quantity(1e-12, 1e8)
+    stiffness_Nm_per_deg: float = quantity(1e-12, 1e9)
+    stribeck_speed_deg_s: float = quantity(1e-9, 1e3)
     stribeck_exponent: float = positive(10.0, default=2.0)
     presliding_damping_Nms: float = quantity(0.0, 1e8, default=0.0)
     reference_temperature_degC: float = quantity(-80.0, 150.0, default=15.0)
@@ -94,8 +98,8 @@ class Contact:
 class Wlf:
     """Williams-Landel-Ferry shift log10 aT = -c1 (T - Tr) / (c2 + T - Tr)."""
 
-    c1: float = positive(100.0)
-    c2_K: float = positive(1000.0)
+    c1: float = quantity(0.1, 100.0)
+    c2_K: float = quantity(0.1, 1000.0)
     reference_degC: float = quantity(-150.0, 300.0)
 
 
@@ -104,28 +108,28 @@ class DmaTable:
     """Dynamic mechanical analysis at one frequency: temperature [degC], storage and loss modulus [Pa]."""
 
     temperature_degC: tuple[float, ...] = quantity(-200.0, 400.0)
-    storage_modulus_Pa: tuple[float, ...] = positive(1e13)
-    loss_modulus_Pa: tuple[float, ...] = positive(1e13)
+    storage_modulus_Pa: tuple[float, ...] = quantity(100.0, 1e13)
+    loss_modulus_Pa: tuple[float, ...] = quantity(0.01, 1e13)
 
 
 @dataclass(frozen=True)
 class MasterCurve:
     """Master curve at the WLF reference temperature: frequency [Hz], storage and loss modulus [Pa]."""
 
-    frequency_Hz: tuple[float, ...] = positive(1e30)
-    storage_modulus_Pa: tuple[float, ...] = positive(1e13)
-    loss_modulus_Pa: tuple[float, ...] = positive(1e13)
+    frequency_Hz: tuple[float, ...] = quantity(1e-40, 1e40)
+    storage_modulus_Pa: tuple[float, ...] = quantity(100.0, 1e13)
+    loss_modulus_Pa: tuple[float, ...] = quantity(0.01, 1e13)
 
 
 @dataclass(frozen=True)
 class Rubber:
     """Tread rubber: a DMA table (or a master curve) and the heat balance of the tread layer."""
 
-    dma_frequency_Hz: float = positive(1e6)
-    density_kg_m3: float = positive(1e5)
-    specific_heat_J_kgK: float = positive(1e5)
-    tread_thickness_m: float = positive(1.0)
-    contact_area_m2: float = positive(100.0)
+    dma_frequency_Hz: float = quantity(1e-6, 1e6)
+    density_kg_m3: float = quantity(100.0, 1e4)
+    specific_heat_J_kgK: float = quantity(100.0, 2e4)
+    tread_thickness_m: float = quantity(1e-4, 1.0)
+    contact_area_m2: float = quantity(1e-6, 100.0)
     heat_transfer_W_m2K: float = quantity(0.0, 1e5)
     wlf: Wlf | None = None
     dma: DmaTable | None = None
@@ -149,7 +153,7 @@ class Cylinder:
     rod: str
     chassis_m: tuple[float, ...] = quantity(-10.0, 10.0)
     knuckle_m: tuple[float, ...] = quantity(-10.0, 10.0)
-    bore_m: float = positive(2.0)
+    bore_m: float = quantity(1e-4, 2.0)
     rod_m: float = quantity(0.0, 2.0)
 
 
@@ -162,7 +166,7 @@ class Hydraulics:
 @dataclass(frozen=True)
 class TorqueSensor:
     topic: str = "steering/measured_torque"
-    noise_Nm: float = positive(1e6, default=1.0)
+    noise_Nm: float = quantity(1e-15, 1e6, default=1.0)
 
 
 @dataclass(frozen=True)
@@ -175,7 +179,7 @@ class Sensors:
     angle_resolution_deg: float = quantity(0.0, 10.0, default=0.0)
     angle_noise_deg: float = quantity(0.0, 10.0, default=0.01)
     pressure_reference: str = "gauge"
-    pressure_range_Pa: float = positive(1e9, default=40.0e6)
+    pressure_range_Pa: float = quantity(1.0, 1e9, default=40.0e6)
     pressure_noise_Pa: float = quantity(0.0, 1e8, default=1.5e4)
     pressure_gain: float = quantity(0.5, 2.0, default=1.0)
     angle_from: str | None = None

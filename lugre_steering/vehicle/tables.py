@@ -10,10 +10,13 @@ from typing import Any
 
 import yaml
 
+from lugre_steering.files import read_text
 from lugre_steering.resources import config_folder
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
 
+LONGEST_TABLE = 1_000_000
+"""Bytes. A measured table has some thousand."""
 _TABLES = {
     "dma_csv": ("dma", ("temperature_degC", "storage_modulus_Pa", "loss_modulus_Pa")),
     "master_curve_csv": ("master_curve", ("frequency_Hz", "storage_modulus_Pa", "loss_modulus_Pa")),
@@ -39,13 +42,14 @@ def _read_table(reader: Reader, key: str, name: object, columns: tuple[str, ...]
         raise reader.fail(key, name, "the path of a CSV file")
     path = reader.file.parent / name
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()  # spreadsheets begin with a byte order mark
+        lines = read_text(path, LONGEST_TABLE).removeprefix("\ufeff").splitlines()  # spreadsheets begin with a byte order mark
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
         raise reader.fail(key, name, f"a readable CSV file ({path}: {error})") from error
     rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
     header = [cell.strip() for cell in rows[0][1].split(",")] if rows else []
     if any(column not in header for column in columns):
-        raise reader.fail(key, ",".join(header), f"{path} to have the columns {', '.join(columns)}")
+        # What else the file holds may be nobody's business.
+        raise reader.fail(key, name, f"a CSV file whose first line names the columns {', '.join(columns)} (this is {path})")
     table: dict[str, list[float]] = {column: [] for column in columns}
     for number, line in rows[1:]:
         cells = line.split(",")

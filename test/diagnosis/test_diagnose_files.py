@@ -13,6 +13,7 @@ from lugre_steering.bag import BagWriter, Part, cdr
 from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis.command import run
 from lugre_steering.errors import LugreSteeringError
+from lugre_steering.files import MARKS
 from lugre_steering.recording import Kind
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre
@@ -43,11 +44,11 @@ def parked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_file_that_cannot_be_written_is_named(parked: Path, tmp_path: Path) -> None:
+def test_a_folder_in_the_place_of_a_result_is_named(parked: Path, tmp_path: Path) -> None:
     run([parked], SHEET, tmp_path, report=False)
     (tmp_path / "augmented.yaml").unlink()
     (tmp_path / "augmented.yaml").mkdir()
-    with pytest.raises(LugreSteeringError, match=r"augmented\.yaml: cannot be written"):
+    with pytest.raises(LugreSteeringError, match=r"augmented\.yaml: exists and is not part of"):
         run([parked], SHEET, tmp_path, report=False)
 
 
@@ -81,11 +82,21 @@ def test_the_report_of_an_earlier_diagnosis_is_taken_away_and_nothing_else(parke
     (tmp_path / "diagnosis.json").write_text(json.dumps(earlier), encoding="utf-8")
     old = ["report.html", "before_after_a_run.png", "residual_end_stop.png", "evidence.png", "heldout.png"]
     others = ["my_report.html", "notes.txt", "before_after_mine.png", "residual_mine.png", "residual_end_stop.csv"]
-    for name in (*old, *others):
+    for name in old:
+        (tmp_path / name).write_bytes(b"..." + MARKS[Path(name).suffix])
+    for name in others:
         (tmp_path / name).write_text("old", encoding="utf-8")
     run([parked], SHEET, tmp_path, report=False)
     assert not any((tmp_path / name).exists() for name in old)
     assert all((tmp_path / name).is_file() for name in others)
+
+
+def test_a_report_that_somebody_put_in_its_place_stays(parked: Path, tmp_path: Path) -> None:
+    run([parked], SHEET, tmp_path, report=False)
+    (tmp_path / "report.html").write_text("mine", encoding="utf-8")
+    with pytest.raises(LugreSteeringError, match=r"report\.html: exists and is not part of an earlier result"):
+        run([parked], SHEET, tmp_path, report=False)
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == "mine"
 
 
 @pytest.mark.parametrize("content", ['{"mine": 1}', '{"schema": "other/1", "bags": [], "effects": []}', "[]", "no json"])

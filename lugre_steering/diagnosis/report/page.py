@@ -22,6 +22,7 @@ from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.files import write_text
 from lugre_steering.fitting.problem import calibrations_for
 from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle
@@ -72,7 +73,7 @@ def write_report(diagnosis: Diagnosis, folder: Path) -> Written:
         if not library:
             notes.append("interactive plots need plotly")
         page = folder / "report.html"
-        page.write_text(render(diagnosis, library, pictures), encoding="utf-8")
+        write_text(render(diagnosis, library, pictures), page)
     except OSError as error:
         raise DataError(f"{folder}: the report cannot be written ({error.strerror or error})") from error
     note = f"report: {'; '.join(notes)}: install 'lugre_steering[report]'" if notes else None

@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from lugre_steering import units
+from lugre_steering.chain.compiled import njit
 from lugre_steering.fitting.fit import Fit, fit, normalised
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from lugre_steering.files import head, not_ours, write_text
 from lugre_steering.simulate.paper.outcome import Outcome
 
 
@@ -42,11 +44,14 @@ def draw_outcome(outcome: Outcome, file: Path) -> None:
 
 
 def write_table(outcome: Outcome, file: Path) -> None:
-    """The table as CSV."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(outcome.columns)
-        writer.writerows([[f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in outcome.rows])
+    """The table as CSV. A file there of anybody else, which has other columns, is not replaced (``DataError``)."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(outcome.columns)
+    if file.exists() and not head(file).startswith(text.getvalue().encode()):
+        raise not_ours(file)
+    writer.writerows([[f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in outcome.rows])
+    write_text(text.getvalue(), file)
 
 
 def outcome_table(outcome: Outcome) -> Table:

@@ -1,0 +1,115 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled code kept between runs, sealed: what a power cut or a full disk leaves of it is told and made anew, never run.
+
+Numba believes whatever lies in its cache: an empty or cut file stops every later start, a flipped byte in the machine code may
+do anything. So each file ends with the hash of what stands before it, which Numba, a reader of pickles, does not see.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+import numba
+from numba.core import caching, dispatcher
+
+_SEAL = hashlib.sha256
+_SEAL_BYTES = _SEAL().digest_size
+_told: set[str] = set()
+
+
+class _DamagedError(Exception):
+    """A kept file is not what was written."""
+
+
+class _SealedFile(caching.IndexDataCacheFile):
+    """Index and data files of one function, each sealed when written and looked at before it is read."""
+
+    def _load_index(self) -> Any:
+        _check(self._index_path)
+        return super()._load_index()
+
+    def _load_data(self, name: str) -> Any:
+        _check(self._data_path(name))
+        return super()._load_data(name)
+
+    @contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:
+        with super()._open_for_write(filepath) as file:
+            yield file
+            file.flush()
+            file.write(_SEAL(Path(file.name).read_bytes()).digest())
+            file.flush()
+            os.fsync(file.fileno())
+
+    def discard(self) -> None:
+        """Without its index nothing of a function counts as kept."""
+        with suppress(OSError):
+            os.unlink(self._index_path)
+
+
+class _KeptCode(caching.FunctionCache):
+    """Numba's cache of one function; no trouble with its files ever reaches the caller, who then compiles."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file: _SealedFile = _SealedFile(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling what another version has sealed may raise anything
+            _tell(f"the code kept in {_folder()} is damaged or cannot be read: it is compiled anew")
+            self._cache_file.discard()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except (OSError, _DamagedError) as error:
+            _tell(f"compiled code cannot be kept in {_folder()} ({getattr(error, 'strerror', error)}): every start compiles")
+
+
+def keep_safely() -> None:
+    """Let Numba keep the functions of this package sealed, and do without where there is no place to keep them."""
+    plain = caching.FunctionCache
+
+    def cache_of(function: Callable[..., Any]) -> Any:
+        if not function.__module__.startswith("lugre_steering"):
+            return plain(function)
+        with suppress(RuntimeError, OSError):  # no folder can be written
+            kept = _KeptCode(function)
+            # Elsewhere Numba would run stale code after an edit of what a function calls.
+            if _folder() and kept.cache_path.startswith(_folder()):
+                return kept
+        _tell(f"compiled code cannot be kept in {_folder() or 'any folder'}: every start compiles")
+        return caching.NullCache()
+
+    dispatcher.FunctionCache = cache_of  # type: ignore[attr-defined]
+
+
+def _folder() -> str:
+    return str(numba.config.CACHE_DIR)  # type: ignore[attr-defined]
+
+
+def _check(path: str) -> None:
+    """Nothing if the file is whole; ``_DamagedError`` if not. One that is not there is Numba's business."""
+    try:
+        content = Path(path).read_bytes()
+    except FileNotFoundError:
+        return
+    if len(content) <= _SEAL_BYTES or _SEAL(content[:-_SEAL_BYTES]).digest() != content[-_SEAL_BYTES:]:
+        raise _DamagedError(f"{path}: damaged")
+
+
+def _tell(text: str) -> None:
+    """One line, once: all functions lie in one folder."""
+    if text not in _told:
+        _told.add(text)
+        print(f"lugre-steering: {text}", file=sys.stderr)

@@ -1,0 +1,95 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever a power cut or a full disk makes of kept compiled code: the same results, and one line that says so."""
+
+from __future__ import annotations
+
+import builtins
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import pytest
+from numba.core import caching
+
+from lugre_steering.chain import cache, compiled  # noqa: F401 (the chain as it keeps its code)
+from lugre_steering.chain.lag import lag_weights as law
+
+DAMAGED = "is damaged or cannot be read: it is compiled anew"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(cache, "_told", set())
+    return tmp_path
+
+
+def start() -> int:
+    """What the next process would do with a law of the chain; returns how often kept code was used."""
+    started = numba.njit(cache=True)(law.py_func)
+    started(0.01, 0.1)
+    return sum(started.stats.cache_hits.values())
+
+
+def flip(content: bytes) -> bytes:
+    i = len(content) // 2
+    return content[:i] + bytes([content[i] ^ 0x10]) + content[i + 1 :]
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda _: b"",
+        lambda content: content[: len(content) // 2],
+        lambda content: content[:-1],
+        lambda content: bytes(len(content)),
+        lambda content: os.urandom(len(content)),
+        lambda content: content[:64] + bytes(len(content) - 64),
+        flip,
+    ],
+    ids=["empty", "half", "one_less", "zeros", "garbage", "zeros_from_64", "one_bit"],
+)
+def test_damaged_code_is_made_anew(
+    folder: Path, capsys: pytest.CaptureFixture[str], kind: str, damage: Callable[[bytes], bytes]
+) -> None:
+    assert [start(), start()] == [0, 1]
+    (file,) = folder.rglob(f"*.{kind}")
+    file.write_bytes(damage(file.read_bytes()))
+    assert capsys.readouterr().err == ""
+    assert start() == 0
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert DAMAGED in said
+    assert start() == 1
+
+
+def test_a_lost_file_is_made_anew_without_a_word(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    start()
+    next(folder.rglob("*.nbc")).unlink()
+    assert [start(), start()] == [0, 1]
+    assert capsys.readouterr().err == ""
+
+
+def test_a_disk_that_is_full_costs_the_cache_only(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(name: str, mode: str = "r") -> object:
+        return builtins.open("/dev/full" if "w" in mode else name, mode)
+
+    monkeypatch.setattr(caching, "open", full, raising=False)
+    assert [start(), start()] == [0, 0]
+    said = capsys.readouterr().err
+    assert said == f"lugre-steering: compiled code cannot be kept in {folder} (No space left on device): every start compiles\n"
+
+
+def test_without_a_folder_the_program_runs_and_says_so() -> None:
+    code = "import lugre_steering.chain.step; print('ready')"
+    env = {**os.environ, "NUMBA_CACHE_DIR": "/proc/nowhere"}  # no user, not even root, can make it
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=120, check=True)
+    assert done.stdout == "ready\n"
+    assert done.stderr == "lugre-steering: compiled code cannot be kept in /proc/nowhere: every start compiles\n"
