@@ -20,7 +20,7 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 CHUNK_LIMIT = 128 << 20  # bytes of one chunk, packed or not: read at once, and a few copies of it must fit into memory
 MESSAGE_LIMIT = 64 << 20  # bytes of one message: more than any camera or laser sends
 _FED, _STEP = 1 << 16, 1 << 17  # bytes given to a codec, and taken from it, at a time (zstd makes blocks of 128 kB)
-_FREE, _RATIO = 1 << 30, 100  # far more than recordings of sensors unpack to, which shrink to a tenth at best
+_FREE, _RATIO = 512 << 20, 30  # recordings of sensors shrink to a tenth at best
 
 
 class TooLargeError(Exception):
@@ -36,6 +36,7 @@ class Allowance:
     def spend(self, size: int) -> None:
         """Take ``size`` bytes off."""
         if size > self._left:
+            self._left = 0
             raise TooLargeError(f"they unpack to more than the {self._total >> 20} MB that a file of this size may")
         self._left -= size
 

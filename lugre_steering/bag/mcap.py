@@ -51,6 +51,7 @@ _PIECE = 1 << 20  # bytes of messages outside chunks that are read at a time
 _KEPT = 1 << 16  # bytes
 _SUMMARY_LIMIT = 256 << 20  # bytes; one of a recording of 100 GB has some 50 MB
 _TOPICS_LIMIT = 64 << 20  # bytes of all definitions and descriptions of topics
+_MOST_REPORTED = 30  # findings of one file
 _NO_HEADS = np.empty(0, MESSAGE_HEAD)
 _MESSAGE_COST = 500  # a message costs as much time as this many bytes
 
@@ -69,11 +70,14 @@ class _Run(NamedTuple):
 
 
 class _DamageError(Exception):
-    """Why a chunk cannot be used as it is, and the bytes in which some of its records may still be found."""
+    """Why a chunk cannot be used as it is, and the bytes in which some of its records may still be found.
 
-    def __init__(self, reason: str, remains: Data = b"") -> None:
+    Where nothing tells which of them are hurt (not ``located``), they count only if damage is found between them.
+    """
+
+    def __init__(self, reason: str, remains: Data = b"", *, located: bool = True) -> None:
         super().__init__(reason)
-        self.remains = remains
+        self.remains, self.located = remains, located
 
 
 class _Fields:
@@ -121,8 +125,11 @@ def _contents(data: bytes) -> Iterator[tuple[int, bytes]]:
 class McapFile:
     """One MCAP file; ``number`` gives the index of a topic among those of all files of the bag."""
 
-    def __init__(self, path: Path, number: Callable[[Connection], int], findings: list[Finding]) -> None:
+    def __init__(
+        self, path: Path, number: Callable[[Connection], int], findings: list[Finding], *, unpacked: bool = False
+    ) -> None:
         self.path, self._number, self.findings = path, number, findings
+        self._unpacked = unpacked  # from a compressed file, where damage has no edges
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._index = np.full(1 << 16, -1, np.int32)  # MCAP channel number -> index of the connection
         self._known = np.zeros(1 << 16, np.bool_)
@@ -132,6 +139,7 @@ class McapFile:
         self._cut: int | None = None  # where a file without its proper end stops making sense
         self._promised: int | None = None  # messages, as the file says
         self._kept, self._kept_at = b"", 0
+        self._reported: set[str] = set()
         self._learned = 0  # bytes of topics and schemas
         self._file = path.open("rb")
         self._size = path.stat().st_size
@@ -154,17 +162,17 @@ class McapFile:
         return [(run.begin_ns, self._load(run)) for run in self._runs]
 
     def _load(self, run: _Run) -> Iterator[Messages]:
-        reason, checked = "its records are damaged", True
+        reason, whole, believed = "its records are damaged", True, True
         try:
             data = self._open_chunk(run) if run.is_chunk else self._read(run.offset, run.size)
         except _DamageError as damage:
-            reason, checked, data = str(damage), False, damage.remains
+            reason, whole, believed, data = str(damage), False, damage.located, damage.remains
         starts, broken = self._find(data, torn=run.torn)
         try:
             self._allowance.spend(_MESSAGE_COST * len(starts))
         except TooLargeError as error:
-            reason, starts, checked = str(error), array("q"), False
-        if not checked and not broken:  # nothing tells where between the records the damage is
+            reason, starts, whole = str(error), array("q"), False
+        if not believed and not broken:
             starts = array("q")
         messages, foreign = self._messages(data, starts)
         seen = len(starts)
@@ -173,7 +181,7 @@ class McapFile:
         if run.messages is not None and seen < run.messages:
             lost = f"{run.messages - seen} of {run.messages} messages of {where}{since} are lost: {reason}"
             self._report(lost)
-        elif not checked or broken:
+        elif not whole or broken:
             kept = f"; the {seen} messages that can still be told apart were kept" if seen else ""
             self._report(f"{where} cannot be read in full: {reason}{kept}")
         if foreign:
@@ -191,9 +199,12 @@ class McapFile:
         return (run.begin_ns - self.begin_ns) / 1e9
 
     def _report(self, statement: str) -> None:
-        finding = Finding("damaged_bag", "", f"{self.path.name}: {statement}")
-        if finding not in self.findings:  # a bag may be read more than once
-            self.findings.append(finding)
+        if statement not in self._reported:  # a bag may be read more than once
+            self._reported.add(statement)
+            if len(self._reported) == _MOST_REPORTED:
+                statement = "there is more damage like this"
+            if len(self._reported) <= _MOST_REPORTED:
+                self.findings.append(Finding("damaged_bag", "", f"{self.path.name}: {statement}"))
 
     def _read(self, offset: int, size: int) -> bytes:
         self._file.seek(offset)
@@ -216,20 +227,24 @@ class McapFile:
             if plain_size > CHUNK_LIMIT:
                 raise _DamageError(f"it says to unpack to {plain_size >> 20} MB, expected at most {CHUNK_LIMIT >> 20}")
             try:
-                data = expand(data, compression, plain_size, self._allowance, torn=run.torn)
+                data, damage = expand(data, compression, plain_size, self._allowance)
             except TooLargeError as error:
                 raise _DamageError(f"its {compression} data are no recording ({error})") from error
-            except Exception as error:  # whatever a codec raises on damaged bytes
-                raise _DamageError(f"its {compression} data are damaged ({error})") from error
-        remains = b"" if compression else data  # of unpacked damage nothing can be believed
+            if damage and not run.torn:
+                raise _DamageError(f"its {compression} data are damaged ({damage})", data)
+        # Of what damaged data unpack to, nothing can be believed.
+        remains = b"" if compression or self._unpacked else data
         if not run.torn and len(data) != plain_size:
-            raise _DamageError(f"it holds {len(data)} bytes instead of {plain_size}", remains)
+            raise _DamageError(f"it holds {len(data)} bytes instead of {plain_size}", remains, located=False)
         if not run.torn and crc and zlib.crc32(data) != crc:
-            raise _DamageError("its checksum does not match", remains)
+            raise _DamageError("its checksum does not match", remains, located=False)
         return data
 
     def _find(self, data: Data, *, torn: bool) -> tuple[array[int], bool]:
-        """Where the messages begin, and whether there is damage between them. Learns topics on the way."""
+        """Where the messages begin, and whether there is damage between them. Learns topics on the way.
+
+        In unpacked ``data`` (a bytearray) nothing behind the damage is worth a search.
+        """
         starts = array("q")
         at, end = 0, len(data)
         unpack, head, least = RECORD.unpack_from, RECORD.size, MESSAGE_HEAD.itemsize - RECORD.size
@@ -247,6 +262,8 @@ class McapFile:
             at = after
         if at == end:
             return starts, False
+        if isinstance(data, bytearray):
+            return starts if torn else starts[:-1], not torn
         starts, broken = array("q"), False
         for record in records(lambda at, size: data[at : at + size], 0, end, self._known):
             broken |= record.op == GAP or (record.after > end and not torn)

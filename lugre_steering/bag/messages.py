@@ -117,13 +117,14 @@ def inflated(messages: Messages, allowance: Allowance) -> Iterator[tuple[Message
         raw = messages.bytes_of(i)
         if i in compressed:
             try:
-                raw = bytes(expand(raw, "zstd", MESSAGE_LIMIT, allowance))
+                plain, damage = expand(raw, "zstd", MESSAGE_LIMIT, allowance)
             except TooLargeError as error:
                 lost[str(error)] += 1
                 continue
-            except Exception:  # whatever a codec raises on damaged bytes
+            if damage:
                 lost["they are damaged"] += 1
                 continue
+            raw = bytes(plain)
         kept.append(i)
         data.append(raw)
         size += len(raw)

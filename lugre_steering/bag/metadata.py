@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import yaml
 
-_LIMIT = 4 << 20  # bytes; some 4000 topics
+_LIMIT = 2 << 20  # bytes; some 4000 topics
 _DEPTH = 32
 _ROOT = "rosbag2_bagfile_information"
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C where PyYAML has it

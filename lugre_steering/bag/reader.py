@@ -129,6 +129,7 @@ class Bag:
 
     def _open(self, path: Path) -> None:
         """Open one file by its content, not by its name."""
+        shown, reason = path, ""
         try:
             with path.open("rb") as file:
                 head = file.read(16)
@@ -136,23 +137,24 @@ class Bag:
                 folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="lugre_steering_")))
                 plain = folder / path.name.removesuffix(path.suffix)
                 if reason := expand_file(path, plain):
-                    self._say("truncated_bag", f"{path.name}: {reason}; what came before was read")
+                    reason = f"{reason}; "
+                    self._say("truncated_bag", f"{path.name}: {reason}what came before was read")
                 path = plain
                 with path.open("rb") as file:
                     head = file.read(16)
             if not head:
-                raise BagError(f"{path}: the file is empty")
+                raise BagError(f"{shown}: {reason}the file is empty")
             if head.startswith(mcap.MAGIC):
-                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self._number, self.findings)
+                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self._number, self.findings, unpacked=path is not shown)
             elif head.startswith(sqlite.MAGIC):
                 opened = sqlite.SqliteFile(path, self._number, self.findings)
             else:
-                raise BagError(f"{path}: not a recording (neither MCAP nor sqlite3 by its first bytes)")
+                raise BagError(f"{shown}: {reason}not a recording (neither MCAP nor sqlite3 by its first bytes)")
             self._stack.callback(opened.close)
             self._size += path.stat().st_size
             self._files.append(opened)
         except OSError as error:
-            raise BagError(f"{path}: cannot be read ({error.strerror or error})") from error
+            raise BagError(f"{shown}: cannot be read ({error.strerror or error})") from error
         except BagError as error:
             if not self.path.is_dir():
                 raise
