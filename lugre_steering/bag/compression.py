@@ -97,9 +97,9 @@ def _pieces(read: Callable[[int], bytes], compression: str) -> Iterator[bytes]:
 
 
 def expand(
-    data: bytes | bytearray | memoryview, compression: str, limit: int, allowance: Allowance, *, torn: bool = False
-) -> bytearray:
-    """Decompress a whole stream to at most ``limit`` bytes, or of a ``torn`` one what its complete blocks hold."""
+    data: bytes | bytearray | memoryview, compression: str, limit: int, allowance: Allowance
+) -> tuple[bytearray, str]:
+    """What a stream of at most ``limit`` bytes holds, and "" or why it ends early (what came before is kept)."""
     plain = bytearray()
     try:
         for piece in _pieces(io.BytesIO(data).read, compression):
@@ -109,10 +109,9 @@ def expand(
             plain += piece
     except TooLargeError:
         raise
-    except Exception:  # whatever a codec raises on damaged bytes
-        if not torn:
-            raise
-    return plain
+    except Exception as error:  # whatever a codec raises on damaged bytes
+        return plain, str(error)
+    return plain, ""
 
 
 def expand_file(source: Path, target: Path) -> str:

@@ -227,11 +227,12 @@ class McapFile:
             if plain_size > CHUNK_LIMIT:
                 raise _DamageError(f"it says to unpack to {plain_size >> 20} MB, expected at most {CHUNK_LIMIT >> 20}")
             try:
-                data, damage = expand(data, compression, plain_size, self._allowance)
+                unpacked, damage = expand(data, compression, plain_size, self._allowance)
             except TooLargeError as error:
                 raise _DamageError(f"its {compression} data are no recording ({error})") from error
             if damage and not run.torn:
-                raise _DamageError(f"its {compression} data are damaged ({damage})", data)
+                raise _DamageError(f"its {compression} data are damaged ({damage})", unpacked)
+            data = unpacked
         # Of what damaged data unpack to, nothing can be believed.
         remains = b"" if compression or self._unpacked else data
         if not run.torn and len(data) != plain_size:
