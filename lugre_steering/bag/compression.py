@@ -18,9 +18,9 @@ import lz4.frame  # type: ignore[import-untyped]
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 CHUNK_LIMIT = 128 << 20  # bytes of one chunk, packed or not: read at once, and a few copies of it must fit into memory
-MESSAGE_LIMIT = 64 << 20  # bytes of one message: more than any camera or laser sends
+MESSAGE_LIMIT = 32 << 20  # bytes of one message: more than any camera or laser sends
 _FED, _STEP = 1 << 16, 1 << 17  # bytes given to a codec, and taken from it, at a time (zstd makes blocks of 128 kB)
-_FREE, _RATIO = 512 << 20, 30  # recordings of sensors shrink to a tenth at best
+_FREE, _RATIO = 256 << 20, 20  # recordings of sensors shrink to a tenth at best
 
 
 class TooLargeError(Exception):
@@ -74,8 +74,9 @@ def _zstd_decompressor() -> Callable[[], Any]:
     return _Zstandard
 
 
+zstd_decompressor = _zstd_decompressor()
 _DECOMPRESSORS: dict[str, Callable[[], Any]] = {
-    "zstd": _zstd_decompressor(),
+    "zstd": zstd_decompressor,
     "lz4": lz4.frame.LZ4FrameDecompressor,
 }
 

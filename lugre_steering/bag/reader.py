@@ -33,6 +33,7 @@ MESSAGE_TYPE = {
 }
 _SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 _TOPICS_LIMIT = 5_000  # no vehicle has as many; each costs time and memory with every block
+_LONGEST = 1 << 20  # bytes of a message of one of these types, with thousands of joints
 _PEEK = 500_000  # messages looked at to find which topic carries a joint
 
 
@@ -187,7 +188,8 @@ class Bag:
             raise BagError(f"{self.path}: reading stopped ({error})") from error
         for reason, number in left_out.items():
             self._say("damaged_bag", f"{number} compressed messages are left out: {reason}")
-        if wanted is None and self.message_count is not None and count != self.message_count:
+        everything = wanted is None or len(wanted) == len(self.connections)
+        if everything and self.message_count is not None and count != self.message_count:
             self._say("message_count", f"metadata.yaml promises {self.message_count} messages, {count} could be read")
 
     def blocks(
@@ -221,6 +223,9 @@ class Bag:
             length = messages.length[of_topic]
             for size in np.unique(length):
                 alike = of_topic[length == size]
+                if size > _LONGEST:
+                    self.malformed[self.connections[k].topic] += alike.size
+                    continue
                 decoded = cdr.decode(windows(messages.data, messages.start[alike], int(size)), msgtype, joints)
                 if bad := int((~decoded.valid).sum()):
                     self.malformed[self.connections[k].topic] += bad
