@@ -64,6 +64,7 @@ class Bag:
         self.connections: list[Connection] = []
         self._numbers: dict[Connection, int] = {}
         self.malformed: Counter[str] = Counter()  # messages per topic that do not decode as their type
+        self._foreign: Counter[int] = Counter()  # messages per connection that speak of no wanted joint
         self.message_count: int | None = None  # as the metadata say; None where there are none
         self._files: list[mcap.McapFile | sqlite.SqliteFile] = []
         self._size = 0  # bytes of all files
@@ -204,6 +205,7 @@ class Bag:
                     readers.setdefault(k, []).append(i)
         seen: Counter[int] = Counter()
         self.malformed.clear()
+        self._foreign.clear()
         for messages in self.messages(None if all_messages else set(readers), messages_per_block):
             block = self._decode(messages, channels, readers)
             seen.update(dict(enumerate(np.bincount(block.channel, minlength=len(channels)).tolist())))
@@ -213,6 +215,10 @@ class Bag:
         for i, channel in enumerate(channels):
             if channel in topics and not seen[i] and channel.joint:
                 self._say("no_data", f"no message speaks of joint {channel.joint!r}", topics[channel])
+        for k, count in self._foreign.items():
+            if count and len(readers[k]) == 1 and seen[readers[k][0]]:  # a topic that several share has others by right
+                statement = f"{count} messages speak of other joints only, not of {channels[readers[k][0]].joint!r}"
+                self._say("foreign_joint", statement, self.connections[k].topic)
 
     def _decode(self, messages: Messages, channels: Sequence[Channel], readers: Mapping[int, Sequence[int]]) -> Block:
         rows: list[tuple[IntArray, NDArray[np.int32], IntArray, Array, Array]] = []
@@ -229,6 +235,7 @@ class Bag:
                 decoded = cdr.decode(windows(messages.data, messages.start[alike], int(size)), msgtype, joints)
                 if bad := int((~decoded.valid).sum()):
                     self.malformed[self.connections[k].topic] += bad
+                self._foreign[k] += int((decoded.valid & ~decoded.carried.any(axis=0)).sum())
                 for j, i in enumerate(wanted):
                     use = decoded.valid & decoded.carried[j]
                     value, rate = decoded.value[j, use], decoded.rate[j, use]

@@ -81,12 +81,14 @@ class _Worker:
         self._process.start()
         other.close()
 
-    def run(self, case: int) -> Case:
+        self.run(0, 60.0)  # loads the program
+
+    def run(self, case: int, limit_s: float = TIME_LIMIT_S) -> Case:
         begin = time.perf_counter()
         verdict, detail, peak = "crash", "", 0.0
         try:
             self._pipe.send(case)
-            if self._pipe.poll(TIME_LIMIT_S):
+            if self._pipe.poll(limit_s):
                 verdict, detail, peak = self._pipe.recv()
             else:
                 verdict = "hang"
@@ -111,7 +113,6 @@ def fuzz(name: str, cases: Sequence[int], seconds: float) -> Iterator[Case]:
         target(name).corpus(folder)
         worker = _Worker(name, folder)
         try:
-            worker.run(cases[0])  # the first one loads the program
             for number in cases:
                 if time.monotonic() > end:
                     return
@@ -119,7 +120,6 @@ def fuzz(name: str, cases: Sequence[int], seconds: float) -> Iterator[Case]:
                 if case.verdict not in (*GOOD, "traceback", "silent loss"):
                     worker.stop()
                     worker = _Worker(name, folder)
-                    worker.run(cases[0])
                 yield case
         finally:
             worker.stop()

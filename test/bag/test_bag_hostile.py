@@ -183,7 +183,7 @@ def test_tables_that_are_computed(tmp_path: Path, tables: tuple[str, str]) -> No
         if tables[0] == TABLES["topics"]:
             db.execute("INSERT INTO topics VALUES(1, ?, ?, 'cdr')", LINE)
     db.close()
-    with pytest.raises(BagError, match="not authorized|not a rosbag2 recording|no usable message"):
+    with pytest.raises(BagError, match=r"not authorized|not a rosbag2 recording|no usable message"):
         read_recording(tmp_path / "run.db3", CHANNELS)
 
 
@@ -284,7 +284,7 @@ def test_an_error_shows_the_damage(tmp_path: Path) -> None:
     data = bytearray(file.read_bytes())
     data[100:-2000] = bytes(len(data) - 2100)
     file.write_bytes(data)
-    with pytest.raises(BagError, match="no usable message.*damage: "):
+    with pytest.raises(BagError, match=r"no usable message.*damage: "):
         read_recording(file, CHANNELS)
 
 
@@ -296,6 +296,22 @@ def test_a_nanosecond_part_of_a_second_or_more_is_malformed(tmp_path: Path) -> N
     recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
     assert recording.angle["left"].value.tolist() == [0.1]
     assert recording.rejected == {"/" + LEFT.topic: {"malformed": 1}}
+
+
+def test_a_message_of_another_joint_on_the_topic_of_one_is_told(tmp_path: Path) -> None:
+    """One flipped bit in a name, and no checksum could tell."""
+    raw = [make.joint_state(T0 + i, [LEFT.joint if i != 3 else "left_track_steer_joins"], [0.1]) for i in range(9)]
+    messages = [("/" + LEFT.topic, make.JOINT_STATE, T0 + i, r) for i, r in enumerate(raw)]
+    recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
+    assert recording.angle["left"].value.size == 8
+    assert [f.finding for f in recording.findings] == ["foreign_joint"]
+
+
+def test_the_bench_tells_every_way_to_fail(tmp_path: Path) -> None:
+    cases = [fuzz.Case(i, verdict, "", float(i), 100.0 * i) for i, verdict in enumerate([*fuzz.GOOD, *fuzz.FAULTS])]
+    board = fuzz.scoreboard(cases)
+    assert [board[verdict] for verdict in (*fuzz.GOOD, *fuzz.FAULTS)] == [1] * 7
+    assert (board["slowest_s"], board["peak_MB"], len(board["faults"])) == (6.0, 600.0, 5)
 
 
 def test_fuzzed_bags_are_read_or_refused(tmp_path: Path) -> None:
