@@ -307,7 +307,7 @@ def test_a_message_of_another_joint_on_the_topic_of_one_is_told(tmp_path: Path) 
     assert [f.finding for f in recording.findings] == ["foreign_joint"]
 
 
-def test_the_bench_tells_every_way_to_fail(tmp_path: Path) -> None:
+def test_the_bench_tells_every_way_to_fail() -> None:
     cases = [fuzz.Case(i, verdict, "", float(i), 100.0 * i) for i, verdict in enumerate([*fuzz.GOOD, *fuzz.FAULTS])]
     board = fuzz.scoreboard(cases)
     assert [board[verdict] for verdict in (*fuzz.GOOD, *fuzz.FAULTS)] == [1] * 7
