@@ -120,14 +120,14 @@ def test_split_recording_and_a_lost_part(tmp_path: Path, messages: list[make.Mes
     for k, part in enumerate(rest):
         shutil.copy(make.file_of(part), whole / f"run_{k}{suffix}")
     listed = "".join(f"  - run{k}{suffix}\n" for k in ("", "_0", "_1"))
-    metadata = metadata.replace(f"  - run{suffix}\n", listed)
+    metadata = metadata.replace(f"  - run{suffix}\n", listed).replace("message_count: 3000", "message_count: 9000")
     (whole / "metadata.yaml").write_text(metadata)
     with Bag(whole) as bag:
         log = np.concatenate([b.log_ns for b in bag.blocks(CHANNELS)])
     np.testing.assert_array_equal(log, sorted(m[2] for m in messages)[:9000])
     (whole / f"run_0{suffix}").unlink()
     recording = read_recording(whole, CHANNELS)
-    assert [f.finding for f in recording.findings] == ["missing_file"]
+    assert [f.finding for f in recording.findings] == ["missing_file", "message_count"]
     assert f"run_0{suffix}" in recording.findings[0].statement
 
 
