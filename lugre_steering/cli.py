@@ -6,7 +6,6 @@ returns."""
 from __future__ import annotations
 
 import functools
-import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +19,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from lugre_steering import __version__
+from lugre_steering import __version__, serialise
 from lugre_steering.errors import DataError, LugreSteeringError
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
@@ -109,7 +108,7 @@ def step_bar(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
 
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
-    print(json.dumps(result, indent=2, allow_nan=False))
+    print(serialise.as_json(result))
 
 
 def command(name: str | None = None) -> Callable[[F], F]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lugre_steering.errors import DataError
+from lugre_steering.serialise import as_json
 
 
 def earlier_result(out: Path, record: str, schema: str, others: Sequence[str], vehicle_file: Path) -> dict[str, Any] | None:
@@ -39,7 +40,7 @@ def earlier_result(out: Path, record: str, schema: str, others: Sequence[str], v
 def write_record(record: Mapping[str, Any], file: Path) -> None:
     """As JSON, whole or not at all: half a record would pass for a file of others."""
     part = file.with_name(f".{file.name}.part")
-    part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    part.write_text(as_json(record) + "\n", encoding="utf-8")
     part.replace(file)
 
 

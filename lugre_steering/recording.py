@@ -76,6 +76,22 @@ class Finding:
     intervals_s: tuple[tuple[float, float], ...] = ()
 
 
+    def in_bag(self, bag: str) -> BagFinding:
+        """The finding with the name of the bag it was made in."""
+        return BagFinding(self.finding, self.topic, bag, self.intervals_s, self.statement)
+
+
+@dataclass(frozen=True)
+class BagFinding:
+    """A finding about one bag: what (``finding``, one word), the topic if there is one, stretches [s] since the first stamp."""
+
+    finding: str
+    topic: str
+    bag: str
+    intervals_s: tuple[tuple[float, float], ...]
+    statement: str
+
+
 @dataclass(frozen=True)
 class Recording:
     """Signals of one bag, each sorted and free of duplicates, with what was rejected on the way in."""
