@@ -13,14 +13,16 @@ from lugre_steering.errors import DataError
 from lugre_steering.serialise import as_json
 
 
-def earlier_result(out: Path, record: str, schema: str, others: Sequence[str], vehicle_file: Path) -> dict[str, Any] | None:
+def earlier_result(
+    out: Path, record: str, schema: str, others: Sequence[str], vehicle_file: Path | None = None
+) -> dict[str, Any] | None:
     """The record of an earlier run in ``out``, if there is one, so that its files may be replaced.
 
     ``DataError`` if the ``record`` there is of another ``schema``, if one of the ``others`` to be written exists without a
     record, or if writing would replace the vehicle file that is read.
     """
     for name in (record, *others):
-        if (out / name).resolve() == vehicle_file.resolve():
+        if vehicle_file is not None and (out / name).resolve() == vehicle_file.resolve():
             raise DataError(f"{vehicle_file}: would be replaced by the result; choose another --out")
     file = out / record
     if file.exists():
