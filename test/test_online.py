@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lugre_steering.online import BINS, Curves, Fit, Timeline
+from lugre_steering.online import BINS, Comparison, Curves, Timeline
 
 
 @given(
@@ -20,7 +20,7 @@ from lugre_steering.online import BINS, Curves, Fit, Timeline
 def test_fit_does_not_depend_on_how_the_data_are_cut(seed: int, cuts: list[int], mean: float) -> None:
     rng = np.random.default_rng(seed)
     time, measured, residual = np.arange(500.0), mean + rng.normal(0.0, 1e3, 500), rng.normal(5.0, 50.0, 500)
-    fit = Fit()
+    fit = Comparison()
     for part in np.split(np.arange(500), sorted(cuts)):
         fit.add(time[part], measured[part], residual[part])
     result = fit.result()
@@ -38,7 +38,7 @@ def test_fit_does_not_depend_on_how_the_data_are_cut(seed: int, cuts: list[int],
 
 
 def test_fit_of_nothing_and_of_a_constant() -> None:
-    fit = Fit()
+    fit = Comparison()
     fit.add(np.empty(0), np.empty(0), np.empty(0))
     assert fit.result() is None
     fit.add(np.arange(3.0), np.full(3, 7.0), np.zeros(3))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,15 +93,24 @@ def read_recordings(
 
     A copy would count as new evidence, whatever its file is called.
     """
-    recordings: list[Recording] = []
-    for bag in bags:
+
+    def read(bag: Path) -> Recording:
         progress(f"reading {bag.name}")
-        read = read_recording(bag, channels)
-        for other, path in zip(recordings, bags, strict=False):
-            if _same(read, other):
-                raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
-        recordings.append(replace(read, name=unused_name(read.name, [recording.name for recording in recordings])))
-    return recordings
+        return read_recording(bag, channels)
+
+    return distinct((str(bag), read(bag)) for bag in bags)
+
+
+def distinct(sources: Iterable[tuple[str, Recording]]) -> list[Recording]:
+    """Recordings, each with where it comes from, by names of their own; ``BagError`` for the same one twice."""
+    found: list[tuple[str, Recording]] = []
+    for source, recording in sources:
+        for path, other in found:
+            if _same(recording, other):
+                raise BagError(f"{source}: holds the same recording as {path}; a copy proves nothing, give each recording once")
+        name = unused_name(recording.name, [other.name for _, other in found])
+        found.append((source, replace(recording, name=name)))
+    return [recording for _, recording in found]
 
 
 def _same(first: Recording, second: Recording) -> bool:

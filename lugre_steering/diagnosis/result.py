@@ -8,13 +8,19 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from lugre_steering import units
+from lugre_steering.earlier import earlier_result, write_record
+from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, BagFinding, unused_name
-from lugre_steering.result import Result
+from lugre_steering.result import Result, folder_for, frame, html
 from lugre_steering.serialise import IN_MEMORY, finite, mapped
 from lugre_steering.vehicle import Vehicle, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 SCHEMA: Final = "lugre_steering/diagnosis/1"
 
@@ -186,3 +192,48 @@ class Diagnosis(Result):
         """The same in the words of the vehicle's coordinate, with None for every number that does not exist."""
         told: Diagnosis = units.in_words(self.vehicle, mapped(self, lambda value, _: finite(value)))
         return told
+
+    def save(self, out: str | Path) -> None:
+        """Write diagnosis.json and augmented.yaml into a folder; replaces only an earlier diagnosis there."""
+        folder = folder_for(out)
+        earlier_result(folder, "diagnosis.json", SCHEMA, ("augmented.yaml",))
+        write_record(self.json, folder / "diagnosis.json")
+        self.augmented.save(folder / "augmented.yaml")
+
+    def to_frame(self) -> DataFrame:
+        """One row per fitted parameter of every named effect, as a pandas table."""
+        return frame(self._rows())
+
+    def plot(self, bag: int | str = 0) -> Figure:
+        """Torque and residual of one bag, by number or name, before and after; shaded: where the effects act."""
+        from lugre_steering.report.panels import Curve, Panel, panels
+
+        if not self.traces:
+            raise DataError(f"plot: there is nothing to draw, as the verdict is {self.verdict}: {self.statement}")
+        trace = self.traces[bag] if isinstance(bag, int) else next(t for t in self.traces if t.name == bag)
+        unit, time = self.vehicle.coordinate.force_unit, trace.time
+        shaded = [span for effect in self.effects for span in trace.intervals.get(effect.id, ())]
+        before, after = trace.measured - trace.baseline, trace.measured - trace.augmented
+        rows = [
+            Panel(f"torque, bag {trace.name}", unit, [
+                Curve(time, trace.measured, "measured", "measured"),
+                Curve(time, trace.baseline, "recalibrated baseline", "original"),
+                Curve(time, trace.augmented, "with the effects found", "improved"),
+            ]),
+            Panel("residual", unit, [Curve(time, before, "before"), Curve(time, after, "after")], shaded),
+        ]  # fmt: skip
+        if self.effects:
+            rows.append(Panel("what each effect adds", unit, [Curve(time, trace.contributions[e.id], e.id) for e in self.effects]))
+        return panels(rows)
+
+    def _rows(self) -> list[dict[str, object]]:
+        return [
+            {"effect": effect.id, "stage": effect.stage, "parameter": name, "value": found.value, "low": found.ci95[0],
+             "high": found.ci95[1], "unit": found.unit, "energy_share": effect.energy_share, "masked_share": effect.masked_share,
+             "p_value": effect.p_value}
+            for effect in self.effects
+            for name, found in effect.parameters.items()
+        ]  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        return html(f"{self.vehicle.name}: {self.verdict}", self.statement, self._rows())

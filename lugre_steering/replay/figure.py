@@ -4,25 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.online import Curves, r2_words
+from lugre_steering.online import Agreement, Curves, r2_words
 from lugre_steering.recording import Array
 from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, SHOWN, figure
 from lugre_steering.vehicle import Vehicle
 
-GAP_S = 0.5
+BROKEN_S = 0.5
 """A curve is broken where nothing came for longer than this."""
 
 
 def draw_replay(
-    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Mapping[str, Any] | None, file: Path
+    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Agreement | None, file: Path
 ) -> None:
     """Write the picture as PNG.
 
@@ -81,11 +79,11 @@ def _lines(curves: Curves) -> tuple[Array, Array]:
     middle, low, high = curves.bins()
     both = np.stack([low, high], axis=-1).reshape(len(low), -1)
     time = np.repeat(middle, 2)
-    breaks = 2 * (np.flatnonzero(np.diff(middle) > max(GAP_S, 2.0 * curves.bin_s)) + 1)
+    breaks = 2 * (np.flatnonzero(np.diff(middle) > max(BROKEN_S, 2.0 * curves.bin_s)) + 1)
     return np.insert(time, breaks, np.nan), np.insert(both, breaks, np.nan, axis=1)
 
 
-def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
+def _caption(name: str, vehicle: Vehicle, fit: Agreement | None) -> str:
     text = f"Bag {name}. Vehicle: {vehicle.name}. "
     if vehicle.effects:
         text += f"Effects added to the baseline: {', '.join(effect.id for effect in vehicle.effects)}. "
@@ -93,6 +91,6 @@ def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
         return text + "No residual: the torque was not measured."
     unit = vehicle.coordinate.force_unit
     return text + (
-        f"Residual over {fit['samples']} samples: RMSE {fit['rmse_Nm']:.1f} {unit}{r2_words(fit['r2'], 'R²')}, bias {fit['bias_Nm']:+.1f} "
+        f"Residual over {fit.samples} samples: RMSE {fit.rmse_Nm:.1f} {unit}{r2_words(fit.r2, 'R²')}, bias {fit.bias_Nm:+.1f} "
         f"{unit}."
     )

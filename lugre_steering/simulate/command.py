@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -22,11 +20,13 @@ from lugre_steering.errors import DataError
 from lugre_steering.recording import Kind
 from lugre_steering.report.available import no_pictures
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import as_json
 from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
 from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench
 from lugre_steering.simulate.paper.figure import checks_table, draw_outcome, outcome_table, write_table
 from lugre_steering.simulate.paper.outcome import Outcome
+from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import STORAGES, write_bag
 from lugre_steering.vehicle import Vehicle
@@ -80,7 +80,8 @@ def run_manoeuvre(
     if folder.exists():  # said before the work, not after it
         raise DataError(f"{folder}: exists already; recordings are never overwritten, choose another --out")
     given = {name: value for name, value in sensing.items() if value is not None}
-    run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
+    done = simulation(what, vehicle, given)
+    run = done.run
     make_folder(out)
     label = f"{what}, vehicle '{vehicle.name}'"
     write_bag(folder, run, label, storage)
@@ -89,19 +90,15 @@ def run_manoeuvre(
         from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
 
         draw_simulation(run, label, picture)
-    truth = run.truth
-    return {
-        "synthetic": True,
-        "bag": str(folder),
-        "picture": str(picture) if note is None else None,
-        "picture_note": note,
-        "duration_s": float(truth.motion.time[-1]),
-        "largest_torque_Nm": float(np.abs(truth.torque).max()),
-        "largest_angle_deg": float(np.degrees(np.abs(truth.motion.theta).max())),
-        "largest_pressure_Pa": float(run.pressures.max()) if run.pressures.size else None,
-        "rubber_at_end_degC": [float(t) for t in truth.tracks["temperature"][:, -1]],
-        "effects": {effect.id: dict(effect.parameters) for effect in vehicle.effects},
-    }
+    done = dataclasses.replace(done, bag=str(folder), picture=str(picture) if note is None else None, picture_note=note)
+    return done.json
+
+
+def simulation(what: str, vehicle: Vehicle, sensing: Mapping[str, float | int]) -> Simulation:
+    """One manoeuvre in memory; ``sensing`` overrides fields of ``Sensing``."""
+    name = bag_name(Path(what)).replace("-", "_")
+    run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **sensing))  # type: ignore[arg-type]
+    return Simulation.of(name, run)
 
 
 def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:
@@ -120,10 +117,10 @@ def write_outcomes(what: str, outcomes: list[Outcome], out: Path) -> dict[str, A
         write_table(outcome, out / f"{outcome.name}.csv")
         if note is None:
             draw_outcome(outcome, out / f"{outcome.name}.png")
-        (out / f"{outcome.name}.json").write_text(json.dumps(results[-1], indent=2), encoding="utf-8")
+        (out / f"{outcome.name}.json").write_text(as_json(results[-1]), encoding="utf-8")
     result = {"passed": all(outcome.passed for outcome in outcomes), "picture_note": note, "experiments": results}
     if what == ALL:
-        (out / f"{ALL}.json").write_text(json.dumps(result, indent=2), encoding="utf-8")
+        (out / f"{ALL}.json").write_text(as_json(result), encoding="utf-8")
     return result
 
 
