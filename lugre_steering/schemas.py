@@ -46,11 +46,11 @@ def _object(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
 
 def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     """The schema of one type; an annotation of it holds further keywords."""
-    if hint in _SIMPLE:
-        return dict(_SIMPLE[hint])
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is Annotated:
         return {**_of(arguments[0], definitions), **arguments[1]}
+    if hint in _SIMPLE:
+        return dict(_SIMPLE[hint])
     if origin is Literal:
         return {"enum": list(arguments)}
     if origin in (Union, types.UnionType):
@@ -63,11 +63,11 @@ def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
         return {"type": "array", "prefixItems": items, "minItems": count, "maxItems": count}
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return {"type": "object", "additionalProperties": _of(arguments[1], definitions)}
-    if not dataclasses.is_dataclass(hint):
+    if not isinstance(hint, type) or not dataclasses.is_dataclass(hint):
         raise TypeError(f"{hint}: no JSON type is known for it")
     if hint.__name__ not in definitions:
         definitions[hint.__name__] = {}  # known while its own fields are looked at
-        definitions[hint.__name__] = _object(typing.cast(type, hint), definitions)
+        definitions[hint.__name__] = _object(hint, definitions)
     return {"$ref": f"#/$defs/{hint.__name__}"}
 
 

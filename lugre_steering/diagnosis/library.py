@@ -10,6 +10,7 @@ from pathlib import Path
 from lugre_steering.bag.given import Given, given_recordings
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
+from lugre_steering.result import folder_for
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
@@ -35,6 +36,7 @@ def diagnose(
 def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:
     """Write report.html and its pictures into a folder (which ``Diagnosis.save`` may have filled); the page."""
     from lugre_steering.diagnosis.report import page
-    from lugre_steering.result import folder_for
 
-    return page.write_report(diagnosis, folder_for(out)).page
+    folder = folder_for(out)
+    page.write_report(diagnosis, folder)
+    return folder / "report.html"

@@ -11,6 +11,7 @@ from typing import Any
 
 from lugre_steering.recording import Array
 from lugre_steering.report import style
+from lugre_steering.report.style import Figure
 
 STYLES: dict[str, dict[str, Any]] = {"measured": style.MEASURED, "improved": style.IMPROVED, "original": style.ORIGINAL}
 
@@ -35,7 +36,7 @@ class Panel:
     shaded: Sequence[tuple[float, float]] = ()
 
 
-def panels(rows: Sequence[Panel]) -> Any:
+def panels(rows: Sequence[Panel]) -> Figure:
     """Panels one below the other, over time [s]; the figure."""
     with _figure(len(rows), 2.1 * len(rows)) as (fig, axes):
         for ax, panel in zip(axes, rows, strict=True):
@@ -51,7 +52,7 @@ def panels(rows: Sequence[Panel]) -> Any:
     return fig
 
 
-def intervals(title: str, label: str, rows: Sequence[tuple[str, float, tuple[float, float]]]) -> Any:
+def intervals(title: str, label: str, rows: Sequence[tuple[str, float, tuple[float, float]]]) -> Figure:
     """A named value with its interval per row, and a line at one; the figure."""
     with _figure(1, 1.2 + 0.4 * len(rows)) as (fig, (ax,)):
         for i, (_, value, (low, high)) in enumerate(rows):
@@ -65,7 +66,7 @@ def intervals(title: str, label: str, rows: Sequence[tuple[str, float, tuple[flo
 
 
 @contextmanager
-def _figure(rows: int, height: float) -> Iterator[tuple[Any, Any]]:
+def _figure(rows: int, height: float) -> Iterator[tuple[Figure, Any]]:
     import matplotlib as mpl
     import matplotlib.pyplot as plt
 
