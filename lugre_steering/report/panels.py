@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lugre_steering.recording import Array
 from lugre_steering.report import style
-from lugre_steering.report.style import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STYLES: dict[str, dict[str, Any]] = {"measured": style.MEASURED, "improved": style.IMPROVED, "original": style.ORIGINAL}
 

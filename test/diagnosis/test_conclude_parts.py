@@ -102,7 +102,7 @@ def test_structure_is_located_in_a_recording_shorter_than_the_window(problem: Pr
     done = finished(both, fit(both, weight(both)))
     (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual, None)
     assert entry.bag == "short"
-    assert entry["intervals_s"][0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
+    assert entry.intervals_s[0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
 
 
 def test_held_out_errors_of_a_bag_are_those_of_the_fit_that_was_judged(problem: Problem) -> None:
