@@ -164,12 +164,12 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
     if len(use):
         s = stamp[use]
         believed = confirmed(s)
-        reject("backward_stamp", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
+        reject("backward", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
     if len(use):
-        reject("backward_stamp", _doubled(stamp[use]))
+        reject("backward", _doubled(stamp[use]))
     reordered = int(_late(stamp[use]).sum()) if len(use) else 0
     use = use[np.argsort(stamp[use], kind="stable")]
-    reject("duplicate_stamp", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
+    reject("duplicate", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
     return use, reasons, reordered
 
 
