@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from lugre_steering.errors import LugreSteeringError
+from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.serialise import as_json, plain
 
 if TYPE_CHECKING:
@@ -32,6 +32,24 @@ class Result:
     def to_json(self) -> str:
         """The text of the result file that the command writes."""
         return as_json(self.json)
+
+
+class Named(Protocol):
+    """What has the name of a bag."""
+
+    @property
+    def name(self) -> str: ...
+
+
+N = TypeVar("N", bound=Named)
+
+
+def of_bag(parts: Sequence[N], bag: int | str) -> N:
+    """The part of one bag, by number from 0 or by name."""
+    names = [part.name for part in parts]
+    if bag not in names and bag not in range(len(parts)):
+        raise DataError(f"bag: got {bag!r}, expected a number below {len(parts)} or one of {', '.join(names)}")
+    return parts[names.index(bag) if isinstance(bag, str) else bag]
 
 
 def frame(rows: Sequence[Row] | Mapping[str, Any]) -> DataFrame:

@@ -221,6 +221,9 @@ def test_results_are_shown_and_drawn(diagnosis: ls.Diagnosis, calibration: ls.Ca
         assert all(ax.lines for ax in figure.axes)
         plt.close(figure)
     assert plt.get_backend() == backend
+    for result in (diagnosis, replay):
+        with pytest.raises(ls.DataError, match="expected a number below 1 or one of synthetic_hidden_stop_a"):
+            result.plot("other")
 
 
 def test_tables_need_pandas_and_say_so(diagnosis: ls.Diagnosis, replay: ls.Replay, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from lugre_steering import units
 from lugre_steering.earlier import earlier_result, write_record
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, BagFinding, unused_name
-from lugre_steering.result import Result, folder_for, frame, html
+from lugre_steering.result import Result, folder_for, frame, html, of_bag
 from lugre_steering.serialise import IN_MEMORY, finite, mapped
 from lugre_steering.vehicle import Vehicle, save
 
@@ -210,7 +210,7 @@ class Diagnosis(Result):
 
         if not self.traces:
             raise DataError(f"plot: there is nothing to draw, as the verdict is {self.verdict}: {self.statement}")
-        trace = self.traces[bag] if isinstance(bag, int) else next(t for t in self.traces if t.name == bag)
+        trace = of_bag(self.traces, bag)
         unit, time = self.vehicle.coordinate.force_unit, trace.time
         shaded = [span for effect in self.effects for span in trace.intervals.get(effect.id, ())]
         before, after = trace.measured - trace.baseline, trace.measured - trace.augmented

@@ -16,7 +16,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator import Options
 from lugre_steering.online import Agreement
 from lugre_steering.recording import Array, Finding
-from lugre_steering.result import Result, folder_for, frame, html
+from lugre_steering.result import Result, folder_for, frame, html, of_bag
 from lugre_steering.serialise import IN_MEMORY
 
 if TYPE_CHECKING:
@@ -123,8 +123,7 @@ class Replay(Result):
         """Angles, torques and residual of one bag, by number or name."""
         from lugre_steering.report.panels import Curve, Panel, panels
 
-        chosen = self.bags[bag] if isinstance(bag, int) else next(b for b in self.bags if b.name == bag)
-        s, unit = chosen.kept(), self.torque_unit
+        s, unit = of_bag(self.bags, bag).kept(), self.torque_unit
         torque = Panel("torque that the actuators deliver", unit, [Curve(s.time_s, s.torque, "estimate", "improved")])
         if s.measured.size:
             torque.curves.insert(0, Curve(s.residual_time_s, s.measured, "measured", "measured"))
