@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import json
 import os
 import sys
 import warnings
@@ -22,7 +21,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from lugre_steering import __version__
+from lugre_steering import __version__, serialise
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
@@ -132,7 +131,7 @@ def doubts_told_once() -> Iterator[None]:
 
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
-    print(json.dumps(result, indent=2, allow_nan=False))
+    print(serialise.as_json(result))
 
 
 def command(name: str | None = None) -> Callable[[F], F]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -43,9 +42,39 @@ class Range:
             self.high, self.high_s = other.high, other.high_s
 
 
+@dataclass(frozen=True)
+class Peaks:
+    """Largest and smallest torque [N m], and when [s]."""
+
+    max_Nm: float
+    max_at_s: float
+    min_Nm: float
+    min_at_s: float
+
+
+@dataclass(frozen=True)
+class PeaksOfBoth:
+    """Peaks of the measured torque (of cylinders or a torque sensor) and of the estimate."""
+
+    cylinder_torque: Peaks
+    estimate: Peaks
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well estimates agree with measured torque: RMSE and bias (mean residual) [N m], R2 (None where the measured torque never
+    changes), and peaks."""
+
+    samples: int
+    rmse_Nm: float
+    r2: float | None
+    bias_Nm: float
+    peaks: PeaksOfBoth
+
+
 @dataclass
-class Fit:
-    """How well estimates agree with measured torque [N m].
+class Comparison:
+    """Estimates against measured torque [N m] as they come.
 
     Mean and variance are merged from batches after Chan, Golub and LeVeque (1983), The American Statistician 37(3),
     which loses no digits to a large mean, unlike sums of squares.
@@ -65,7 +94,7 @@ class Fit:
         if not measured.size:
             return
         mean = float(measured.mean())
-        batch = Fit(
+        batch = Comparison(
             measured.size,
             mean,
             float(((measured - mean) ** 2).sum()),
@@ -77,7 +106,7 @@ class Fit:
         batch.estimate.add(time_s, measured - residual)
         self.merge(batch)
 
-    def merge(self, other: Fit) -> None:
+    def merge(self, other: Comparison) -> None:
         """Take in the samples of another one."""
         if not other.count:
             return
@@ -92,21 +121,21 @@ class Fit:
         self.measured.merge(other.measured)
         self.estimate.merge(other.estimate)
 
-    def result(self) -> dict[str, Any] | None:
-        """RMSE, R2 (None where the measured torque never changes), bias and peaks; None without samples."""
+    def result(self) -> Agreement | None:
+        """What they came to; None without samples."""
         if not self.count:
             return None
 
-        def peaks(seen: Range) -> dict[str, float]:
-            return {"max_Nm": seen.high, "max_at_s": seen.high_s, "min_Nm": seen.low, "min_at_s": seen.low_s}
+        def peaks(seen: Range) -> Peaks:
+            return Peaks(seen.high, seen.high_s, seen.low, seen.low_s)
 
-        return {
-            "samples": self.count,
-            "rmse_Nm": math.sqrt(self.squares / self.count),
-            "r2": 1.0 - self.squares / self.spread if self.spread > 0.0 else None,
-            "bias_Nm": self.error / self.count,
-            "peaks": {"cylinder_torque": peaks(self.measured), "estimate": peaks(self.estimate)},
-        }
+        return Agreement(
+            samples=self.count,
+            rmse_Nm=math.sqrt(self.squares / self.count),
+            r2=1.0 - self.squares / self.spread if self.spread > 0.0 else None,
+            bias_Nm=self.error / self.count,
+            peaks=PeaksOfBoth(peaks(self.measured), peaks(self.estimate)),
+        )
 
 
 def is_large(residual_rms: float, estimate_rms: float, measured_rms: float, vehicle: Vehicle) -> bool:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -104,15 +104,24 @@ def read_recordings(
 
     A copy would count as new evidence, whatever its file is called.
     """
-    recordings: list[Recording] = []
-    for bag in bags:
+
+    def read(bag: Path) -> Recording:
         progress(f"reading {bag.name}")
-        read = read_recording(bag, channels)
-        for other, path in zip(recordings, bags, strict=False):
-            if _same(read, other):
-                raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
-        recordings.append(replace(read, name=unused_name(read.name, [recording.name for recording in recordings])))
-    return recordings
+        return read_recording(bag, channels)
+
+    return distinct((str(bag), read(bag)) for bag in bags)
+
+
+def distinct(sources: Iterable[tuple[str, Recording]]) -> list[Recording]:
+    """Recordings, each with where it comes from, by names of their own; ``BagError`` for the same one twice."""
+    found: list[tuple[str, Recording]] = []
+    for source, recording in sources:
+        for path, other in found:
+            if _same(recording, other):
+                raise BagError(f"{source}: holds the same recording as {path}; a copy proves nothing, give each recording once")
+        name = unused_name(recording.name, [other.name for _, other in found])
+        found.append((source, replace(recording, name=name)))
+    return [recording for _, recording in found]
 
 
 def _same(first: Recording, second: Recording) -> bool:
@@ -159,12 +168,12 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
     if len(use):
         s = stamp[use]
         believed = confirmed(s)
-        reject("backward_stamp", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
+        reject("backward", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
     if len(use):
-        reject("backward_stamp", _doubled(stamp[use]))
+        reject("backward", _doubled(stamp[use]))
     reordered = int(_late(stamp[use]).sum()) if len(use) else 0
     use = use[np.argsort(stamp[use], kind="stable")]
-    reject("duplicate_stamp", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
+    reject("duplicate", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
     return use, reasons, reordered
 
 

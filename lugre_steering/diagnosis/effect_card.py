@@ -17,7 +17,6 @@ from rich.text import Text
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.data.dataset import Run, ideal_run
-from lugre_steering.diagnosis.result import finite
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.fingerprint import candidates
 from lugre_steering.effects.entry import Effect
@@ -27,6 +26,7 @@ from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import plain
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
 from lugre_steering.vehicle import Vehicle
@@ -119,7 +119,7 @@ def describe(effect: Effect) -> dict[str, Any]:
             for p in effect.parameters
         ],
     }  # fmt: skip
-    result = finite(entry)
+    result = plain(entry)
     assert isinstance(result, dict)
     return result
 

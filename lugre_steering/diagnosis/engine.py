@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from lugre_steering import units
 from lugre_steering.bag import read_recordings
 from lugre_steering.data.bursts import set_aside
 from lugre_steering.data.dataset import prepare
@@ -19,11 +17,11 @@ from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
-from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
+from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import split
-from lugre_steering.recording import Finding, Recording
+from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
 
 MIN_SLIDING, MIN_SAMPLES = 2.0, 500
@@ -76,11 +74,8 @@ def diagnose_recordings(
             lacking = f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
         else:
             lacking = f"only {roles.fit.sum()} usable samples are left to fit; at least {MIN_SAMPLES} are needed (see data_quality)"
-        advice = {
-            "manoeuvre": "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description,
-            "separates": ["friction level", "stiffness"],
-            "why": lacking,
-        }
+        drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description
+        advice = Experiment(drive, ("friction level", "stiffness"), lacking)
         statement = (
             f"The recording of {sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s does not determine the "
             f"baseline: {lacking}. Nothing can be said about missing physics."
@@ -92,7 +87,7 @@ def diagnose_recordings(
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
-        findings += [_entry(finding, bag) for bag, finding in disturbed.items()]
+        findings += [finding.in_bag(bag) for bag, finding in disturbed.items()]
         problem = Problem(vehicle, runs)
         noise, roles, found = investigate(problem, seed, progress)
     progress("verifying on held-out data")
@@ -100,35 +95,25 @@ def diagnose_recordings(
     return conclude(done, findings, seed=seed, material=material, progress=progress)
 
 
-def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:
-    return [_entry(finding, quality.recording.name) for quality in qualities for finding in quality.findings]
-
-
-def _entry(f: Finding, bag: str) -> dict[str, Any]:
-    return {
-        "finding": f.finding, "topic": f.topic, "bag": bag,
-        "intervals_s": [list(span) for span in f.intervals_s], "statement": f.statement,
-    }  # fmt: skip
+def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
+    return [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
 
 
 def _insufficient(
     qualities: Sequence[Quality],
     vehicle: Vehicle,
-    findings: list[dict[str, Any]],
+    findings: Sequence[BagFinding],
     statement: str,
-    advice: dict[str, Any] | None,
+    advice: Experiment | None,
 ) -> Diagnosis:
     """The verdict when nothing can be concluded: the vehicle stays as it was."""
     floor = 1.0
     if vehicle.hydraulics is not None:
         floor = max(1.0, vehicle.sensors.pressure_noise_Pa * 5e-3)
-    fit_entry: dict[str, Any] = {"rmse_Nm": 0.0, "heldout_rmse_Nm": None}
-    json = {
-        "schema": SCHEMA, "bags": [quality.recording.name for quality in qualities], "verdict": "insufficient_data",
-        "statement": statement, "noise_floor_Nm": floor, "baseline": fit_entry,
-        "augmented": {**fit_entry, "improvement": None, "improvement_ci95": None}, "effects": [],
-        "unexplained": {"structured": False, "description": "not examined", "formula": None, "where": None},
-        "detection_limits": {}, "data_quality": findings, "next_experiment": advice,
-    }  # fmt: skip
-    return Diagnosis(units.in_words(vehicle, finite(json)), vehicle)
+    return Diagnosis(
+        schema=SCHEMA, bags=tuple(quality.recording.name for quality in qualities), verdict="insufficient_data",
+        statement=statement, noise_floor_Nm=floor, baseline=Errors(0.0, None),
+        augmented=Augmented(0.0, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
+        detection_limits={}, data_quality=tuple(findings), next_experiment=advice,
+    ).in_words()  # fmt: skip
 

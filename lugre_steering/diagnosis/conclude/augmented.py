@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import NamedEffect
 from lugre_steering.effects.registry import ORIGINS
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
 
 
-def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]], heldout_rmse: float) -> Vehicle:
+def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect], heldout_rmse: float) -> Vehicle:
     """Recalibrated vehicle with the named effects that act in the last bag; ``heldout_rmse`` [N m] was found before all
     data were fitted."""
     problem = done.problem

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import unlisted
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
@@ -34,7 +35,7 @@ LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
 class LeftOver(NamedTuple):
     """The contract's entry, the same in one sentence, and whether it is structure worth a verdict."""
 
-    entry: dict[str, Any]
+    entry: Unexplained
     text: str
     structured: bool
 
@@ -50,7 +51,7 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     loud = slow - nothing > max(UNLISTED_EXCESS, done.noise.slow_doubt) or excess > FAST_EXCESS
     if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
-        return LeftOver({"structured": False, "description": description, "formula": None, "where": None}, "", False)
+        return LeftOver(Unexplained(False, description), "", False)
     if not final.effects:
         # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
         sound = fit(done.problem, done.fitted, (), final.x, robust=True, linearisations=25)
@@ -76,7 +77,7 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
         else f"a pattern outside the catalogue foretells {100 * gain:.0f} % of the held-out residual energy"
     )
     where = _where(done, axes, axis, residual, shape)
-    return LeftOver({"structured": True, "description": text, "formula": formula, "where": where}, text, True)
+    return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
 
 
 def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
@@ -90,7 +91,7 @@ def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
 
 def _where(
     done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array, shape: Array | None
-) -> list[dict[str, Any]]:
+) -> list[Place]:
     """Stretches and range of ``axis`` that hold it: where ``shape`` (n,) acts if given, else where the residual is loud."""
     problem = done.problem
     entries = []
@@ -105,10 +106,8 @@ def _where(
         else:
             spans, piece = locate.intervals(run.time, shape[part]), shape[part]
         if spans:
-            entries.append({
-                "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                "range": list(locate.active_range(values[axis], piece)), "unit": done.unit(units.COORDINATES[axis]),
-            })  # fmt: skip
+            between = locate.active_range(values[axis], piece)
+            entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATES[axis])))
     return entries
 
 
