@@ -21,8 +21,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from lugre_steering import __version__, serialise
+from lugre_steering import serialise
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
+from lugre_steering.version import __version__
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

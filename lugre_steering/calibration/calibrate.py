@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``lugre-steering calibrate`` without the command line: recordings in, calibrated vehicle and its uncertainty out.
+"""Calibration without the command line: recordings in, calibrated vehicle and its uncertainty out.
 
 ``calibration.json`` (schema lugre_steering/calibration/1; every number finite, ``null`` where there is none):
 
@@ -28,30 +28,25 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from lugre_steering import __version__, units
-from lugre_steering.bag import read_recordings
+from lugre_steering import units
 from lugre_steering.calibration import result
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import inspect
 from lugre_steering.errors import DataError
-from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
 from lugre_steering.fitting.split import split
 from lugre_steering.recording import Array, Recording
-from lugre_steering.report.available import no_pictures
-from lugre_steering.vehicle import Vehicle, load, save
+from lugre_steering.vehicle import Vehicle
+from lugre_steering.version import __version__
 
-FILES = (result.VEHICLE, "calibration.png")
-"""What is written beside the record."""
 SHORTEST_S = 10.0
 SLIDING = 3.0
 """Turns must reach this many presliding lengths, or friction never slides."""
@@ -127,42 +122,6 @@ class Calibrated:
     def result(self) -> dict[str, Any]:
         """As in calibration.json."""
         return self.calibration.json
-
-
-def calibrate(
-    bags: Sequence[Path],
-    vehicle_file: Path,
-    out: Path,
-    *,
-    free: Sequence[str] = (),
-    fix: Sequence[str] = (),
-    prior: Mapping[str, float] | None = None,
-    priors: bool = True,
-    progress: Progress = lambda _: None,
-) -> dict[str, Any]:
-    """Fit the vehicle file to the bags; write calibrated.yaml, calibration.json and calibration.png into ``out``.
-
-    Returns the content of calibration.json. ``free`` adds ``kingpin_arm`` or ``pressure_gain`` to the fitted values,
-    ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
-    """
-    vehicle = load(vehicle_file)
-    calibrations = chosen(vehicle, free, fix, prior or {})
-    with output_folder(out):
-        earlier_result(out, result.RECORD, result.SCHEMA, FILES, vehicle_file)
-        recordings = read_recordings(bags, vehicle.channels, progress)
-        done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
-        found = replace(done.calibration, bags=tuple(str(bag) for bag in bags), vehicle=str(vehicle_file))
-        progress("writing")
-        try:
-            for name in FILES:  # of an earlier run: they would not belong to this record
-                (out / name).unlink(missing_ok=True)
-            save(found.with_provenance(), out / result.VEHICLE)
-            picture, note = _picture(done, out / "calibration.png")
-            found = replace(found, picture=picture, picture_note=note)
-            write_record(found.json, out / result.RECORD)
-        except OSError as error:
-            raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
-    return found.json
 
 
 def chosen(
@@ -371,15 +330,6 @@ def statement(
                 f"{name.replace('_', ' ')} by {value.shifts[name]:+.2g} %."
             )
     return " ".join(text)
-
-
-def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
-    if note := no_pictures():
-        return None, note
-    from lugre_steering.calibration.figure import draw_calibration
-
-    draw_calibration(done, file)
-    return str(file), None
 
 
 def _rounded(vehicle: Vehicle) -> Vehicle:

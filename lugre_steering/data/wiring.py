@@ -21,6 +21,7 @@ from scipy.stats import theilslopes
 from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, angle_noise, prepare
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
@@ -434,12 +435,14 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
 
     if abs(match(seen(model))[1]) <= SKEW_S:
         return
+    gaps = [f"{effect.id}_{effect.play}" for effect in CATALOGUE.values() if effect.play]
     matches, unshifted = [], np.inf
     for softer, play in product(SOFTER, PLAY):
         trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
         for record in trial.parameters:
             record["sigma_0"] *= softer
-            record["backlash_width"] += play * presliding
+            for gap in gaps:
+                record[gap] += play * presliding
         torque = seen(trial)
         matches.append(match(torque))
         unshifted = min(unshifted, matches[-1][2], *(match(lagged(torque, step, lag))[2] for lag in LAG_S))

@@ -117,6 +117,8 @@ class Effect:
     """Begun late, it leaves another trace than the end of the same always there (heat, path, time and age are remembered)."""
     never_late: bool = False
     """It has its own window in time, or acts at the start only."""
+    play: str = ""
+    """Its parameter that is a free play [rad], by which a torque looks as if it were stamped late."""
     one_sided: bool = False
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
     joint_title: str = ""
