@@ -395,7 +395,7 @@ def effects(
 def prove(
     out: OutFolder,
     quick: Annotated[bool, typer.Option("--quick", help="a stratified few, under five minutes on two cores")] = False,
-    cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'single/end_stop/*'")] = None,
+    cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'null/*'")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="repeat or resume the run with this seed [a new one]")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,

@@ -88,7 +88,8 @@ class Effect:
     """Physics that the baseline leaves out.
 
     ``equation`` in the field's notation, ``source`` the primary literature, ``trace`` how it looks in a residual,
-    ``coordinate`` the axis along which it tells itself, ``rivals`` the entries it is easily taken for. ``hooks`` are its
+    ``coordinate`` the axis along which it tells itself, ``rivals`` the entries it is easily taken for
+    (each pair is declared once; ``registry.rivals`` gives all of an entry). ``hooks`` are its
     laws by the place where they act (``chain.compose.HOOKS``); ``memory`` is what they remember, with its value at the
     start (a number, numbers, or the name of a baseline parameter).
     """

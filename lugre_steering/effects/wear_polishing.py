@@ -28,7 +28,6 @@ EFFECT = Effect(
         Parameter("slip_scale", "rad", "slip at which 63 % is reached", 1.0, 0.05, 100.0, (0.1, 0.3, 1.0), "slip"),
     ),
     hooks={"level": level},
-    rivals=("carcass_heat_sink", "surface_patch", "flash_temperature"),
     memory={"slip": 0.0},  # accumulated |contact angle| [rad]
     counts_from_start=True,
 )
