@@ -205,7 +205,7 @@ def test_a_plan_that_the_vehicle_leaves_or_that_has_run_out_is_told() -> None:
     assert told[45][1] > 1e3
     assert told[60][0] == ["plan far from the angle"]
     assert told[75] == (["plan far from the angle"], 0.0)
-    assert told[150] == (["plan has run out"], 0.0)
+    assert told[175] == (["plan has run out"], 0.0)
     estimator.set_plan(*plan_of([], []))
     assert not [row for side in (0, 1) for row in estimator.push(side, T0 + 300 * PERIOD_NS, 0.1)[0] if doubts(row)]
 

@@ -20,8 +20,9 @@ from lugre_steering.effects.sensors import SensorCorrection, sensor_correction
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import JUMPED, REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD
-from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
 from lugre_steering.estimator.known import known_range
+from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
+from lugre_steering.estimator.memory import Memory, hand_over, recall, remembered
 from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
@@ -175,6 +176,31 @@ class Estimator:
         """Steps so far with a rubber temperature outside the rubber table."""
         return int(self._core.state["saturated"].sum())
 
+    @property
+    def memory(self) -> Memory:
+        """What the vehicle has been through: rubber temperatures, bristles, memories of effects."""
+        return remembered(self._core, self.vehicle.sides)
+
+    def resume(self, memory: Memory) -> None:
+        """Begin with such a memory, before the first sample; ``DataError`` if it is of another model."""
+        recall(self._core, self.vehicle.sides, memory)
+
+    def continued(self, vehicle: Vehicle) -> Estimator:
+        """An estimator with the model of another file of this vehicle that goes on where this one is, no sample lost.
+
+        ``DataError`` if that file has other sides or inputs.
+        """
+        if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
+            raise DataError("it has other sides, topics or joints")
+        new = Estimator(vehicle, self.options)
+        hand_over(self._core, new._core)
+        return new
+
+    def set_options(self, options: Options) -> None:
+        """Go on with other options."""
+        _set_options(self._core.config, self._core.parameters, options)
+        self.options = options
+
     def snapshot(self) -> list[np.ndarray[Any, Any]]:
         """A copy of the whole state, for ``restore``."""
         return [array.copy() for array in self._core]
@@ -195,17 +221,24 @@ def _label(kind: Kind, name: str) -> str:
     return {Kind.ANGLE: f"angle/{name}", Kind.PRESSURE: f"pressure/{name}"}.get(kind, kind.name.lower())
 
 
+def _set_options(config: Records, parameters: Records, options: Options) -> None:
+    """Write the options as the compiled loop reads them."""
+    for name in ("pair_tolerance", "max_gap", "backward_jump", "forward_jump"):
+        config[f"{name}_ns"] = round(getattr(options, f"{name}_s") * 1e9)
+    config["max_rate"] = options.max_rate_rad_s
+    config["horizon"] = options.feed_forward_horizon_s
+    config["limit"] = options.feed_forward_limit_Nm or LIMIT_STATIC * parameters["static_torque"].max()
+    config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * parameters["sigma_0"].max()
+    config["withdrawal_ramp"], config["recovery_ramp"] = options.withdrawal_ramp_s, options.recovery_ramp_s
+    config["plan_tolerance"] = options.plan_tolerance_rad
+
+
 def _new_core(vehicle: Vehicle, options: Options) -> Core:
     model = build_model(vehicle)
     correction: SensorCorrection = sensor_correction(vehicle)
     sides = len(vehicle.sides)
     config = np.zeros(1, CONFIG)
-    config["pair_tolerance_ns"] = round(options.pair_tolerance_s * 1e9)
-    config["max_gap_ns"] = round(options.max_gap_s * 1e9)
-    config["backward_jump_ns"] = round(options.backward_jump_s * 1e9)
-    config["forward_jump_ns"] = round(options.forward_jump_s * 1e9)
     config["max_angle"] = math.pi
-    config["max_rate"] = options.max_rate_rad_s
     config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
@@ -214,18 +247,14 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["lag"] = correction.lag_s
     config["arm_linear"], config["arm_quadratic"] = correction.arm_linear, correction.arm_quadratic
     config["effects"] = any(has_effects(p) for p in model.parameters)
-    config["horizon"] = options.feed_forward_horizon_s
     config["message"] = -1
-    friction, stiffness = (max(float(p[name][0]) for p in model.parameters) for name in ("static_torque", "sigma_0"))
-    config["friction"] = sides * friction
-    config["limit"] = options.feed_forward_limit_Nm or LIMIT_STATIC * friction
-    config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * stiffness
-    config["withdrawal_ramp"], config["recovery_ramp"] = options.withdrawal_ramp_s, options.recovery_ramp_s
-    config["plan_tolerance"] = options.plan_tolerance_rad
+    config["friction"] = sum(float(p["static_torque"][0]) for p in model.parameters)
     config["weight"] = 1.0
     known = known_range(vehicle)
     config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
 
+    parameters = np.concatenate(model.parameters)
+    _set_options(config, parameters, options)
     channels = np.zeros(len(vehicle.channels), CHANNEL)
     lines = 0
     for row, channel in zip(channels, vehicle.channels, strict=True):
@@ -245,7 +274,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     return Core(
         config=config,
         channels=channels,
-        parameters=np.concatenate(model.parameters),
+        parameters=parameters,
         state=np.zeros(sides, STATE),
         motion=np.zeros(sides, MOTION),
         trust=np.zeros(sides, TRUST),

@@ -22,10 +22,10 @@ class KnownRange:
 
 def known_range(vehicle: Vehicle) -> KnownRange:
     """From ``provenance``: ``seen: {angle_deg, rate_deg_s}`` and ``heldout_rmse_Nm``, of ``calibration`` or at its top."""
-    top = vehicle.provenance
-    notes = [top, top.get("calibration")]
-    seen = next((note["seen"] for note in notes if isinstance(note, Mapping) and isinstance(note.get("seen"), Mapping)), {})
-    rmse = next((note["heldout_rmse_Nm"] for note in notes if isinstance(note, Mapping) and "heldout_rmse_Nm" in note), 0.0)
+    notes = [note for note in (vehicle.provenance, vehicle.provenance.get("calibration")) if isinstance(note, Mapping)]
+    seen: object = next((note["seen"] for note in notes if "seen" in note), None)
+    seen = seen if isinstance(seen, Mapping) else {}
+    rmse: object = next((note["heldout_rmse_Nm"] for note in notes if "heldout_rmse_Nm" in note), 0.0)
     if isinstance(rmse, Mapping):
         rmse = rmse.get("calibrated", 0.0)
     angle, rate = (_positive(seen.get(key)) for key in ("angle_deg", "rate_deg_s"))

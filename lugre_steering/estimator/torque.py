@@ -12,7 +12,16 @@ from lugre_steering.chain.lag import lag_weights
 from lugre_steering.chain.rates import follow
 from lugre_steering.chain.step import step
 from lugre_steering.estimator.admission import restart
-from lugre_steering.estimator.doubt import RANGE, TABLE, angle_doubts, noise_of, re_anchor, standing_doubts, trust, watch
+from lugre_steering.estimator.doubt import (
+    RANGE,
+    TABLE,
+    angle_doubts,
+    noise_of,
+    re_anchor,
+    standing_doubts,
+    trust,
+    watch,
+)
 from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
