@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -200,6 +200,11 @@ class Estimator:
         """Go on with other options."""
         _set_options(self._core.config, self._core.parameters, options)
         self.options = options
+
+    def set_released(self, feed_forward: Sequence[float]) -> None:
+        """The feed-forward [N m] of each side was last this; it comes back from there over the recovery ramp."""
+        self._core.released[: len(feed_forward)] = feed_forward
+        self._core.config["weight"] = 0.0
 
     def snapshot(self) -> list[np.ndarray[Any, Any]]:
         """A copy of the whole state, for ``restore``."""
