@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from lugre_steering.estimator.release import LONGEST_S
+
 
 class CommandRamp:
     """Leads each command from the last one published to the wanted one, over a fixed time after every interruption: a
@@ -52,10 +54,12 @@ class Fade:
     """Leads the values last published to zero over a ramp."""
 
     def __init__(self, now_ns: int, values: Sequence[float], ramp_s: float) -> None:
-        self._begin_ns, self._values, self._ramp_ns = now_ns, list(values), ramp_s * 1e9
+        self._values, self._ramp_ns = list(values), ramp_s * 1e9
+        self._last_ns, self._share = now_ns, 1.0
 
     def __call__(self, now_ns: int) -> list[float]:
-        """What to publish now; a clock set back ends the ramp."""
-        since = now_ns - self._begin_ns
-        share = 1.0 - since / self._ramp_ns if 0 <= since < self._ramp_ns else 0.0
-        return [share * value for value in self._values]
+        """What to publish now. A late call makes no larger step than ``LONGEST_S`` would; a clock set back none."""
+        passed = min(LONGEST_S * 1e9, max(0, now_ns - self._last_ns))
+        self._last_ns = now_ns
+        self._share = max(0.0, self._share - passed / self._ramp_ns) if self._ramp_ns else 0.0
+        return [self._share * value for value in self._values]
