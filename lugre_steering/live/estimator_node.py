@@ -9,8 +9,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -52,6 +53,9 @@ class SteeringTorqueEstimator(LifecycleNode):
         # Steady, so that health is reported while simulated time stands still.
         self.create_timer(TICK_S, self.guarded(self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, "~/reload", self._reload)
+        self._writer: threading.Thread | None = None
+        change = self._service_change_state
+        change.callback = self._answered(change.callback)
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._take_over)
 
@@ -62,7 +66,7 @@ class SteeringTorqueEstimator(LifecycleNode):
             return
         for step in (self.trigger_configure, self.trigger_activate):
             if step() != TransitionCallbackReturn.SUCCESS:
-                raise self._refusal or DataError("the node cannot be started; see its log")
+                raise self._refusal or DataError(self.last_exception or "the node cannot be started")
 
     # ------------------------------------------------------------ life cycle
 
@@ -77,6 +81,9 @@ class SteeringTorqueEstimator(LifecycleNode):
             self._refusal = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it
+            self.fault(error)
+            return TransitionCallbackReturn.ERROR
         self._restore(self.session)
         self.get_logger().info(
             f"'{vehicle.name}' ready, executor '{self.settings.executor}'; compiled code loaded in {time.monotonic() - begin:.2f} s"
@@ -114,6 +121,19 @@ class SteeringTorqueEstimator(LifecycleNode):
         if session is not None:
             session.close()
 
+    def _answered(self, change: Callable[..., Any]) -> Callable[..., Any]:
+        """A transition that is not possible now is refused; out of rclpy's service it would come as an exception."""
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return change(request, response)
+            except RCLError as error:
+                self.get_logger().warning(f"transition refused: {' '.join(str(error).split())}")
+                response.success = False
+                return response
+
+        return answer
+
     # ----------------------------------------------------- faults and report
 
     def guarded(self, handle: Callable[..., None]) -> Callable[..., None]:
@@ -138,10 +158,13 @@ class SteeringTorqueEstimator(LifecycleNode):
 
     def _tick(self) -> None:
         session, now_ns = self.session, time.monotonic_ns()
+        waited_s = (now_ns - self._reported_ns) * 1e-9
         if session is None:
+            if waited_s >= REPORT_S:
+                self._reported_ns = now_ns
+                self._diagnose([DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{NODE}: outputs", message="not configured")])
             return
         session.tick()
-        waited_s = (now_ns - self._reported_ns) * 1e-9
         if waited_s >= REPORT_S or (session.news and waited_s >= NEWS_S):
             self._report(session, now_ns)
 
@@ -153,13 +176,18 @@ class SteeringTorqueEstimator(LifecycleNode):
             own = self.get_name(), self.get_namespace()
             session.health.namesakes = self.get_node_names_and_namespaces().count(own) - 1
         self._reports += 1
-        message = DiagnosticArray()
+        statuses = session.statuses(monotonic_ns, elapsed_s)
+        self._diagnose(statuses)
+        self._console.tell(statuses, (monotonic_ns - self._began_ns) * 1e-9)
+        due = monotonic_ns - self._saved_ns >= self.settings.state_period_s * 1e9
+        if due and (self._writer is None or not self._writer.is_alive()):
+            self._writer = threading.Thread(target=self._to_write(), daemon=True)  # a disk may be slow
+            self._writer.start()
+
+    def _diagnose(self, statuses: list[DiagnosticStatus]) -> None:
+        message = DiagnosticArray(status=statuses)
         message.header.stamp = self.get_clock().now().to_msg()
-        message.status = session.statuses(monotonic_ns, elapsed_s)
         self._diagnostics.publish(message)
-        self._console.tell(message.status, (monotonic_ns - self._began_ns) * 1e-9)
-        if monotonic_ns - self._saved_ns >= self.settings.state_period_s * 1e9:
-            threading.Thread(target=self.save, daemon=True).start()  # a disk may be slow
 
     # ------------------------------------------------- parameters and files
 
@@ -204,14 +232,24 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.get_logger().warning(f"state not used: {error}")
 
     def save(self) -> None:
-        """Write the state file, if there is to be one and anything to keep; a failure is told, not raised."""
+        """Write the state file now."""
+        if self._writer is not None:
+            self._writer.join()
+        self._to_write()()
+
+    def _to_write(self) -> Callable[[], None]:
+        """What writes the present state, if there is to be a file and anything to keep; a failure is told, not raised."""
         self._saved_ns = time.monotonic_ns()
         file, session = self.settings.state_file, self.session
-        if file is None or session is None:
-            return
-        try:
-            memory = session.estimator.memory
-            if memory["sides"]:
-                write_state(file, session.vehicle, memory)
-        except (OSError, ValueError) as error:
-            self.get_logger().warning(f"{file}: state cannot be written: {error}", throttle_duration_sec=30.0)
+        memory = session.estimator.memory if session is not None and file is not None else None
+        vehicle = session.vehicle if session is not None else None
+
+        def write() -> None:
+            if file is None or vehicle is None or not memory or not memory["sides"]:
+                return
+            try:
+                write_state(file, vehicle, memory)
+            except (OSError, ValueError) as error:
+                self.get_logger().warning(f"{file}: state cannot be written: {error}", throttle_duration_sec=30.0)
+
+        return write

@@ -53,9 +53,9 @@ class Session:
 
     def activate(self) -> None:
         self.active = True
-        if self.outputs.fading is not None:  # it was active before
-            self.estimator.set_released(self.outputs.released)
-            self.outputs.fading = None
+        if self._torque_ns:  # what has come meanwhile was for nobody: the feed-forward comes back from what was last published
+            self.estimator.set_released(self.outputs.released or [0.0] * len(self.vehicle.sides))
+        self.outputs.fading = None
 
     def deactivate(self) -> None:
         """Lead the feed-forward to zero; nothing else is published any more."""

@@ -61,6 +61,7 @@ def unmatched_world() -> Iterator[World]:
 def test_life_cycle() -> None:
     with LiveNode(*COMMANDS, "-p", "autostart:=false") as node, unmatched_world() as world:
         assert state_of(world) == State.PRIMARY_STATE_UNCONFIGURED
+        world.wait(lambda: any(s.message == "not configured" for d in world.heard["diagnostics"] for s in d.status))
         assert change_state(world, Transition.TRANSITION_CONFIGURE)
         assert state_of(world) == State.PRIMARY_STATE_INACTIVE
         world.wait(lambda: bool(world.heard["diagnostics"]))
@@ -68,8 +69,12 @@ def test_life_cycle() -> None:
         driver.steer(0.5)
         assert not world.heard["torque"]  # follows, but publishes nothing
         assert "node not active" in world.status("outputs")[1]
+        heard = len(world.heard["feed_forward"])
         assert change_state(world, Transition.TRANSITION_ACTIVATE)
+        assert not change_state(world, Transition.TRANSITION_ACTIVATE)  # refused, and no fault
         driver.steer(1.5)
+        stamped = [message.effort[0] for message in world.heard["feed_forward"][heard:]]
+        assert max(abs(b - a) for a, b in itertools.pairwise([0.0, *stamped])) < 6e3
         world.wait(lambda: len(world.heard["torque"]) > 100)
         torque = world.heard["torque"][-1].wrench.torque.z
         assert abs(torque) > 1e4
