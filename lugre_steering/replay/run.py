@@ -44,7 +44,7 @@ COMMAND = "steering/command"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
-NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate")
+NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate", "angle_jump")
 """Counters of the estimator about samples that it did use."""
 
 Progress = Callable[[str, int, "int | None"], None]
