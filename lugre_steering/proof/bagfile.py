@@ -15,13 +15,14 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.proof.sensors import Samples
 
+TYPES = {"angle": "JointState", "pressure": "FluidPressure", "temperature": "Temperature"}
 _SENTINEL = 1.2345678e-3
 _RECEIVED_NS = 600_000
 """A message is logged so much later than it is stamped."""
 
 
 class Topic(NamedTuple):
-    """One sensor: topic name, joint name (angles), 'pressure' or 'temperature' else, and what it recorded."""
+    """One sensor: topic name, kind (of TYPES), joint name (angles only), and what it recorded."""
 
     name: str
     kind: str
@@ -33,13 +34,12 @@ def write_bag(path: Path, topics: Sequence[Topic], epoch_s: int, plugin: Storage
     """Write all messages in the order of their stamps."""
     store = get_typestore(Stores.ROS2_JAZZY)
     stamp, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
-    types = {"angle": "sensor_msgs/msg/JointState", "pressure": "sensor_msgs/msg/FluidPressure", "temperature": "sensor_msgs/msg/Temperature"}
     none = np.zeros(0)
     head = header(stamp(0, 0), "steering_axle")
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         connections, templates, places = [], [], []
         for topic in topics:
-            kind = types[topic.kind]
+            kind = f"sensor_msgs/msg/{TYPES[topic.kind]}"
             connections.append(writer.add_connection(topic.name, kind, typestore=store))
             rest = ([topic.joint], np.array([_SENTINEL]), none, none) if topic.kind == "angle" else (_SENTINEL, 0.0)
             raw = bytes(store.serialize_cdr(store.types[kind](head, *rest), kind))

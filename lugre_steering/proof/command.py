@@ -17,12 +17,14 @@ import numba
 import numpy
 import scipy
 
-from lugre_steering.errors import LugreSteeringError
+from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.proof import campaign
-from lugre_steering.proof.blind import run_all, source_version
+from lugre_steering.proof.blind import source_version
+from lugre_steering.proof.journal import run_all
 from lugre_steering.proof.scoreboard import board
 from lugre_steering.resources import config_folder
 
+SIMULATORS = {"2": (2,), "3": (3,), "all": (2, 3)}
 QUICK_BUDGET_S = 225.0
 """No case is begun after this, so that a quick run ends within five minutes."""
 
@@ -32,6 +34,8 @@ def run(
     *,
     quick: bool = False,
     cases: str | None = None,
+    simulator: str = "all",
+    kinds: str | None = None,
     seed: int | None = None,
     peers: bool = False,
     announce: Callable[[str], None] = lambda _: None,
@@ -44,19 +48,14 @@ def run(
         for note in missing():
             announce(note)
     seed = secrets.randbelow(2**31) if seed is None else seed
-    chosen = campaign.campaign(seed)
-    if cases is not None:
-        chosen = campaign.matching(chosen, cases)
-    if quick:
-        chosen = campaign.quick(chosen)
+    chosen = _chosen(seed, simulator, kinds, cases, quick)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise LugreSteeringError(f"{out}: cannot be made: {error.strerror or error}; expected a writable folder") from error
-    command = " ".join(
-        ["lugre-steering prove --out DIR", f"--seed {seed}", *(["--quick"] if quick else []), *(["--peers"] if peers else [])]
-        + ([f"--cases '{cases}'"] if cases is not None else [])
-    )
+    flags = {"--quick": quick, "--peers": peers, f"--simulator {simulator}": simulator != "all"}
+    flags |= {f"--kinds {kinds}": kinds is not None, f"--cases '{cases}'": cases is not None}
+    command = " ".join(["lugre-steering prove --out DIR", f"--seed {seed}", *(flag for flag, given in flags.items() if given)])
     announce(f"{len(chosen)} cases, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
     rows = run_all(
         chosen, config_folder() / "test_vehicle.yaml", out / "cases.jsonl",
@@ -74,6 +73,18 @@ def run(
     else:
         draw_all(result, out)
     return result
+
+
+def _chosen(seed: int, simulator: str, kinds: str | None, cases: str | None, quick: bool) -> list[campaign.Hiding]:
+    """The cases that the options leave."""
+    if simulator not in SIMULATORS:
+        raise DataError(f"--simulator {simulator!r}: expected {', '.join(SIMULATORS)}")
+    chosen = campaign.campaign(seed, SIMULATORS[simulator])
+    if kinds is not None:
+        chosen = campaign.of_kinds(chosen, kinds)
+    if cases is not None:
+        chosen = campaign.matching(chosen, cases)
+    return campaign.quick(chosen) if quick else chosen
 
 
 def _versions() -> dict[str, str]:

@@ -275,7 +275,8 @@ def _carrier(channel: str, scene: Scene) -> Array:
     known: dict[str, Callable[[], Array]] = {
         "conservative": lambda: np.full_like(x, half), "coulomb": lambda: half * np.tanh(scene.rate / (0.1 * DEG)),
         "load": lambda: np.abs(scene.torque) * np.tanh(scene.rate / (0.1 * DEG)), "viscous": lambda: half * x,
-        "turbulent": lambda: half * x * np.abs(x), "gain": lambda: scene.torque, "inertia": lambda: half * scene.acceleration / (10.0 * DEG),
+        "turbulent": lambda: half * x * np.abs(x), "gain": lambda: scene.torque,
+        "inertia": lambda: half * scene.acceleration / (10.0 * DEG),
         "lag": lambda: -np.gradient(scene.torque, scene.step, axis=1),
     }  # fmt: skip
     return np.asarray(known[channel]())

@@ -113,7 +113,8 @@ class Turned(NamedTuple):
 def onset(t: float, start: float) -> float:
     """0 before ``start`` [s], 1 from one second later, a half cosine between."""
     share = min(max(t - start, 0.0), 1.0)
-    return 0.5 - 0.5 * np.cos(np.pi * share)
+    value: float = 0.5 - 0.5 * np.cos(np.pi * share)
+    return value
 
 
 @njit(cache=True)
@@ -122,20 +123,23 @@ def _place(where: float, low: float, high: float) -> float:
     edge = 0.1 * (high - low)
     inside = min((where - low) / edge, (high - where) / edge)
     inside = min(max(0.5 + 0.5 * inside, 0.0), 1.0)
-    return 0.5 - 0.5 * np.cos(np.pi * inside)
+    value: float = 0.5 - 0.5 * np.cos(np.pi * inside)
+    return value
 
 
 @njit(cache=True)
 def _looked_up(table: Array, degC: float) -> float:
     place = (degC - LOWEST_DEGC) / STEP_K
     i = min(max(int(place), 0), table.size - 2)
-    return table[i] + min(max(place - i, 0.0), 1.0) * (table[i + 1] - table[i])
+    value: float = table[i] + min(max(place - i, 0.0), 1.0) * (table[i + 1] - table[i])
+    return value
 
 
 @njit(cache=True)
 def _slope(rate: float, load: float, power: float) -> float:
     """dz/dt of a bristle whose tip carries ``load`` (torque over strength) while its root moves at ``rate``."""
-    return rate - abs(rate) * np.sign(load) * abs(load) ** power
+    value: float = rate - abs(rate) * np.sign(load) * abs(load) ** power
+    return value
 
 
 @njit(cache=True)

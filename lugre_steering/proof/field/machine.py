@@ -75,13 +75,13 @@ class Machine:
     reference_degC: float = 15.0
 
     @property
-    def track_load_N(self) -> float:
+    def track_load(self) -> float:
         return 0.5 * self.load_N + self.track_weight_N
 
     @property
-    def lever_sum_Nm(self) -> float:
+    def lever_sum(self) -> float:
         """Load times radius of all rollers of one track."""
-        return float(np.sum(self.track_load_N * self.roller_share * np.hypot(self.roller_x_m, self.hinge_offset_m)))
+        return float(np.sum(self.track_load * self.roller_share * np.hypot(self.roller_x_m, self.hinge_offset_m)))
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -128,19 +128,19 @@ def _with(machine: Machine, **changes: Any) -> Machine:
 def _linkage(machine: Machine, size: float, rng: np.random.Generator) -> tuple[Ram, ...]:
     """A ram per side and circuit, before or behind the hinge, sized for 7 to 11 MPa while sliding; left and right mirrored."""
     rams: list[Ram] = []
-    needed = machine.sliding * machine.lever_sum_Nm / machine.circuit_share.size
+    needed = machine.sliding * machine.lever_sum / machine.circuit_share.size
     for circuit in range(machine.circuit_share.size):
-        tried = [_ram(machine, size, circuit, needed, rng) for _ in range(60)]
+        tried = [_ram(size, circuit, needed, rng) for _ in range(60)]
         ram = max(tried, key=lambda r: _evenness(r, 1.3 * machine.limit))
         rams += [ram, Ram(1, circuit, ram.chassis.conjugate(), ram.knuckle.conjugate(), ram.bore_m, ram.rod_m)]
     return tuple(rams)
 
 
-def _ram(machine: Machine, size: float, circuit: int, torque_Nm: float, rng: np.random.Generator) -> Ram:
+def _ram(size: float, circuit: int, torque: float, rng: np.random.Generator) -> Ram:
     ahead, outward = (1.0 if circuit % 2 else -1.0), rng.choice([-1.0, 1.0])
     knuckle = size * complex(ahead * rng.uniform(0.24, 0.36), -outward * rng.uniform(0.0, 0.12))
     chassis = size * complex(ahead * rng.uniform(0.5, 0.8), -outward * rng.uniform(0.5, 0.85))
-    bore = round(float(np.sqrt(torque_Nm / (rng.uniform(7e6, 11e6) * 0.85 * abs(knuckle)) * 4.0 / np.pi)), 3)
+    bore = round(float(np.sqrt(torque / (rng.uniform(7e6, 11e6) * 0.85 * abs(knuckle)) * 4.0 / np.pi)), 3)
     return Ram(0, circuit, _millimetres(chassis), _millimetres(knuckle), bore, round(bore * rng.uniform(0.4, 0.6), 3))
 
 
@@ -166,12 +166,12 @@ def draw_ground(machine: Machine, rubber_degC: float, air_degC: float, rng: np.r
     def near(value: float, off: float = OFF_SHEET) -> float:
         return value * (1.0 + rng.uniform(-off, off))
 
-    sliding = near(machine.sliding) * machine.lever_sum_Nm
+    sliding = near(machine.sliding) * machine.lever_sum
     number = rng.uniform(6.0, 40.0, 3)
     amplitude = rng.uniform(0.01, 0.02) * np.sqrt(2.0 / 3.0) * np.ones(3)  # 1 to 2 % root mean square together
     return Ground(
         sliding_Nm=sliding, static_ratio=1.0 + near(machine.static / machine.sliding - 1.0, 0.3),
-        stiffness_Nm_rad=near(machine.sliding * machine.lever_sum_Nm / machine.yield_angle),
+        stiffness_Nm_rad=near(machine.sliding * machine.lever_sum / machine.yield_angle),
         stribeck_speed=near(machine.stribeck_speed), stribeck_exponent=float(rng.uniform(0.5, 2.0)),
         sharpness=float(np.exp(rng.uniform(np.log(0.75), np.log(1.5)))), rate_strengthening=float(rng.uniform(0.01, 0.04)),
         direct_share=float(rng.uniform(0.0, 0.3)), follow_angle=float(rng.uniform(0.1, 0.5)) * DEG,
@@ -179,7 +179,7 @@ def draw_ground(machine: Machine, rubber_degC: float, air_degC: float, rng: np.r
         waves=np.stack([amplitude, number, rng.uniform(0.0, 2.0 * np.pi, 3)], axis=1),
         heat_capacity_J_K=near(1120.0 * 1750.0 * machine.area_m2 * machine.tread_m),
         heat_loss_W_K=near(machine.transfer_W_m2K * machine.area_m2), rubber_degC=rubber_degC, air_degC=air_degC,
-        aligning_Nm=machine.track_load_N * machine.kingpin_lever_m * np.sin(machine.kingpin_inclination),
+        aligning_Nm=machine.track_load * machine.kingpin_lever_m * np.sin(machine.kingpin_inclination),
     )  # fmt: skip
 
 
@@ -230,7 +230,7 @@ def sheet_of(machine: Machine, sensors: dict[str, float], rubber_degC: float, ai
         },
         "friction": {
             "pavement": "dry_concrete", "static": machine.static, "coulomb": machine.sliding,
-            "stiffness_Nm_per_deg": round(machine.sliding * machine.lever_sum_Nm / machine.yield_angle * DEG, 1),
+            "stiffness_Nm_per_deg": round(machine.sliding * machine.lever_sum / machine.yield_angle * DEG, 1),
             "stribeck_speed_deg_s": round(machine.stribeck_speed / DEG, 3), "stribeck_exponent": 2.0,
             "reference_temperature_degC": machine.reference_degC,
         },

@@ -54,7 +54,9 @@ def draw_mean(limit: float, duration_s: float, rng: np.random.Generator) -> Arra
         hold = float(rng.exponential(pause)) if rng.random() < 0.7 else 0.1
         hold = min(hold + (rng.uniform(10.0, 30.0) if rng.random() < 0.05 else 0.0), 0.3 * duration_s)
         spent += abs(target - at) / rate + 0.5 + hold
-        targets.append(target), rates.append(rate), holds.append(hold)
+        targets.append(target)
+        rates.append(rate)
+        holds.append(hold)
         at, side = target, side if small else -side
     return strokes(np.array(targets), np.array(rates), np.array(holds))
 

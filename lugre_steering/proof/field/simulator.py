@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cases of the third simulator: a machine, its ground, its drives and its sensors, all drawn from one seed.
 
-Nothing of the truth enters the bags or the sheet. Two cases of one seed and kind share machine, drives and sensor noise, whatever they hide.
+Nothing of the truth enters the bags or the sheet. Two cases of one seed and kind share machine, drives and sensor noise.
 """
 
 from __future__ import annotations
