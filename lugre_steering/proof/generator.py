@@ -70,9 +70,10 @@ class Law:
     sign: float
     size: float
 
-    @property
-    def remembers(self) -> bool:
-        return self.memory != "none" or self.outside in REMEMBERING
+    def told(self) -> dict[str, str]:
+        """What it is, in words that scores are grouped by."""
+        memory = self.outside if self.outside in REMEMBERING else self.memory
+        return {"channel": self.channel, "coordinate": self.coordinate, "memory": memory, "shape": self.shape, "outside": self.outside}
 
 
 CHANNELS: dict[str, tuple[float, float]] = {
@@ -83,6 +84,8 @@ CHANNELS: dict[str, tuple[float, float]] = {
 COORDINATES = (
     "angle", "abs angle", "rate", "direction", "since reversal", "torque", "power", "time", "slip", "dwell", "temperature",
 )  # fmt: skip
+MOVING = ("angle", "rate", "direction", "since reversal", "torque", "power")
+"""Coordinates that go up and down in every recording: what a delay, a mode or a catch needs to be felt."""
 MEMORIES = ("none", "lag", "play")
 SHAPES = ("linear", "power", "approach", "step", "hinge", "window", "bump", "wave", "product")
 OUTSIDE = ("latched", "resonator", "retarded", "diagonal", "alternating", "bursts", "wiping")
@@ -96,7 +99,8 @@ def draw_law(rng: np.random.Generator) -> Law:
     outside = str(rng.choice(OUTSIDE)) if rng.random() < OUTSIDE_SHARE else ""
     memory = str(rng.choice(MEMORIES[1:])) if not outside and rng.random() < 0.5 else "none"
     return Law(
-        channel=channel, coordinate=str(rng.choice(COORDINATES)), memory=memory, shape=str(rng.choice(SHAPES)), outside=outside,
+        channel=channel, coordinate=str(rng.choice(MOVING if outside else COORDINATES)), memory=memory,
+        shape=str(rng.choice(SHAPES)), outside=outside,
         a=float(rng.random()), b=float(rng.random()), c=float(rng.random()), memory_s=float(np.exp(rng.uniform(np.log(0.7), np.log(8.0)))),
         play=float(rng.uniform(0.1, 0.4)), sign=float(rng.choice([-1.0, 1.0])), size=float(rng.uniform(low, high)),
     )  # fmt: skip

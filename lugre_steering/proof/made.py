@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lugre_steering.proof.sensors import Samples
 
 Array = NDArray[np.float64]
 
@@ -53,6 +55,17 @@ class BagTruth(Protocol):
     def effect_torque(self) -> dict[str, Array]: ...
     @property
     def intervals(self) -> dict[str, list[tuple[float, float]]]: ...
+
+
+class SensedBag(BagTruth, Protocol):
+    """A bag with what its sensors recorded, and the clean angles (2, n) [rad] on the grid ``time``."""
+
+    @property
+    def angles(self) -> Sequence[Samples]: ...
+    @property
+    def pressures(self) -> Sequence[Samples]: ...
+    @property
+    def clean_angles(self) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -98,6 +111,16 @@ class Made(Protocol):
     def probe(self, angles: Array, step: float) -> Probe:
         """The same vehicle on other angles (2, n) [rad]."""
         ...
+
+
+def seen_variance(bag: SensedBag, step: float, torque_of: Callable[[Array, Array], Array]) -> float:
+    """Variance [N2 m2] of the torque that sensors show about the noise-free one, on a clock of ``step`` [s] that reads between
+    the samples of every channel, all phases alike; ``torque_of`` (pressures, angles) as the sheet's geometry has it."""
+    start = max(0.0, *(samples.time[0] for samples in (*bag.angles, *bag.pressures)))
+    time = np.arange(start, min(samples.time[-1] for samples in bag.pressures), step)
+    angles = np.stack([np.interp(time, bag.time, angle) for angle in bag.clean_angles])
+    seen = np.stack([np.interp(time, samples.time, samples.value) for samples in bag.pressures])
+    return float(np.mean((torque_of(seen, angles) - np.interp(time, bag.time, bag.torque)) ** 2))
 
 
 def pooled_noise(made: Made) -> float:

@@ -16,7 +16,7 @@ from lugre_steering.proof import hydraulics, manoeuvres, simulator
 from lugre_steering.proof.campaign import Hiding
 from lugre_steering.proof.conceal import Concealed
 from lugre_steering.proof.field import simulator as field
-from lugre_steering.proof.made import Hidden, Made, Probe, Wanted
+from lugre_steering.proof.made import Hidden, Made, Probe, Wanted, seen_variance
 from lugre_steering.proof.sensors import PERIOD_S
 from lugre_steering.proof.simulator import BagData, Case, CaseData
 from lugre_steering.proof.vehicle_draw import Sheet, load_sheet
@@ -50,13 +50,9 @@ class SecondCase:
 
     def seen_noise_variance(self, bag: int) -> float:
         """Lower than ``noise_variance`` for white noise, since interpolation averages: what is left to a perfect model there."""
-        here = self.bags[bag]
-        start = max(samples.time[0] for samples in (*here.angles, *here.pressures))
-        time = np.arange(start, min(samples.time[-1] for samples in here.pressures), 0.1 * PERIOD_S)
-        angles = np.stack([np.interp(time, here.time, angle) for angle in here.clean_angles])
-        seen = np.stack([np.interp(time, samples.time, samples.value) for samples in here.pressures])
-        measured = hydraulics.torque_of(seen, hydraulics.line_gain(self.data.sheet, angles))
-        return float(np.mean((measured - np.interp(time, here.time, here.torque)) ** 2))
+        return seen_variance(
+            self.bags[bag], 0.1 * PERIOD_S, lambda seen, angles: hydraulics.torque_of(seen, hydraulics.line_gain(self.data.sheet, angles))
+        )
 
     def tangents(self) -> Array:
         return self._tangents
@@ -67,8 +63,7 @@ class SecondCase:
 
     def told(self, effect: Hidden) -> dict[str, float | str]:
         if effect.id == LAW:
-            law = self.data.law
-            return {**effect.values, **{key: getattr(law, key) for key in ("channel", "coordinate", "memory", "shape", "outside")}}
+            return {**effect.values, **self.data.law.told()}
         return {key: self.data.sheet.lines[int(value)] if key == "line" else value for key, value in effect.values.items()}
 
     def write(self, seen: Path, unseen: Path) -> list[Path]:

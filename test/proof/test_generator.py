@@ -27,7 +27,7 @@ ANGLE = np.stack([0.4 * np.tanh(3.0 * np.sin(0.4 * TIME)) * (0.7 + 0.3 * np.cos(
 """Strokes of changing size with rests at their ends."""
 SCENE = Scene(
     TIME, ANGLE, np.gradient(ANGLE, 4e-3, axis=1), np.gradient(np.gradient(ANGLE, 4e-3, axis=1), 4e-3, axis=1),
-    1e4 * np.tanh(np.cos(0.4 * TIME) * 5.0) * np.ones((2, 1)), 15.0 + 0.1 * TIME * np.ones((2, 1)), 0.4, 4e4,
+    1.9e4 * np.tanh(np.cos(0.4 * TIME) * 5.0) * np.ones((2, 1)), 15.0 + 0.1 * TIME * np.ones((2, 1)), 0.4, 4e4,
 )  # fmt: skip
 PLAIN = Law("conservative", "angle", "none", "linear", "", 0.5, 0.5, 0.5, 2.0, 0.2, 1.0, 0.03)
 DRAWN = [draw_law(np.random.default_rng(seed)) for seed in range(600)]

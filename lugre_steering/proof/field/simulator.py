@@ -25,7 +25,7 @@ from lugre_steering.proof.field import hydraulics, machine, motion, rubber, shee
 from lugre_steering.proof.field.dirt import STATED, Dirt, draw_clean, draw_dirt, sense
 from lugre_steering.proof.field.friction import Cells, Ground, Inside, Turned, turn_track
 from lugre_steering.proof.generator import Law, Modulation, Scene, draw_law, modulate
-from lugre_steering.proof.made import Hidden, Probe, Wanted, active_intervals, unit
+from lugre_steering.proof.made import Hidden, Probe, Wanted, active_intervals, seen_variance, unit
 from lugre_steering.proof.sensors import NoiseKind, Samples
 
 Array = NDArray[np.float64]
@@ -230,13 +230,10 @@ class FieldCase:
 
     def seen_noise_variance(self, bag: int) -> float:
         """Variance of the torque that the sensors show on a common clock about the noise-free one [N2 m2], skews included."""
-        here = self.bags[bag]
-        start = max(samples.time[0] for samples in (*here.angles, *here.pressures))
-        time = np.arange(max(start, 0.0), min(samples.time[-1] for samples in here.pressures), 0.2 * PERIOD_S)
-        angles = np.stack([np.interp(time, here.time, angle) for angle in here.clean_angles])
-        seen = np.stack([np.interp(time, samples.time, samples.value) for samples in here.pressures])
-        torque = hydraulics.torque_of(seen, hydraulics.gains(self.setting.machine, angles))
-        return float(np.mean((torque - np.interp(time, here.time, here.torque)) ** 2))
+        machine_ = self.setting.machine
+        return seen_variance(
+            self.bags[bag], 0.2 * PERIOD_S, lambda seen, angles: hydraulics.torque_of(seen, hydraulics.gains(machine_, angles))
+        )
 
     def tangents(self) -> Array:
         return self._tangents
@@ -258,8 +255,7 @@ class FieldCase:
 
     def told(self, effect: Hidden) -> dict[str, float | str]:
         if effect.id == LAW:
-            law = self.setting.law
-            return {**effect.values, **{key: getattr(law, key) for key in ("channel", "coordinate", "memory", "shape", "outside")}}
+            return {**effect.values, **self.setting.law.told()}
         lines = self.setting.machine.lines
         return {key: lines[int(value)] if key == "line" else value for key, value in effect.values.items()}
 
