@@ -175,7 +175,8 @@ def sheet_told(row: Row) -> bool:
     finding = wrong_sheet(row)
     if finding is None or names_named(row):
         return False
-    suspects = [str(suspect) for suspect in (finding.get("suspects") or [])[:FIRST_SUSPECTS]]
+    suspects = [str(suspect["key"] if isinstance(suspect, Mapping) else suspect) for suspect in (finding.get("suspects") or [])]
+    suspects = suspects[:FIRST_SUSPECTS]
     return any(re.search(pattern, suspect) for pattern in row["mistake"]["suspects"] for suspect in suspects)
 
 

@@ -195,6 +195,7 @@ def test_wrong_sheet_counts_with_a_right_suspect_among_three_and_no_name() -> No
         return scores.sheet_told({**case, "diagnosis": found})
 
     assert told(["friction.coulomb", "axle.load_N"])
+    assert told([{"key": "axle.load_N", "factor": 0.1}])  # type: ignore[list-item]
     assert not told(["friction.coulomb", "friction.static", "hydraulics.cylinders.left_a.bore_m", "axle.load_N"])
     assert not told(["axle.load_N"], effect("surface_patch"))
     assert not scores.sheet_told(case)

@@ -49,13 +49,13 @@ def _friction(sheet: Sheet, rng: np.random.Generator) -> Wrong:
 
 
 def _bore(sheet: Sheet, rng: np.random.Generator) -> Wrong:
-    """One pair of cylinders mistyped by about a tenth: the circuits then contradict each other, or the friction is a fifth off."""
+    """One pair of cylinders mistyped by a tenth: shared loads then no longer add up, or (one circuit) the friction is a fifth off."""
     factor = float(rng.choice([0.9, 1.1]))
     circuit = str(rng.choice(sorted({name[-1] for name in sheet["hydraulics"]["cylinders"]})))
     for name, cylinder in sheet["hydraulics"]["cylinders"].items():
         if name.endswith(circuit):
             cylinder["bore_m"] = round(cylinder["bore_m"] * factor, 4)
-    return Wrong(sheet, f"bores of circuit {circuit} x {factor:g}", (BORE,))
+    return Wrong(sheet, f"bores of circuit {circuit} x {factor:g}", (rf"(left|right)_{circuit}\.bore|bores of all",))
 
 
 def _arm(sheet: Sheet, rng: np.random.Generator) -> Wrong:
@@ -72,7 +72,7 @@ def _sides(sheet: Sheet, _rng: np.random.Generator) -> Wrong:
         "left": "steering/right/joint_state", "left_joint": "right_track_steer_joint",
         "right": "steering/left/joint_state", "right_joint": "left_track_steer_joint",
     }  # fmt: skip
-    return Wrong(sheet, "left and right exchanged", (r"topics\.(left|right)|side|exchanged",))
+    return Wrong(sheet, "left and right exchanged", (r"topics\.(left|right)|sides|angles? exchanged",))
 
 
 def _chambers(sheet: Sheet, _rng: np.random.Generator) -> Wrong:
