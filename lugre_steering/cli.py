@@ -396,17 +396,19 @@ def prove(
     out: OutFolder,
     quick: Annotated[bool, typer.Option("--quick", help="a stratified few, under five minutes on two cores")] = False,
     cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'null/*'")] = None,
+    simulator: Annotated[str, typer.Option(help="2 (a world like the sheet's), 3 (other friction, machines, sensors) or all")] = "all",
+    kinds: Annotated[str | None, typer.Option(help="only these kinds of cases, e.g. 'dirty,sheet'")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="repeat or resume the run with this seed [a new one]")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hide physics in recordings of a second simulator, diagnose them blind, and score the answers."""
+    """Hide physics in recordings of two other simulators, diagnose them blind, and score the answers."""
     from lugre_steering.proof.command import run
     from lugre_steering.proof.table import show_board
 
     with progress_bar() as progress:
         result = run(
-            out, quick=quick, cases=cases, seed=seed, peers=peers,
+            out, quick=quick, cases=cases, simulator=simulator, kinds=kinds, seed=seed, peers=peers,
             announce=lambda text: print(f"lugre-steering: {text}", file=sys.stderr), progress=progress,
         )  # fmt: skip
     if as_json:

@@ -8,6 +8,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -91,7 +92,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         )
         return TransitionCallbackReturn.SUCCESS
 
-    def _load(self, file: str) -> Vehicle:
+    def _load(self, file: Path) -> Vehicle:
         """The vehicle file, with what is doubtful in it told as warnings."""
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always")
