@@ -19,6 +19,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.live.console import Console
 from lugre_steering.live.parameters import changed, declare
@@ -96,6 +97,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         """The vehicle file, with what is doubtful in it told as warnings."""
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always")
+            add_files(self.settings.effects_files)
             vehicle = load(file)
         for doubt in doubts:
             self.get_logger().warning(str(doubt.message))

@@ -5,6 +5,7 @@ message."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ class Settings:
     """The node's parameters, checked."""
 
     vehicle_file: Path
+    effects_files: tuple[Path, ...]
     executor: str
     frame_id: str
     input_depth: int
@@ -74,6 +76,7 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
     if not given["vehicle_file"]:
         raise ParameterError("parameter 'vehicle_file': got nothing, expected a vehicle file (--ros-args -p vehicle_file:=PATH)")
     given["vehicle_file"] = Path(given["vehicle_file"])
+    given["effects_files"] = tuple(Path(name) for name in given["effects_files"].split(os.pathsep) if name)
     given["state_file"] = Path(given["state_file"]) if given["state_file"] else None
     return Settings(**given, options=Options(**{parameter.name: values[parameter.name] for parameter in OPTION_TABLE}))
 

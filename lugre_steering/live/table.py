@@ -51,6 +51,7 @@ class Parameter:
 
 TABLE = (
     Parameter("vehicle_file", "", "vehicle file (YAML); required. A change is taken over by the service ~/reload"),
+    Parameter("effects_files", "", "files with physics of your own (.yaml or .py), separated by ':'", fixed=True),
     Parameter("autostart", True, "configure and activate the node at start; false leaves that to a lifecycle manager", fixed=True),
     Parameter(
         "executor",
