@@ -127,6 +127,7 @@ class Composition:
 
 
 _made: dict[str, Composition] = {}
+_asked: dict[tuple[tuple[str, int], ...], Composition] = {}
 
 
 def composition_of(name: str) -> Composition:
@@ -141,6 +142,18 @@ def name_of(fields: Sequence[str]) -> str:
 
 def compose(effects: Sequence[Physics]) -> Composition:
     """The step of the baseline with the given effects in place, in their order."""
+    asked = tuple((effect.id, id(effect)) for effect in effects)
+    if asked not in _asked:
+        _asked[asked] = _compose(effects)
+        _kept.extend(effects)
+    return _asked[asked]
+
+
+_kept: list[Physics] = []
+"""What ``_asked`` knows by its identity, which stays its own as long as it lives."""
+
+
+def _compose(effects: Sequence[Physics]) -> Composition:
     laws = {f"{effect.id}__{hook}": function for effect in effects for hook, function in effect.hooks.items()}
     text = _text(effects)
     sources = [text, *(_source(function) for function in laws.values())]
