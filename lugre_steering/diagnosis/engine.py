@@ -13,7 +13,6 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.bag import read_recordings
 from lugre_steering.data.bursts import set_aside
-from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
@@ -21,6 +20,7 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import split
 from lugre_steering.recording import Finding, Recording
@@ -66,9 +66,10 @@ def diagnose_recordings(
         )
     progress("estimating the motion")
     try:
-        problem = Problem(vehicle, [prepare(quality.recording, vehicle) for quality in qualities])
+        problem, apart = synchronised([quality.recording for quality in qualities], vehicle)
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
+    findings += [_entry(finding, bag) for bag, finding in apart.items()]
     travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
     roles = split(problem)
     if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
