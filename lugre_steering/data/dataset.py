@@ -19,6 +19,8 @@ from lugre_steering.vehicle import Vehicle
 
 MAX_RATE_HZ = 125.0
 GAP_S = 0.25
+BRIDGED_S = 0.05
+"""Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
 
@@ -184,7 +186,7 @@ def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tup
     valid = np.ones(count, bool)
     for signal in signals.values():
         after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
-        valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(GAP_S, 3.0 * step)
+        valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(BRIDGED_S, 3.0 * step)
     return time, valid
 
 

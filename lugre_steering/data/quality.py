@@ -40,6 +40,9 @@ NOISE_RATE_HZ = 20.0
 WINDOW_S = 1.0
 FORGOTTEN = 5.0
 """Presliding lengths after which less than 1 % of a wrong bristle deflection is left."""
+WENT_ON, EDGE_SAMPLES, LONGEST_UNSEEN_S = 0.05, 10, 1.0
+"""Share of a presliding length by which the turn in a gap may miss that of the rates at its edges, samples that give those, and
+the longest gap [s] that they can speak for."""
 PARKED = 0.02
 """Share of a presliding length that a track at rest may seem to move by angle noise."""
 LATE_S = 1.0
@@ -244,6 +247,8 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
         for i in np.flatnonzero(np.diff(time) > _gap_limit(period)):
             if any(_parked(other, time[i], time[i + 1], presliding) for c, other in angles.items() if c is not channel):
                 continue
+            if _went_on(signal, int(i), presliding):
+                continue
             after = slice(i + 1, None, _samples(0.2, period))
             turned = np.cumsum(np.abs(np.diff(signal.value[after], prepend=signal.value[i + 1])))
             forgotten = np.searchsorted(turned, FORGOTTEN * presliding)
@@ -259,6 +264,24 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
                 f"{far}; the measured torque is not used for {_total(tuple(lost)):.1f} s"
             )
             yield Finding("friction_memory_lost", channel.topic, statement, tuple(lost))
+
+
+def _went_on(signal: Signal, last: int, presliding: float) -> bool:
+    """The track moved through the gap after sample ``last`` as it did before and after it, so nothing happened unseen."""
+    time, value = signal.time_s, signal.value
+    gap = float(time[last + 1] - time[last])
+    if gap > LONGEST_UNSEEN_S:
+        return False
+    ends = []
+    for part in (slice(max(last - EDGE_SAMPLES, 0), last + 1), slice(last + 1, last + 2 + EDGE_SAMPLES)):
+        if time[part].size < 3 or float(np.diff(time[part]).max()) > _gap_limit(float(np.median(np.diff(time)))):
+            return False
+        slope, offset = np.polyfit(time[part] - time[last], value[part], 1)
+        ends.append((float(slope), float(offset)))
+    (before, from_), (after, back) = ends
+    turned = back + after * gap - from_
+    expected = 0.5 * (before + after) * gap
+    return before * after >= -((WENT_ON * presliding / gap) ** 2) and abs(turned - expected) < WENT_ON * presliding
 
 
 def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool:

@@ -22,6 +22,8 @@ FIRST_S, GROWTH = 4.0, 4.0
 """Stretch that the first search uses, and by how much each next one is longer and finer."""
 BLOCK_S = 120.0
 """Longest stretch that counts as one clock: device clocks wander."""
+PLACES = 24
+"""Places of the grid within a period that are tried: no message comes early, but the latest may come a period late."""
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
 SCATTER_S = 2e-4
 """Scatter that harms nothing."""
@@ -66,20 +68,25 @@ def _grid(time: Array) -> Grid | None:
         trial = about + np.linspace(-width, width, max(3, 2 * int(np.ceil(4.0 * width * reach)) + 1))
         phases = np.exp(2j * np.pi * np.outer(trial, part)).mean(axis=1)
         best = int(np.abs(phases).argmax())
-        about, phase, coherence = float(trial[best]), complex(phases[best]), float(np.abs(phases[best]))
+        about, coherence = float(trial[best]), float(np.abs(phases[best]))
         if reach >= elapsed[-1]:
             break
         width, reach = 0.5 / reach, min(reach * GROWTH, float(elapsed[-1]))
     if coherence < COHERENT:
         return None
-    start = float(np.angle(phase)) / (2.0 * np.pi * about)
-    number = np.round((elapsed - start) * about).astype(np.int64)
+    starts = np.arange(PLACES) / (PLACES * about)
+    number = min((np.floor((elapsed - start) * about) for start in starts), key=lambda n: _disorder(elapsed * about, n)).astype(np.int64)
     # Messages keep their order: one that comes a whole period late shares the place of the next.
     order = np.arange(number.size)
     number = np.minimum.accumulate((number - order)[::-1])[::-1] + order
     slope, offset = np.polyfit(number, elapsed, 1)
     even = offset + slope * number
     return Grid(time[0] + even, number, float(np.std(elapsed - even)), float(slope))
+
+
+def _disorder(periods: Array, number: Array) -> float:
+    """Share of samples that share a place of the grid, and the variance of all about theirs, ``periods`` (n,) being their times."""
+    return float(np.mean(np.diff(number) == 0.0)) + 4.0 * float(np.var(periods - number))
 
 
 def evened(signal: Signal) -> tuple[Signal, float]:

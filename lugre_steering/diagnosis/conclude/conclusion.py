@@ -33,7 +33,8 @@ def conclude(
     problem, found = done.problem, done.found
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
-    named = bool(found.found) and judged.gain > -CONTRADICTED
+    # and an improvement that may be none is none.
+    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0
     final = found.final if named else found.baseline
     whole = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
