@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -143,6 +143,16 @@ def _air(recorded: Signal | None, vehicle: Vehicle) -> tuple[tuple[float, float]
             now = float(np.mean(value))
             steps.append((float(time[0]), now))
     return tuple(steps)
+
+
+def with_hydraulics(run: Run, vehicle: Vehicle) -> Run:
+    """The run as the cylinders of another vehicle would show it: same motion, same pressures."""
+    gains, turned = line_gains(vehicle, run.theta), line_gains(vehicle, run.theta + 1e-4)
+    side_torque = np.einsum("slt,lt->st", gains, run.pressure)
+    return replace(
+        run, gains=gains, side_torque=side_torque, side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, run.pressure),
+        measured=side_torque.sum(axis=0),
+    )  # fmt: skip
 
 
 def _first_air(recorded: Signal | None) -> float | None:

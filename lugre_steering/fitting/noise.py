@@ -37,6 +37,8 @@ AT_LEAST = 0.5
 """Share of the noise that the sheet gives its sensors, below which none is believed to be."""
 SLOW_MEMORY_S, SURENESS, LEAST_REST_S = 0.4, 3.0, 2.0
 """Memory of slow noise, standard deviations of its estimate that are allowed for, and the shortest standstill counted."""
+ROUNDING_DOUBT = 0.75
+"""Energy, in noise variances, by which the error of steps that no noise dithers may exceed its draws: it is no chance."""
 SUDDEN = 3.0
 """Times its expected fast energy beyond which a window holds an event rather than noise."""
 
@@ -255,7 +257,8 @@ def noise_model(
         variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / dt)))
         slow_variance = np.var(slow) * run.sigma**2
         sigmas.append(np.sqrt(slow_variance + swift_sigma**2 + variance))
-        doubts.append(slow_doubt(run) * slow_variance / sigmas[-1] ** 2)
+        coarse = ROUNDING_DOUBT if run.angle.coarse or run.rounding.size else 0.0
+        doubts.append(slow_doubt(run) * slow_variance / sigmas[-1] ** 2 + coarse)
         residuals.append(slow * run.sigma + swift / np.std(swift) * swift_sigma - errors[bag])
     sigma = np.concatenate(sigmas)
     return Noise(sigma, np.concatenate(residuals, axis=1), float(np.mean(np.concatenate(doubts))))
