@@ -9,7 +9,7 @@ and coarsely quantised recordings stay silent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
+from lugre_steering.data.dead import HELD, inspect_dead
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -82,8 +83,23 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
             if channel.kind is not Kind.ANGLE:
                 clean[channel] = _without(signal, finding.intervals_s)
     usable = _with_signals(recording, clean)
+    lost = tuple(_held_long(findings, vehicle, looks))
+    # What no sensor shows has no wiring to look at.
+    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle)
     # One angle sensor for both tracks would say everything twice.
-    return Quality(tuple(dict.fromkeys((*findings, *inspect_wiring(usable, vehicle)))), usable)
+    return Quality(tuple(dict.fromkeys((*findings, *wrong))), usable)
+
+
+def _held_long(findings: Sequence[Finding], vehicle: Vehicle, looks: Mapping[Channel, _Look]) -> Iterator[Finding]:
+    """Angles that stood at an end of their range, or still, for a good part of the recording."""
+    for channel, look in looks.items():
+        held = sum(
+            _total(f.intervals_s) for f in findings if f.topic == channel.topic and f.finding in ("clipped_angle", "stuck_sensor")
+        )
+        duration = float(look.time[-1] - look.time[0])
+        if channel.kind is Kind.ANGLE and held > HELD * duration:
+            statement = f"{channel.topic}: shows no angle for {held / duration:.0%} of the recording; check its range and its zero"
+            yield Finding("dead_sensor", channel.topic, statement)
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:

@@ -20,7 +20,7 @@ from scipy.stats import theilslopes
 
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import torque_side
+from lugre_steering.chain.step import Records, torque_side
 from lugre_steering.data.dataset import Run, angle_noise, prepare
 from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
@@ -29,8 +29,15 @@ from lugre_steering.units import words
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, build_model
 
-BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
+BLOCKING = frozenset({
+    "sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew", "wiring_suspect", "dead_sensor",
+    "copied_sensor", "noisy_sensor", "angle_zero",
+})  # fmt: skip
 
+UNTOLD = 0.3
+"""Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
+MOVING_RAD_S = 5e-3
+"""Rate of the first sample from which a recording begins in motion."""
 GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
@@ -110,6 +117,9 @@ def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
             return ()
         if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
             return ()
+        total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
+        if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))):
+            return ()
         found = _wrong(recording, vehicle, run)
     if found:
         return tuple(Finding(fault.finding, ", ".join(fault.topics), fault.statement, whole) for fault in found)
@@ -154,7 +164,16 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
 def _torques(model: Model, run: Run) -> Array:
     """Nominal torque of each side (sides, n) [N m]."""
     rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
-    return np.array([torque_side(p, model.rubber, run.time, *row) for p, *row in rows])
+    return np.array([torque_side(_as_it_moves(p, row[1]), model.rubber, run.time, *row) for p, *row in rows])
+
+
+def _as_it_moves(record: Records, omega: Array) -> Records:
+    """The parameters with a bristle that slides already, where a recording begins in the middle of a sweep."""
+    if abs(float(omega[0])) < MOVING_RAD_S:
+        return record
+    sliding = record.copy()
+    sliding["initial_bristle"] = np.sign(omega[0]) * record["coulomb_torque"] / record["sigma_0"]
+    return sliding
 
 
 def _error(run: Run, measured: Array, expected: Array) -> float:

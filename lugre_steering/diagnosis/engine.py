@@ -22,6 +22,7 @@ from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.sheet import WrongSheet, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.recording import Finding, Recording
 from lugre_steering.vehicle import Vehicle
@@ -30,6 +31,9 @@ MIN_SLIDING, MIN_SAMPLES = 2.0, 500
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart; samples that a fit needs."""
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""
+
+WORTH_A_SHEET = 0.5
+"""Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
 Progress = Callable[[str], None]
 
@@ -87,6 +91,9 @@ def diagnose_recordings(
             f"baseline: {lacking}. Nothing can be said about missing physics."
         )
         return _insufficient(qualities, vehicle, findings, statement, advice)
+    progress("comparing with the vehicle file")
+    if (wrong := wrong_sheet(problem)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
     progress("recalibrating the baseline")
     noise, roles, found = investigate(problem, seed, progress)
     left = problem.measured - found.final.prediction
@@ -96,6 +103,8 @@ def diagnose_recordings(
         findings += [_entry(finding, bag) for bag, finding in disturbed.items()]
         problem = Problem(vehicle, runs)
         noise, roles, found = investigate(problem, seed, progress)
+    if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     return conclude(done, findings, seed=seed, material=material, progress=progress)
@@ -110,6 +119,13 @@ def _entry(f: Finding, bag: str) -> dict[str, Any]:
         "finding": f.finding, "topic": f.topic, "bag": bag,
         "intervals_s": [list(span) for span in f.intervals_s], "statement": f.statement,
     }  # fmt: skip
+
+
+def _wrong_sheet(
+    qualities: Sequence[Quality], vehicle: Vehicle, findings: list[dict[str, Any]], wrong: WrongSheet
+) -> Diagnosis:
+    statement = f"The vehicle file is not that of this vehicle, or not of these sensors: {wrong.statement}. No physics is named before that is put right."
+    return _insufficient(qualities, vehicle, [*findings, wrong.entry()], statement, None)
 
 
 def _insufficient(

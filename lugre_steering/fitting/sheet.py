@@ -9,7 +9,7 @@ only itself: each hypothesis is fitted and ranked by what it leaves, in shares o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,11 +34,18 @@ SAMPLES, RATE_HZ = 6000, 25.0
 SCALES = (0.5, 2.0)
 """Range of the factor on a bore or an arm."""
 EXPLAINED, BETTER = 0.8, 0.9
-"""Share of what the baseline leaves that a geometry must explain, and share of what named physics leaves that it may leave."""
+"""Share of what the baseline leaves that a wrong entry must explain, and share of what named physics leaves that it may leave."""
+PUT_RIGHT = 0.03
+"""Error that is left, as share of the torque, with which a sheet counts as put right."""
+OFF, SEVERAL = 0.03, 1.1
+"""Relative error from which an entry is wrong, and what several wrong entries must be worth against one."""
+TIED = 1.1
+"""Cost over the lowest up to which a hypothesis is as good."""
 SHOWN = 5
 LOAD = Calibration("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
 LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
+LEVELS = ("friction_level", "stiffness")
 STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 
 
@@ -66,12 +73,13 @@ class WrongSheet:
 
     times: float
     suspects: tuple[Suspect, ...]
-    why: str
+    why: str | None = None
 
     @property
     def statement(self) -> str:
         check = ", ".join(suspect.words for suspect in self.suspects[:3])
-        return f"measured torque is {self.times:.2g} times what this sheet can give{self.why}; check {check}"
+        said = f"measured torque is {self.times:.2g} times what this sheet can give" if self.why is None else self.why
+        return f"{said}; check {check}"
 
     def entry(self) -> dict[str, Any]:
         """As an entry of ``data_quality``."""
@@ -91,30 +99,38 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     thin = thinned(problem)
     baseline = _fitted(thin)
     surprise = _surprise(thin, baseline)
-    stuck = at_bounds(thin, baseline.x, ("friction_level", "stiffness"))
+    stuck = at_bounds(thin, baseline.x, LEVELS)
     if not stuck and surprise < SURPRISE:
         return None
-    found = sorted((*_levels(thin), *_geometries(thin, baseline)), key=lambda item: item[0].cost)
-    suspect, relieved = found[0]
-    if not stuck and relieved > RELIEVED * surprise:
+    found = sorted(_off((*_levels(thin), *_geometries(thin, baseline))), key=lambda item: item[0].cost)
+    if not found:
         return None
-    why = f" ({' and '.join(name.replace('_', ' ') for name in stuck)} at the bound of recalibration)" if stuck else ""
-    return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]), why)
+    suspect, _ = found[0]
+    floor = float(np.count_nonzero(thin.valid))
+    fits = suspect.error < PUT_RIGHT or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
+    if not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise:
+        return None
+    return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]))
 
 
-def wrong_geometry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = ()) -> WrongSheet | None:
-    """Whether one wrong bore, arm or pair of lines explains what the baseline leaves, and better than ``effects`` do."""
-    if problem.vehicle.hydraulics is None:
-        return None
+def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = ()) -> WrongSheet | None:
+    """Whether one wrong bore, arm or pair of lines, or another vehicle, explains what the baseline leaves, and better than ``effects``."""
     thin = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
-    found = sorted((suspect for suspect, _ in _geometries(thin, baseline)), key=lambda item: item.cost)
+    found = sorted((suspect for suspect, _ in _off((*_levels(thin), *_geometries(thin, baseline)))), key=lambda item: item.cost)
+    if not found:
+        return None
     floor = float(np.count_nonzero(thin.valid))
     left = found[0].cost - floor
     if left > (1.0 - EXPLAINED) * (baseline.cost - floor) or left > BETTER * (named.cost - floor):
         return None
-    return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), ", and not alike in both directions and all lines")
+    return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
+
+
+def _off(found: Iterable[tuple[Suspect, float]]) -> list[tuple[Suspect, float]]:
+    """Those whose entry is off by more than drawings and tapes are."""
+    return [(suspect, left) for suspect, left in found if suspect.factor is None or abs(np.log(suspect.factor)) > OFF]
 
 
 def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
@@ -196,7 +212,8 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
         if key == pressures and factor is not None:  # a torque goes with the square of a bore
             factor = factor**0.5 if vehicle.hydraulics is not None else factor
         freed = (name,) if name else (LEVEL.name, STIFF.name)
-        yield _suspect(problem, trial, result, key, factor), _surprise(trial, result, freed)
+        suspect = _suspect(problem, trial, result, key, factor)
+        yield suspect if name else replace(suspect, cost=SEVERAL * suspect.cost), _surprise(trial, result, freed)
 
 
 def _geometries(problem: Problem, baseline: Fit) -> Iterator[tuple[Suspect, float]]:
