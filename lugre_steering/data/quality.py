@@ -19,6 +19,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
 from lugre_steering.data.dead import HELD, inspect_dead
+from lugre_steering.data.sensing import worse_than_said
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -29,6 +30,8 @@ Intervals = tuple[tuple[float, float], ...]
 
 STUCK_S = 1.0
 """An exact repeat longer than this is a stuck sensor, where noise or a jump shows that the value should have moved."""
+LOST = 0.02
+"""Share of lost messages from which it is told."""
 CLIPPED_SAMPLES = 5
 """So many repeats in a row of a noisy channel's extreme value are a limit of the sensor, not chance."""
 SPIKE_SIGMA = 8.0
@@ -77,6 +80,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
         found, keep = _examine(channel, look, others, vehicle.sensors.pressure_range_Pa)
         findings += found
         clean[channel] = Signal(look.time[keep], look.value[keep])
+        findings += _sensor(channel, clean[channel], look, vehicle)
     for finding in _memory_lost(clean, vehicle):
         findings.append(finding)
         for channel, signal in clean.items():
@@ -100,6 +104,30 @@ def _held_long(findings: Sequence[Finding], vehicle: Vehicle, looks: Mapping[Cha
         if channel.kind is Kind.ANGLE and held > HELD * duration:
             statement = f"{channel.topic}: shows no angle for {held / duration:.0%} of the recording; check its range and its zero"
             yield Finding("dead_sensor", channel.topic, statement)
+
+
+def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> list[Finding]:
+    """A finding where the sensor, its clock or the logger is worse than the vehicle file lets expect."""
+    if signal.time_s.size < 100:
+        return []
+    unit = vehicle.coordinate.unit if channel.kind is Kind.ANGLE else "Pa" if channel.kind is Kind.PRESSURE else vehicle.coordinate.force_unit
+
+    def say(value: float) -> str:
+        return f"{np.degrees(value):.2g} deg" if unit == "rad" else f"{value:.2g} {unit}"
+
+    said = worse_than_said(signal, look.sheet, say) if look.sheet > 0.0 else None
+    found = [Finding("sensor_worse_than_sheet", channel.topic, f"{channel.topic}: {said}; taken into account")] if said else []
+    lost = _lost(look)
+    if lost > LOST:
+        statement = f"{channel.topic}: {lost:.0%} of the messages are lost; what lies between the others is not taken for measured"
+        found.append(Finding("lost_messages", channel.topic, statement))
+    return found
+
+
+def _lost(look: _Look) -> float:
+    """Share of messages lost, by the steps between those that came."""
+    missing = np.maximum(np.round(np.diff(look.time) / look.period) - 1.0, 0.0).sum()
+    return float(missing / (missing + look.time.size))
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:

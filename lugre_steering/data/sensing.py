@@ -7,11 +7,13 @@ A sensor worse than its sheet is believed; one that seems better keeps the sheet
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from lugre_steering.data.stamps import evened
 from lugre_steering.recording import Array, Signal
 
 FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
@@ -19,6 +21,8 @@ FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 WINDOW_S = 1.0
 DITHERED = 0.3
 """White noise, in steps of the resolution, from which it makes the error of rounding white too."""
+WORSE, LATE_S = 1.5, 1e-3
+"""Times the sheet's noise, and scatter of stamps [s], from which a sensor or its clock is worth a finding."""
 STEPS_SEEN = 0.9
 """Share of neighbouring levels that are whole multiples of the resolution, if it is one."""
 
@@ -26,11 +30,10 @@ STEPS_SEEN = 0.9
 @dataclass(frozen=True)
 class Sensing:
     """``noise`` standard deviation of the white part of one sample (rounding included where noise dithers it), ``resolution`` its
-    step (0: none seen), both in the channel's unit; ``scatter_s`` [s] of stamps that are late by chance, taken out."""
+    step (0: none seen), both in the channel's unit."""
 
     noise: float
     resolution: float
-    scatter_s: float = 0.0
 
     @property
     def coarse(self) -> bool:
@@ -72,6 +75,22 @@ def white_noise(signal: Signal) -> float:
     return float(np.sqrt(np.median(mean) / (FOURTH @ FOURTH)))
 
 
-def sensed(signal: Signal, scatter_s: float = 0.0) -> Sensing:
+def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -> str | None:
+    """What a channel shows of its sensor that is clearly worse than its noise by the vehicle file, in words; None if it is not."""
+    even, scatter = evened(signal)
+    sensor = sensed(even)
+    said = []
+    if sensor.coarse and sensor.sigma() > WORSE * sheet:
+        said.append(f"steps of {say(sensor.resolution)}")
+    elif sensor.noise > WORSE * sheet:
+        said.append(f"noise of {say(sensor.noise)} per sample")
+    if said:
+        said[0] += f" (the vehicle file allows {say(sheet)})"
+    if scatter > LATE_S:
+        said.append(f"messages stamped on receipt, {1e3 * scatter:.1f} ms apart by chance; put back on the even clock of the sensor")
+    return "; ".join(said) or None
+
+
+def sensed(signal: Signal) -> Sensing:
     """Steps and noise of a channel."""
-    return Sensing(white_noise(signal), resolution(signal.value), scatter_s)
+    return Sensing(white_noise(signal), resolution(signal.value))

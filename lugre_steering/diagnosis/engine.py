@@ -13,6 +13,7 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.bag import read_recordings
 from lugre_steering.data.bursts import set_aside
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
@@ -22,8 +23,9 @@ from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import WrongSheet, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import LEVELS, WrongSheet, at_bounds, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
+from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Finding, Recording
 from lugre_steering.vehicle import Vehicle
 
@@ -70,7 +72,9 @@ def diagnose_recordings(
         )
     progress("estimating the motion")
     try:
-        problem, apart = synchronised([quality.recording for quality in qualities], vehicle)
+        pieces, cut = in_pieces([quality.recording for quality in qualities])
+        findings += [_entry(finding, bag) for bag, finding in cut.items()]
+        problem, apart = synchronised(pieces, vehicle)
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
     findings += [_entry(finding, bag) for bag, finding in apart.items()]
@@ -105,6 +109,9 @@ def diagnose_recordings(
         noise, roles, found = investigate(problem, seed, progress)
     if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
+    if found.found and at_bounds(problem, found.final.x, LEVELS) and (wrong := wrong_sheet(problem, insist=True)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
+    findings += [_entry(finding, bag) for bag, finding in weather_findings(problem, found.final).items()]
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     return conclude(done, findings, seed=seed, material=material, progress=progress)
