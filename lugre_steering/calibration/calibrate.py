@@ -37,14 +37,17 @@ from lugre_steering import __version__, units
 from lugre_steering.bag import read_recordings
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.earlier import earlier_result, write_record
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
+from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
+from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Array, Recording
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load, save
@@ -217,9 +220,11 @@ def calibrate_recordings(
         for finding in quality.blocking:
             raise DataError(f"{quality.recording.name}: the data must be put right first: {finding.statement}")
     progress("preparing")
-    runs = [prepare(quality.recording, vehicle) for quality in qualities]
-    problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)
+    pieces, cut = in_pieces([quality.recording for quality in qualities])
+    problem, apart = synchronised(pieces, vehicle, chosen(vehicle) if calibrations is None else calibrations)
     check_motion(problem)
+    progress("comparing with the vehicle file")
+    wrong = wrong_sheet(problem)
     progress("fitting")
     result = estimate(problem, priors=priors)
     progress("judging on held-out stretches")
@@ -236,9 +241,12 @@ def calibrate_recordings(
     }
     names = [calibration.name for calibration in problem.calibrations]
     found = [{"bag": quality.recording.name, **asdict(finding)} for quality in qualities for finding in quality.findings]
+    further = [*cut.items(), *apart.items(), *weather_findings(problem, result.fit).items()]
+    found += [{"bag": bag, **asdict(finding)} for bag, finding in further] + ([wrong.entry()] if wrong else [])
+    first = f"The vehicle file seems wrong: {wrong.statement}. " if wrong else ""
     return Calibrated(problem, result, fitted, {
         "priors": priors,
-        "duration_s": sum(float(run.time[-1] - run.time[0]) for run in runs),
+        "duration_s": sum(float(run.time[-1] - run.time[0]) for run in problem.runs),
         "parameters": rows,
         "covariance": {"names": names, "matrix": result.covariance[: len(names), : len(names)].tolist()},
         "rmse_Nm": rmse,
@@ -246,7 +254,7 @@ def calibrate_recordings(
         "undetermined": [asdict(combination) for combination in weak],
         "assumed": [asdict(value) for value in assumed],
         "data_quality": found,
-        "statement": units.words(vehicle, statement(rows, rmse, held, weak, assumed)),
+        "statement": units.words(vehicle, first + statement(rows, rmse, held, weak, assumed)),
     })  # fmt: skip
 
 

@@ -87,14 +87,14 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
             if channel.kind is not Kind.ANGLE:
                 clean[channel] = _without(signal, finding.intervals_s)
     usable = _with_signals(recording, clean)
-    lost = tuple(_held_long(findings, vehicle, looks))
+    lost = tuple(_held_long(findings, looks))
     # What no sensor shows has no wiring to look at.
     wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle)
     # One angle sensor for both tracks would say everything twice.
     return Quality(tuple(dict.fromkeys((*findings, *wrong))), usable)
 
 
-def _held_long(findings: Sequence[Finding], vehicle: Vehicle, looks: Mapping[Channel, _Look]) -> Iterator[Finding]:
+def _held_long(findings: Sequence[Finding], looks: Mapping[Channel, _Look]) -> Iterator[Finding]:
     """Angles that stood at an end of their range, or still, for a good part of the recording."""
     for channel, look in looks.items():
         held = sum(
@@ -110,7 +110,8 @@ def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> 
     """A finding where the sensor, its clock or the logger is worse than the vehicle file lets expect."""
     if signal.time_s.size < 100:
         return []
-    unit = vehicle.coordinate.unit if channel.kind is Kind.ANGLE else "Pa" if channel.kind is Kind.PRESSURE else vehicle.coordinate.force_unit
+    units = {Kind.ANGLE: vehicle.coordinate.unit, Kind.PRESSURE: "Pa", Kind.TORQUE: vehicle.coordinate.force_unit}
+    unit = units[channel.kind]
 
     def say(value: float) -> str:
         return f"{np.degrees(value):.2g} deg" if unit == "rad" else f"{value:.2g} {unit}"
@@ -125,9 +126,8 @@ def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> 
 
 
 def _lost(look: _Look) -> float:
-    """Share of messages lost, by the steps between those that came."""
-    missing = np.maximum(np.round(np.diff(look.time) / look.period) - 1.0, 0.0).sum()
-    return float(missing / (missing + look.time.size))
+    """Share of messages lost, by how many the usual step would have brought."""
+    return float(max(0.0, 1.0 - look.time.size * look.period / (look.time[-1] - look.time[0] + look.period)))
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:

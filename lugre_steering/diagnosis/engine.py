@@ -131,7 +131,10 @@ def _entry(f: Finding, bag: str) -> dict[str, Any]:
 def _wrong_sheet(
     qualities: Sequence[Quality], vehicle: Vehicle, findings: list[dict[str, Any]], wrong: WrongSheet
 ) -> Diagnosis:
-    statement = f"The vehicle file is not that of this vehicle, or not of these sensors: {wrong.statement}. No physics is named before that is put right."
+    statement = (
+        f"The vehicle file is not that of this vehicle, or not of these sensors: {wrong.statement}. "
+        "No physics is named before that is put right."
+    )
     return _insufficient(qualities, vehicle, [*findings, wrong.entry()], statement, None)
 
 

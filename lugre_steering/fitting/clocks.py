@@ -41,7 +41,7 @@ class Offset:
 
     @property
     def believed(self) -> bool:
-        return SHORTEST_S < abs(self.late_s) and abs(self.late_s) > SURE * self.deviation_s
+        return abs(self.late_s) > max(SHORTEST_S, SURE * self.deviation_s)
 
 
 def synchronised(
@@ -114,7 +114,7 @@ def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bo
     weight = original.valid / np.concatenate([run.sigma for run in original.runs])
     slow = fit(original, weight, [(lag, {"tau": float(late.mean())})], start.x, linearisations=10, robust=True, tolerance=1e-4)
     used = np.count_nonzero(weight)
-    return slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost
+    return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
 
 
 def _earlier(recording: Recording, shift: float) -> Recording:

@@ -9,8 +9,9 @@ only itself: each hypothesis is fitted and ranked by what it leaves, in shares o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -224,16 +225,12 @@ def _geometries(problem: Problem, baseline: Fit) -> Iterator[tuple[Suspect, floa
     hydraulics = problem.vehicle.hydraulics
     for name, cylinder in hydraulics.cylinders.items() if hydraulics is not None else ():
         key = f"hydraulics.cylinders.{name}"
-        scaled = {
-            "bore_m": lambda k, c=cylinder: replace(c, bore_m=c.bore_m * k, rod_m=min(c.rod_m, 0.95 * c.bore_m * k)),
-            "knuckle_m": lambda k, c=cylinder: replace(c, knuckle_m=tuple(k * v for v in c.knuckle_m)),
-        }
-        for entry, change in scaled.items():
+        for entry, scale in (("bore_m", _bore), ("knuckle_m", _knuckle)):
             factor = 1.0
             trial, result = problem, baseline
             for _ in range(2):
-                factor = _better(problem, trial, result, name, change, factor)
-                trial = _changed(problem, name, change(factor))
+                factor = _better(problem, trial, result, name, partial(scale, cylinder), factor)
+                trial = _changed(problem, name, scale(cylinder, factor))
                 result = _fitted(trial, start=baseline.x)
             yield _suspect(problem, trial, result, f"{key}.{entry}", factor), _surprise(trial, result)
         trial = _changed(problem, name, replace(cylinder, cap=cylinder.rod, rod=cylinder.cap))
@@ -241,7 +238,18 @@ def _geometries(problem: Problem, baseline: Fit) -> Iterator[tuple[Suspect, floa
         yield _suspect(problem, trial, result, f"{key}.cap and .rod exchanged", None), _surprise(trial, result)
 
 
-def _better(problem: Problem, trial: Problem, result: Fit, name: str, change: Any, factor: float) -> float:
+def _bore(cylinder: Cylinder, factor: float) -> Cylinder:
+    bore = cylinder.bore_m * factor
+    return replace(cylinder, bore_m=bore, rod_m=min(cylinder.rod_m, 0.95 * bore))
+
+
+def _knuckle(cylinder: Cylinder, factor: float) -> Cylinder:
+    return replace(cylinder, knuckle_m=tuple(factor * value for value in cylinder.knuckle_m))
+
+
+def _better(
+    problem: Problem, trial: Problem, result: Fit, name: str, change: Callable[[float], Cylinder], factor: float
+) -> float:
     """The factor on one entry that explains most of what is left, by how it changes the measured torque."""
     weight = _weight(trial)
     turned = (_changed(problem, name, change(factor * 1.02)).measured - trial.measured) * weight / 0.02

@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.catalogue import CATALOGUE
+from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
 
 CONTRADICTED = 0.02
@@ -34,8 +35,9 @@ def conclude(
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
     # and an improvement that may be none is none.
-    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0
-    final = found.final if named else found.baseline
+    clock = _clocks_alone(found.final)
+    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock
+    final = found.final if named or clock else found.baseline
     whole = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
@@ -79,6 +81,13 @@ def conclude(
         traces(done, whole, final, None if judged.rotated else found.final if named else found.baseline),
         evidence(done, effects),
         {effect["id"]: CATALOGUE[effect["id"]].coordinate for effect in effects},
+    )
+
+
+def _clocks_alone(final: Fit) -> bool:
+    """Whether all that was found is what two clocks may be apart, beyond what was measured and taken out of it."""
+    return bool(final.effects) and all(
+        candidate.effect.id == "time_delay" and abs(values["delay"]) < LONGEST_S for candidate, values in final.effects
     )
 
 
