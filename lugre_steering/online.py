@@ -17,9 +17,9 @@ from lugre_steering.vehicle.model import baseline_parameters
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3
 LARGE_SHARE = 0.7
-ALIKE, WRONG_TIMES = 0.85, 1.6
-"""Correlation about zero from which measured and estimated torque have one shape, and the factor between them that no nominal value
-and hardly any weather explains."""
+ALIKE, WRONG_TIMES, UNIT_TIMES = 0.85, 1.6, 30.0
+"""Correlation about zero from which measured and estimated torque have one shape, the factor between them that no nominal value and
+hardly any weather explains, and the one from which units are likelier."""
 NOTABLE_SHARE = 0.05
 """Of the static friction: below, the torque is too small to compare with."""
 
@@ -130,7 +130,7 @@ def sheet_words(residual_squares: float, estimate_squares: float, measured_squar
     if not product > ALIKE * math.sqrt(estimate_squares * measured_squares) or friction <= 0.0:
         return None
     times = product / estimate_squares
-    if 1.0 / WRONG_TIMES < times < WRONG_TIMES:
+    if not WRONG_TIMES < max(times, 1.0 / times) < UNIT_TIMES:
         return None
     level = "friction.coulomb" if vehicle.friction is not None else "contact.coulomb_torque_Nm"
     entries = [*(["axle.load_N"] if vehicle.axle is not None else []), level]

@@ -50,7 +50,7 @@ class Run:
     """Instants [s] from which the recorded air has another temperature [degC]; before the first, that of the vehicle file."""
     first_air: float | None = None
     """Recorded air temperature [degC] at the start; None where none was recorded."""
-    angle: Sensing = Sensing(0.0, 0.0)
+    angle: Sensing = field(default_factory=lambda: Sensing(0.0, 0.0))
     """The worst angle sensor as one sample of this clock shows it [rad]."""
     rounding: Array = field(default_factory=lambda: np.zeros(0))
     """Step of each pressure sensor [Pa] (lines,) that its noise does not dither; 0 elsewhere, empty if none has one."""

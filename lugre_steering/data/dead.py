@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import least_squares
 
+from lugre_steering import units
 from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.data.sensing import white_noise
@@ -36,26 +37,40 @@ COPIED, APART_RAD = 0.1, float(np.radians(0.3))
 """Share of the geometry's difference between the tracks that two sensors must show, where it reaches that root mean square."""
 ZERO_RAD, RESTORED, MISSED_RAD = float(np.radians(3.0)), 0.4, float(np.radians(1.0))
 """Zeros of the angles so far off, which restore the steering geometry to so much of its error, where that is so large."""
+IDLE = 4.0
+"""Times its white noise that the mean over MEAN_S of a channel moves by chance."""
+FAR_RAD = np.pi / 2.0
+"""No steered track turns so far: another unit, which the check of wiring tells."""
 HELD = 0.2
 """Share of a recording in which an angle sensor may stand at an end of its range."""
+
+
+Topics = dict[tuple[Kind, str], str]
 
 
 def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
     """Findings about channels that show nothing of the machine."""
     topics = {(c.kind, c.name): c.topic for c in vehicle.channels}
+    farthest = max((float(np.abs(s.value).max()) for s in recording.angle.values() if s.value.size), default=0.0)
+    if vehicle.track is not None and farthest > FAR_RAD:
+        return ()
     if noise := tuple(_noise_alone(recording, vehicle, topics)):
         return noise
     try:
         run = prepare(recording, vehicle)
     except DataError:
         return ()
-    return tuple(dict.fromkeys((
-        *_rough(run, vehicle, topics), *_frozen(run, vehicle, topics), *_copied(run, vehicle, topics),
-        *_zeros(run, vehicle, topics), *_constant(run, vehicle, topics),
-    )))  # fmt: skip
+    checks = (_frozen, _copied, _zeros, _constant)
+    return tuple(dict.fromkeys(finding for check in checks for finding in check(run, vehicle, topics)))
 
 
-Topics = dict[tuple[Kind, str], str]
+def inspect_noise(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Findings about angles too noisy to follow a bristle."""
+    try:
+        run = prepare(recording, vehicle)
+    except DataError:
+        return ()
+    return tuple(_rough(run, vehicle, {(c.kind, c.name): c.topic for c in vehicle.channels}))
 
 
 def _finding(name: str, topic: str, statement: str) -> Finding:
@@ -78,7 +93,8 @@ def _noise_alone(recording: Recording, vehicle: Vehicle, topics: Topics) -> Iter
         random = [name for name, s in shown if white_noise(s) ** 2 > ALL_NOISE * float(np.var(s.value)) > 0.0]
         if shown and len(random) == len(shown) and _moved(recording, vehicle, kind):
             topic = ", ".join(dict.fromkeys(topics[kind, name] for name in random))
-            yield _finding("dead_sensor", topic, f"noise and no {what}: nothing of it lasts from one sample to the next; check the sensor")
+            statement = f"noise and no {what}: nothing of it lasts from one sample to the next; check the sensor"
+            yield _finding("dead_sensor", topic, statement)
 
 
 def _moved(recording: Recording, vehicle: Vehicle, kind: Kind) -> bool:
@@ -98,8 +114,9 @@ def _rough(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
     if run.angle.sigma() > ROUGH * presliding:
         topic = ", ".join(dict.fromkeys(topics[Kind.ANGLE, side] for side in vehicle.sides))
         yield _finding(
-            "noisy_sensor", topic, f"noise of {np.degrees(run.angle.sigma()):.2g} deg per sample is {run.angle.sigma() / presliding:.0%} of "
-            "what the contact turns before it slides; no friction can be told from it; check the sensor and its cable",
+            "noisy_sensor", topic,
+            f"noise of {units.distance(vehicle, run.angle.sigma(), degrees='.2g')} per sample is {run.angle.sigma() / presliding:.0%} "
+            "of what the contact turns before it slides; no friction can be told from it; check the sensor and its cable",
         )  # fmt: skip
 
 
@@ -117,7 +134,8 @@ def _frozen(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
         return
     for side, span in zip(vehicle.sides, spans, strict=True):
         if span < ALIVE * max(spans):
-            yield _finding("dead_sensor", topics[Kind.ANGLE, side], "stays where it is while the other track turns; check the sensor and its driver")
+            statement = "stays where it is while the other track turns; check the sensor and its driver"
+            yield _finding("dead_sensor", topics[Kind.ANGLE, side], statement)
 
 
 def _geometry(run: Run, vehicle: Vehicle) -> tuple[Array, Array, float] | None:
@@ -168,7 +186,8 @@ def _zeros(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
         return
     for side, off in zip(("left", "right"), found.x, strict=True):
         if abs(float(off)) > 0.5 * abs(float(found.x[worst])):
-            yield _finding("angle_zero", topics[Kind.ANGLE, side], f"its zero is about {np.degrees(off):+.0f} deg off by the steering geometry; set it anew")
+            statement = f"its zero is about {np.degrees(off):+.0f} deg off by the steering geometry; set it anew"
+            yield _finding("angle_zero", topics[Kind.ANGLE, side], statement)
 
 
 def _constant(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
@@ -176,20 +195,31 @@ def _constant(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
     if vehicle.hydraulics is None:
         return
     model = build_model(vehicle)
-    if float(np.ptp(run.theta, axis=1).max()) < MOVES * float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0]):
+    record = model.parameters[0][0]
+    if float(np.ptp(run.theta, axis=1).max()) < MOVES * float(record["coulomb_torque"] / record["sigma_0"]):
         return
     rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
     torque = np.asarray(np.sum([torque_side(p, model.rubber, run.time, *row) for p, *row in rows], axis=0))
-    expected = line_pressures(torque, total_gains(vehicle, run.theta))
-    lines = vehicle.hydraulics.lines
+    try:
+        expected = line_pressures(torque, total_gains(vehicle, run.theta))
+    except DataError:  # angles that these cylinders cannot reach: a matter of units
+        return
+    lines, cylinders = vehicle.hydraulics.lines, vehicle.hydraulics.cylinders.values()
     still = {
         line for line, shown, nominal in zip(lines, run.pressure, expected, strict=True)
-        if _travel(run, shown[run.valid]) < ALIVE * _travel(run, nominal[run.valid])
+        if _travel(run, shown[run.valid]) < ALIVE * _travel(run, nominal[run.valid]) and _idle(run, shown)
     }  # fmt: skip
     dead = [
         line for line in lines
-        if line in still and all(other in still for c in vehicle.hydraulics.cylinders.values() if line in (c.cap, c.rod) for other in (c.cap, c.rod))
+        if line in still and all(still.issuperset({c.cap, c.rod} & set(lines)) for c in cylinders if line in (c.cap, c.rod))
     ]  # fmt: skip
     if dead:
         topic = ", ".join(topics[Kind.PRESSURE, line] for line in dead)
-        yield _finding("dead_sensor", topic, "stays constant but for noise while the tracks turn against friction; check sensors, plugs and valves")
+        statement = "stays constant but for noise while the tracks turn against friction; check sensors, plugs and valves"
+        yield _finding("dead_sensor", topic, statement)
+
+
+def _idle(run: Run, shown: Array) -> bool:
+    """Whether a pressure shows nothing but its own noise, in whatever unit."""
+    noise = white_noise(Signal(run.time, shown))
+    return _travel(run, shown[run.valid]) < max(IDLE * noise, 1e-9 * float(np.abs(shown).max()))

@@ -18,7 +18,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
-from lugre_steering.data.dead import HELD, inspect_dead
+from lugre_steering.data.dead import HELD, inspect_dead, inspect_noise
 from lugre_steering.data.sensing import worse_than_said
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
@@ -80,7 +80,6 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
         found, keep = _examine(channel, look, others, vehicle.sensors.pressure_range_Pa)
         findings += found
         clean[channel] = Signal(look.time[keep], look.value[keep])
-        findings += _sensor(channel, clean[channel], look, vehicle)
     for finding in _memory_lost(clean, vehicle):
         findings.append(finding)
         for channel, signal in clean.items():
@@ -88,8 +87,10 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
                 clean[channel] = _without(signal, finding.intervals_s)
     usable = _with_signals(recording, clean)
     lost = tuple(_held_long(findings, looks))
-    # What no sensor shows has no wiring to look at.
-    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle)
+    # What no sensor shows has no wiring to look at; angles in another unit have its noise too.
+    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle) or inspect_noise(usable, vehicle)
+    if not wrong:
+        findings += [finding for channel, look in looks.items() for finding in _sensor(channel, clean[channel], look, vehicle)]
     # One angle sensor for both tracks would say everything twice.
     return Quality(tuple(dict.fromkeys((*findings, *wrong))), usable)
 
@@ -110,8 +111,7 @@ def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> 
     """A finding where the sensor, its clock or the logger is worse than the vehicle file lets expect."""
     if signal.time_s.size < 100:
         return []
-    units = {Kind.ANGLE: vehicle.coordinate.unit, Kind.PRESSURE: "Pa", Kind.TORQUE: vehicle.coordinate.force_unit}
-    unit = units[channel.kind]
+    unit = {Kind.ANGLE: vehicle.coordinate.unit, Kind.PRESSURE: "Pa", Kind.TORQUE: vehicle.coordinate.force_unit}[channel.kind]
 
     def say(value: float) -> str:
         return f"{np.degrees(value):.2g} deg" if unit == "rad" else f"{value:.2g} {unit}"
@@ -126,8 +126,10 @@ def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> 
 
 
 def _lost(look: _Look) -> float:
-    """Share of messages lost, by how many the usual step would have brought."""
-    return float(max(0.0, 1.0 - look.time.size * look.period / (look.time[-1] - look.time[0] + look.period)))
+    """Share of messages lost one by one or in short bursts, by how many the usual step would have brought; gaps are told as such."""
+    step = np.diff(look.time)
+    short = step[step <= _gap_limit(look.period)]
+    return float(max(0.0, 1.0 - short.size * look.period / max(float(short.sum()), 1e-9)))
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:
