@@ -60,17 +60,18 @@ def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
         run = prepare(recording, vehicle)
     except DataError:
         return ()
-    checks = (_frozen, _copied, _zeros, _constant)
+    checks = (_frozen, _zeros, _constant)
     return tuple(dict.fromkeys(finding for check in checks for finding in check(run, vehicle, topics)))
 
 
-def inspect_noise(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """Findings about angles too noisy to follow a bristle."""
+def inspect_angles(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Findings about angles of sound units that are too noisy to follow a bristle, or one and the same twice."""
     try:
         run = prepare(recording, vehicle)
     except DataError:
         return ()
-    return tuple(_rough(run, vehicle, {(c.kind, c.name): c.topic for c in vehicle.channels}))
+    topics = {(c.kind, c.name): c.topic for c in vehicle.channels}
+    return (*_rough(run, vehicle, topics), *_copied(run, vehicle, topics))
 
 
 def _finding(name: str, topic: str, statement: str) -> Finding:

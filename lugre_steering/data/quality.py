@@ -18,7 +18,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
-from lugre_steering.data.dead import HELD, inspect_dead, inspect_noise
+from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
 from lugre_steering.data.sensing import worse_than_said
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
@@ -88,7 +88,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
     usable = _with_signals(recording, clean)
     lost = tuple(_held_long(findings, looks))
     # What no sensor shows has no wiring to look at; angles in another unit have its noise too.
-    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle) or inspect_noise(usable, vehicle)
+    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle) or inspect_angles(usable, vehicle)
     if not wrong:
         findings += [finding for channel, look in looks.items() for finding in _sensor(channel, clean[channel], look, vehicle)]
     # One angle sensor for both tracks would say everything twice.

@@ -20,7 +20,7 @@ from scipy.stats import theilslopes
 
 from lugre_steering.chain.hydraulics import gauge_offset, line_gains
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import Records, torque_side
+from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, angle_noise, prepare
 from lugre_steering.effects.sensors import sensor_correction
 from lugre_steering.errors import DataError
@@ -36,8 +36,6 @@ BLOCKING = frozenset({
 
 UNTOLD = 0.3
 """Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
-MOVING_RAD_S = 5e-3
-"""Rate of the first sample from which a recording begins in motion."""
 GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
@@ -164,16 +162,7 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
 def _torques(model: Model, run: Run) -> Array:
     """Nominal torque of each side (sides, n) [N m]."""
     rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
-    return np.array([torque_side(_as_it_moves(p, row[1]), model.rubber, run.time, *row) for p, *row in rows])
-
-
-def _as_it_moves(record: Records, omega: Array) -> Records:
-    """The parameters with a bristle that slides already, where a recording begins in the middle of a sweep."""
-    if abs(float(omega[0])) < MOVING_RAD_S:
-        return record
-    sliding = record.copy()
-    sliding["initial_bristle"] = np.sign(omega[0]) * record["coulomb_torque"] / record["sigma_0"]
-    return sliding
+    return np.array([torque_side(p, model.rubber, run.time, *row) for p, *row in rows])
 
 
 def _error(run: Run, measured: Array, expected: Array) -> float:
