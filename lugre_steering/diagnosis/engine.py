@@ -80,6 +80,9 @@ def diagnose_recordings(
     findings += [_entry(finding, bag) for bag, finding in apart.items()]
     travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
     roles = split(problem)
+    progress("comparing with the vehicle file")
+    if roles.fit.sum() >= MIN_SAMPLES and (wrong := wrong_sheet(problem)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
     if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
         if travel < MIN_SLIDING:
             lacking = f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
@@ -95,9 +98,6 @@ def diagnose_recordings(
             f"baseline: {lacking}. Nothing can be said about missing physics."
         )
         return _insufficient(qualities, vehicle, findings, statement, advice)
-    progress("comparing with the vehicle file")
-    if (wrong := wrong_sheet(problem)) is not None:
-        return _wrong_sheet(qualities, vehicle, findings, wrong)
     progress("recalibrating the baseline")
     noise, roles, found = investigate(problem, seed, progress)
     left = problem.measured - found.final.prediction

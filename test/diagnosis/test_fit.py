@@ -34,7 +34,7 @@ def test_reaches_the_minimum_that_scipy_reaches(problem: Problem, robust: bool) 
     found = fit(hidden, weight(hidden), [effect("line_loss_quadratic", c=1e4)], robust=robust, priors=False)
 
     scales = np.append(hidden.scales(), 1e4)
-    wide = np.array([0.0] * len(hidden.calibrations) + [0.3] * len(hidden.runs))
+    wide = hidden.prior_weights(False)
 
     def residuals(p: np.ndarray) -> np.ndarray:
         values = p * scales

@@ -75,7 +75,12 @@ def reference(sound: Recording) -> Array:
 def calibration(recording: Recording) -> Array:
     """Fitted friction level, static ratio, stiffness, Stribeck speed (logarithms, ratio); heat is too slow to judge by."""
     run = prepare(recording, VEHICLE)
-    return fit(Problem(VEHICLE, [run]), np.where(run.valid, 1.0 / run.sigma, 0.0)).x[:4]
+    problem = Problem(VEHICLE, [run])
+    x = fit(problem, np.where(run.valid, 1.0 / run.sigma, 0.0)).x
+    record, table = problem.model.parameters[0][0], problem.model.rubber
+    degrees = record["table_low"] + record["table_step"] * np.arange(len(table))
+    stiffness, friction = (np.log(np.interp(problem.temperatures(0, x)[0], degrees, column)) for column in table.T)
+    return x[:4] + np.array([friction, 0.0, stiffness, 0.0])  # as they are at the temperature of the start
 
 
 def angle(side: str, edit: Edit) -> Fault:
