@@ -16,10 +16,10 @@ from lugre_steering.recording import Array, IntArray, Signal
 
 COHERENT = 0.3
 """Coherence below which there is no grid to return to: scatter of a quarter of a period."""
-ABOUT = 0.03
-"""Share of the frequency within which it is sought around that of the median step."""
-FIRST_S, GROWTH = 4.0, 4.0
-"""Stretch that the first search uses, and by how much each next one is longer and finer."""
+ABOUT = 0.15
+"""Share of the frequency within which it is sought around that of the median step, which rounding and losses move."""
+FIRST, GROWTH = 400, 4.0
+"""Periods that the first search uses, and by how much each next one is longer and finer."""
 BLOCK_S = 120.0
 """Longest stretch that counts as one clock: device clocks wander."""
 PLACES = 24
@@ -62,7 +62,7 @@ def _grid(time: Array) -> Grid | None:
     elapsed = time - time[0]
     step = np.diff(elapsed)
     about = 1.0 / float(np.median(step))
-    width, reach = ABOUT * about, FIRST_S
+    width, reach = ABOUT * about, FIRST / about
     while True:
         part = elapsed[elapsed <= reach]
         trial = about + np.linspace(-width, width, max(3, 2 * int(np.ceil(4.0 * width * reach)) + 1))

@@ -27,7 +27,7 @@ LONGEST_S = 0.035
 SHORTEST_S, SURE = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
 WORTH_SAYING_S = 2e-3
-ROUNDS = 3
+ROUNDS = 6
 SLOWER = 0.9
 """Share of the cost with an offset below which a slow sensor explains it better."""
 
@@ -56,7 +56,8 @@ def synchronised(
     deviation = np.zeros(len(recordings))
     for _ in range(ROUNDS):
         offsets = clock_offsets(problem, baseline)
-        step = np.array([offset.late_s if offset.believed else 0.0 for offset in offsets])
+        # What is believed at all is then followed to its end.
+        step = np.array([offset.late_s if offset.believed or known else 0.0 for offset, known in zip(offsets, late, strict=True)])
         if np.abs(step).max() < SHORTEST_S:
             break
         late, deviation = late + step, np.array([offset.deviation_s for offset in offsets])

@@ -21,6 +21,7 @@ from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Calibration, Candidate, Problem, Values
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.loads import vertical_load
 from lugre_steering.vehicle.sections import Cylinder
 
 WIDE, FARTHEST = 1.0, 2.6
@@ -215,6 +216,9 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
         factor = float(np.exp(result.x[names.index(name)])) if name else None
         if key == pressures and factor is not None:  # a torque goes with the square of a bore
             factor = factor**0.5 if vehicle.hydraulics is not None else factor
+        if vehicle.axle is not None and vehicle.track is not None and name == LOAD.name and factor is not None:
+            share = vertical_load(vehicle.axle, vehicle.track) / (0.5 * vehicle.axle.load_N)  # the tracks' own weight is no load
+            factor = max((factor - 1.0) * share + 1.0, 1e-3)
         freed = (name,) if name else (LEVEL.name, STIFF.name)
         suspect = _suspect(problem, trial, result, key, factor)
         yield suspect if name else replace(suspect, cost=SEVERAL * suspect.cost), _surprise(trial, result, freed)
