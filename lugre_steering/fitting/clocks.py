@@ -28,7 +28,7 @@ SHORTEST_S, SURE = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
 WORTH_SAYING_S = 2e-3
 ROUNDS = 6
-SLOWER = 0.9
+SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
 
 
