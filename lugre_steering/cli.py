@@ -178,6 +178,9 @@ def replay(
     parameters: Annotated[
         Path | None, typer.Option(help="parameter file of the node (YAML), to replay with the same time options")
     ] = None,
+    initial_temperature: Annotated[
+        str | None, typer.Option(help="of the rubber at the start of each bag [degC], or 'air': the first recorded air")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
@@ -190,7 +193,7 @@ def replay(
     if horizon is not None:
         options = replace(options, feed_forward_horizon_s=horizon)
     with progress_bar() as progress:
-        result = run(bags, vehicle, out, options, progress)
+        result = run(bags, vehicle, out, options, progress, initial_temperature)
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:

@@ -16,6 +16,9 @@ from lugre_steering.vehicle.model import baseline_parameters
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3
 LARGE_SHARE = 0.7
+ALIKE, WRONG_TIMES, UNIT_TIMES = 0.85, 1.6, 30.0
+"""Correlation about zero from which measured and estimated torque have one shape, the factor between them that no nominal value and
+hardly any weather explains, and the one from which units are likelier."""
 NOTABLE_SHARE = 0.05
 """Of the static friction: below, the torque is too small to compare with."""
 
@@ -142,6 +145,27 @@ def is_large(residual_rms: float, estimate_rms: float, measured_rms: float, vehi
     """Whether a residual is so large beside the torque that wrong units, signs or plugs are likelier than missing physics."""
     friction = len(vehicle.sides) * float(baseline_parameters(vehicle)["static_torque"])
     return estimate_rms > NOTABLE_SHARE * friction and residual_rms > LARGE_SHARE * min(estimate_rms, measured_rms)
+
+
+def sheet_words(residual_squares: float, estimate_squares: float, measured_squares: float, vehicle: Vehicle) -> str | None:
+    """What to say where the measured torque follows the estimate in shape but not in size, so that entries of the vehicle file are
+    likely wrong; None where it does not. Sums of squares over the same samples [N2 m2].
+
+    The sum of products follows from them, residual = measured - estimate; the best factor on the estimate is that over the
+    estimate's squares.
+    """
+    friction = len(vehicle.sides) * float(baseline_parameters(vehicle)["static_torque"])
+    product = 0.5 * (measured_squares + estimate_squares - residual_squares)
+    if not product > ALIKE * math.sqrt(estimate_squares * measured_squares) or friction <= 0.0:
+        return None
+    times = product / estimate_squares
+    if not WRONG_TIMES < max(times, 1.0 / times) < UNIT_TIMES:
+        return None
+    level = "friction.coulomb" if vehicle.friction is not None else "contact.coulomb_torque_Nm"
+    entries = [*(["axle.load_N"] if vehicle.axle is not None else []), level]
+    entries.append("bores" if vehicle.hydraulics is not None else "the unit of the torque sensor")
+    warm = ", and how warm the rubber was (--initial-temperature)" if vehicle.rubber is not None else ""
+    return f"measured torque is {times:.2g} times what this sheet can give; check {', '.join(entries)}{warm}"
 
 
 def r2_words(r2: float | None, name: str = "R2") -> str:

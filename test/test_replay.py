@@ -362,7 +362,7 @@ def test_a_joint_of_another_name_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1e-5, -1.0, 0.5, 0.0])
 def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float) -> None:
-    """Pressures in bar, with the other sign, half of them, and none."""
+    """Pressures in bar, with the other sign, half of them (as a sheet of twice the load looks too), and none."""
     messages = []
     for topic, kind, log, raw in read(DOUBLE_CYCLE):
         if kind == make.FLUID_PRESSURE:
@@ -370,7 +370,9 @@ def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float)
             raw = make.pressure(stamp_of(message), scale * message.fluid_pressure)
         messages.append((topic, kind, log, raw))
     (bag,) = replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")["bags"]
-    assert [finding["finding"] for finding in bag["findings"]] == ([] if scale == 1.0 else ["large_residual"])
+    expected = {1.0: [], 0.5: ["wrong_sheet"]}.get(scale, ["large_residual"])
+    assert [finding["finding"] for finding in bag["findings"]] == expected
+    assert all("0.5 times" in f["statement"] for f in bag["findings"] if f["finding"] == "wrong_sheet")
 
 
 def test_a_velocity_of_zeros_is_not_believed(tmp_path: Path) -> None:

@@ -36,13 +36,16 @@ from lugre_steering import units
 from lugre_steering.calibration import result
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
+from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
+from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.version import __version__
@@ -177,9 +180,11 @@ def calibrate_recordings(
         for finding in quality.blocking:
             raise DataError(f"{quality.recording.name}: the data must be put right first: {finding.statement}")
     progress("preparing")
-    runs = [prepare(quality.recording, vehicle) for quality in qualities]
-    problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)
+    pieces, cut = in_pieces([quality.recording for quality in qualities])
+    problem, apart = synchronised(pieces, vehicle, chosen(vehicle) if calibrations is None else calibrations)
     check_motion(problem)
+    progress("comparing with the vehicle file")
+    wrong = wrong_sheet(problem)
     progress("fitting")
     fitted = estimate(problem, priors=priors)
     progress("judging on held-out stretches")
@@ -196,6 +201,10 @@ def calibrate_recordings(
     )
     names = [calibration.name for calibration in problem.calibrations]
     matrix = tuple(tuple(row) for row in fitted.covariance[: len(names), : len(names)].tolist())
+    found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
+    further = [*cut.items(), *apart.items(), *weather_findings(problem, fitted.fit).items()]
+    found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])
+    first = f"The vehicle file seems wrong: {wrong.statement}. " if wrong else ""
     return Calibrated(problem, fitted, result.Calibration(
         schema=result.SCHEMA,
         tool_version=__version__,
@@ -203,15 +212,15 @@ def calibrate_recordings(
         bags=tuple(recording.name for recording in recordings),
         vehicle=vehicle.name,
         priors=priors,
-        duration_s=sum(float(run.time[-1] - run.time[0]) for run in runs),
+        duration_s=sum(float(run.time[-1] - run.time[0]) for run in problem.runs),
         parameters=tuple(rows),
         covariance=result.Covariance(tuple(names), matrix),
         rmse_Nm=rmse,
         heldout_rmse_Nm=held,
         undetermined=tuple(weak),
         assumed=tuple(assumed),
-        data_quality=tuple(finding.in_bag(q.recording.name) for q in qualities for finding in q.findings),
-        statement=units.words(vehicle, statement(rows, rmse, held, weak, assumed)),
+        data_quality=tuple(found),
+        statement=units.words(vehicle, first + statement(rows, rmse, held, weak, assumed)),
         calibrated=calibrated,
     ))  # fmt: skip
 

@@ -30,8 +30,13 @@ from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.model import Model, build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 
-BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
+BLOCKING = frozenset({
+    "sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew", "wiring_suspect", "dead_sensor",
+    "copied_sensor", "noisy_sensor", "angle_zero",
+})  # fmt: skip
 
+UNTOLD = 0.3
+"""Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
 GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
@@ -110,6 +115,9 @@ def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
         except DataError:
             return ()
         if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
+            return ()
+        total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
+        if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))):
             return ()
         found = _wrong(recording, vehicle, run)
     if found:

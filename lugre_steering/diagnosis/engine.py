@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.bag import read_recordings
 from lugre_steering.data.bursts import set_aside
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
@@ -19,8 +19,11 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.sheet import LEVELS, WrongSheet, at_bounds, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
+from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
 
@@ -28,6 +31,9 @@ MIN_SLIDING, MIN_SAMPLES = 2.0, 500
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart; samples that a fit needs."""
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""
+
+WORTH_A_SHEET = 0.5
+"""Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
 Progress = Callable[[str], None]
 
@@ -64,11 +70,17 @@ def diagnose_recordings(
         )
     progress("estimating the motion")
     try:
-        problem = Problem(vehicle, [prepare(quality.recording, vehicle) for quality in qualities])
+        pieces, cut = in_pieces([quality.recording for quality in qualities])
+        findings += [finding.in_bag(bag) for bag, finding in cut.items()]
+        problem, apart = synchronised(pieces, vehicle)
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
+    findings += [finding.in_bag(bag) for bag, finding in apart.items()]
     travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
     roles = split(problem)
+    progress("comparing with the vehicle file")
+    if roles.fit.sum() >= MIN_SAMPLES and (wrong := wrong_sheet(problem)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
     if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
         if travel < MIN_SLIDING:
             lacking = f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
@@ -90,6 +102,11 @@ def diagnose_recordings(
         findings += [finding.in_bag(bag) for bag, finding in disturbed.items()]
         problem = Problem(vehicle, runs)
         noise, roles, found = investigate(problem, seed, progress)
+    if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
+    if found.found and at_bounds(problem, found.final.x, LEVELS) and (wrong := wrong_sheet(problem, insist=True)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
+    findings += [finding.in_bag(bag) for bag, finding in weather_findings(problem, found.final).items()]
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     return conclude(done, findings, seed=seed, material=material, progress=progress)
@@ -97,6 +114,16 @@ def diagnose_recordings(
 
 def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
     return [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
+
+
+def _wrong_sheet(
+    qualities: Sequence[Quality], vehicle: Vehicle, findings: Sequence[BagFinding], wrong: WrongSheet
+) -> Diagnosis:
+    statement = (
+        f"The vehicle file is not that of this vehicle, or not of these sensors: {wrong.statement}. "
+        "No physics is named before that is put right."
+    )
+    return _insufficient(qualities, vehicle, [*findings, wrong.finding()], statement, None)
 
 
 def _insufficient(

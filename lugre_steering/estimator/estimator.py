@@ -31,6 +31,7 @@ from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
 from lugre_steering.vehicle.model import build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 
+RUBBER_DEGC = (-80.0, 150.0)
 LINE_RING = 8192
 PENDING_RING = 8192
 WAITING_RING = 1024  # one side may come two seconds later than the other, at 500 Hz
@@ -121,6 +122,18 @@ class Estimator:
             self._core, self._first_line, channel.astype(np.int64), stamp_ns, value, rate, estimates, residuals
         )
         return estimates[:e], residuals[:r]
+
+    def begin_at(self, rubber_degC: float) -> None:
+        """Rubber temperature [degC] from which every start is made, in place of the vehicle file's; to be given before the first sample.
+
+        Raises ``DataError`` for a vehicle without rubber or a temperature that no rubber has.
+        """
+        if self.vehicle.rubber is None:
+            raise DataError("initial temperature: this vehicle has no rubber, so nothing of it depends on temperature")
+        low, high = RUBBER_DEGC
+        if not low <= rubber_degC <= high:
+            raise DataError(f"initial temperature: got {rubber_degC:g}, expected {low:g} to {high:g} degC")
+        self._core.parameters["rubber_temperature"] = rubber_degC
 
     def set_plan(self, stamp_ns: IntArray, theta: Array) -> None:
         """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan.

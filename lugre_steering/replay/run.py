@@ -32,8 +32,8 @@ from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, r2_words
-from lugre_steering.recording import NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
+from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, r2_words, sheet_words
+from lugre_steering.recording import AIR_LIMIT_DEGC, NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
 from lugre_steering.replay.result import RECORD, SCHEMA, InputCounts, Replay, ReplayedBag, Series
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
@@ -41,6 +41,8 @@ from lugre_steering.vehicle import Vehicle, load
 PREFIX = f"/{NODE}"
 FRAME = "base_link"
 COMMAND = "steering/command"
+AIR = "air"
+"""In place of an initial temperature: that of the first recorded air."""
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
@@ -57,9 +59,12 @@ def replay(
     out: Path,
     options: Options | None = None,
     progress: Progress | None = None,
+    initial_temperature: str | None = None,
 ) -> dict[str, Any]:
     """Run the estimator over each bag anew; write bags, pictures and summary.json into ``out``.
 
+    ``initial_temperature``: of the rubber at the start of each bag, a number [degC] or ``air`` for the first recorded air; without it that
+    of the vehicle file.
     Returns the summary. Raises ``BagError`` or ``VehicleFileError`` for input that is of no use.
     """
     vehicle = load(vehicle_file)
@@ -70,7 +75,7 @@ def replay(
     try:
         with output_folder(out):
             for path, name in zip(bags, names, strict=True):
-                run = Passage(path, name, vehicle, options)
+                run = Passage(path, name, vehicle, options, initial_temperature)
                 written = run.write(out, progress)
                 overall.merge(run.fit)
                 summary = replace(summary, bags=(*summary.bags, written), overall=overall.result())
@@ -152,9 +157,12 @@ def _refuse_foreign(folder: Path) -> None:
 class Passage:
     """One bag through a new estimator."""
 
-    def __init__(self, path: Path, name: str, vehicle: Vehicle, options: Options) -> None:
+    def __init__(self, path: Path, name: str, vehicle: Vehicle, options: Options, initial_temperature: str | None = None) -> None:
         self.path, self.name, self.vehicle = path, name, vehicle
         self.estimator = Estimator(vehicle, options)
+        self._as_warm_as_air = initial_temperature == AIR
+        if initial_temperature not in (None, AIR):
+            self.estimator.begin_at(_degrees(initial_temperature))
         self.fit = Comparison()
         self.motion = Curves(2 * len(vehicle.sides) + 1)  # angles, temperatures, torque
         self.check = Curves(2)  # cylinder torque, residual
@@ -307,6 +315,8 @@ class Passage:
         commands = [k for k, c in enumerate(bag.connections) if c.topic == command]
         plans = np.flatnonzero(np.isin(block.messages.connection, commands))
         channel, begin, parts = block.channel.astype(np.int64), 0, []
+        if self._as_warm_as_air:
+            self._begin_with_air(block)
         for plan, end in zip([*plans, None], [*np.searchsorted(block.message, plans), channel.size], strict=True):
             rows = slice(begin, end)
             parts.append(
@@ -321,6 +331,17 @@ class Passage:
     def _records(self, pushed: tuple[Records, Records]) -> tuple[Records, Records]:
         """Estimates and residuals that are finite numbers."""
         return self._finite(pushed[0], "total"), self._finite(pushed[1], "residual")
+
+    def _begin_with_air(self, block: Block) -> None:
+        """Rubber as warm as the first air of the first block; the vehicle file's where none is recorded there."""
+        self._as_warm_as_air = False
+        number = next((i for i, c in enumerate(self.vehicle.channels) if c.kind is Kind.AIR_TEMPERATURE), -1)
+        recorded = block.value[(block.channel == number) & (np.abs(block.value) < AIR_LIMIT_DEGC)]
+        if recorded.size:
+            self.estimator.begin_at(float(recorded[0]))
+        else:
+            statement = "no air temperature at the start; the rubber begins as the vehicle file says"
+            self._found.append(Finding("no_air_temperature", "", statement))
 
     def _finite(self, rows: Records, field: str) -> Records:
         """Rows whose torque is a finite number; the node publishes no other either."""
@@ -397,7 +418,9 @@ class Passage:
         fit = self.fit
         sums = fit.squares, fit.estimates, fit.spread + fit.count * fit.mean**2
         residual, estimate, measured = (math.sqrt(squares / max(fit.count, 1)) for squares in sums)
-        if is_large(residual, estimate, measured, self.vehicle):
+        if said := sheet_words(*sums, self.vehicle):
+            yield Finding("wrong_sheet", "", said)
+        elif is_large(residual, estimate, measured, self.vehicle):
             statement = "the residual is as large as the torque: units, signs, plugs or clocks may be wrong; 'diagnose' tells which"
             yield Finding("large_residual", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0
@@ -436,6 +459,14 @@ class Passage:
 
         draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
         return file.name, None
+
+
+def _degrees(text: str | None) -> float:
+    """A temperature as it is typed."""
+    try:
+        return float(text or "")
+    except ValueError:
+        raise DataError(f"--initial-temperature {text}: expected a number of degC, or 'air'") from None
 
 
 def _first_stamp(block: Block, sides: int) -> int | None:

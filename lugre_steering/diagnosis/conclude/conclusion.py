@@ -18,6 +18,7 @@ from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding
 
@@ -32,8 +33,10 @@ def conclude(
     problem, found = done.problem, done.found
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
-    named = bool(found.found) and judged.gain > -CONTRADICTED
-    final = found.final if named else found.baseline
+    # and an improvement that may be none is none.
+    clock = _clocks_alone(found.final)
+    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock
+    final = found.final if named or clock else found.baseline
     whole = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
@@ -74,6 +77,13 @@ def conclude(
         evidence=evidence(done, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
     ).in_words()
+
+
+def _clocks_alone(final: Fit) -> bool:
+    """Whether all that was found is what two clocks may be apart, beyond what was measured and taken out of it."""
+    return bool(final.effects) and all(
+        candidate.effect.id == "time_delay" and abs(values["delay"]) < LONGEST_S for candidate, values in final.effects
+    )
 
 
 def _whole(done: Finished, final: Fit) -> Fit:

@@ -79,8 +79,8 @@ def separation(
     found = {}
     # Where and when they began belongs to the recordings, not to what is driven next.
     first, second = ([(replace(candidate, since=(), bags=None), values) for candidate, values in side] for side in (first, second))
+    x = problem.one_bag(fit.x)
     for manoeuvre in manoeuvres(problem).values():
-        x = np.append(fit.x[: len(problem.calibrations)], 0.0)
         try:
             trial = Problem(problem.vehicle, [_run(problem, manoeuvre, x, sigma)], problem.calibrations)
         except DataError:  # these cylinders cannot drive it

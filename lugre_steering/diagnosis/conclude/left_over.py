@@ -18,6 +18,7 @@ from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import slow_part
+from lugre_steering.fitting.sensors import beside_sensors
 from lugre_steering.recording import Array
 
 UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
@@ -43,7 +44,7 @@ class LeftOver(NamedTuple):
 def left_over(done: Finished, final: Fit) -> LeftOver:
     """Judge what ``final`` leaves of the measured torque."""
     residual = done.problem.measured - final.prediction
-    standardised = residual * done.weight
+    standardised = beside_sensors(done.problem, residual, done.weight, final.jacobian[:, : done.problem.nuisances])
     slow, nothing = _slow_energy(done, standardised), _slow_energy(done, done.noise.draws * done.weight)
     excess = float(np.mean(standardised[done.weight > 0.0] ** 2)) - 1.0
     pattern, gain = _pattern(done, final)
