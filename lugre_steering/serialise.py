@@ -41,7 +41,7 @@ def plain(tree: Any) -> Any:
 
 def _ordered(rows: Any, item: Field[Any]) -> Any:
     names = item.metadata.get("order")
-    return rows if names is None else [{name: row[name] for name in names} for row in rows]
+    return rows if names is None else [{name: row[name] for name in names} | row for row in rows]
 
 
 def finite(value: Any) -> Any:

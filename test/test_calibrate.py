@@ -190,6 +190,10 @@ def test_files_of_the_command(commanded):
     assert printed["schema"] == "lugre_steering/calibration/1"
     assert (out / "calibration.png").read_bytes().startswith(b"\x89PNG")
     note = vehicle_file.load(out / "calibrated.yaml").provenance["calibration"]
+    recording = read_recording(BAG, SHEET.channels)
+    farthest = max(float(np.abs(signal.value).max()) for signal in recording.angle.values())
+    assert note["seen"]["angle_deg"] == pytest.approx(np.degrees(farthest), abs=0.05)
+    assert 3.0 < note["seen"]["rate_deg_s"] < 20.0
     assert note["data"] == [str(BAG)]
     assert note["heldout_rmse_Nm"] == printed["heldout_rmse_Nm"]
     assert note["sheet"] == str(sheet)

@@ -39,7 +39,7 @@ from lugre_steering.calibration.identify import Assumed, Combination, identifiab
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.errors import DataError
-from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.apply import apply_calibration, seen_range
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
@@ -222,6 +222,7 @@ def calibrate_recordings(
         data_quality=tuple(found),
         statement=units.words(vehicle, first + statement(rows, rmse, held, weak, assumed)),
         calibrated=calibrated,
+        seen=seen_range(problem),
     ))  # fmt: skip
 
 

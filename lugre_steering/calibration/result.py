@@ -95,6 +95,8 @@ class Calibration(Result):
     data_quality: tuple[BagFinding, ...] = field(metadata=in_order("bag", "finding", "topic", "statement", "intervals_s"))
     statement: str
     calibrated: Vehicle = field(repr=False, metadata=IN_MEMORY)
+    seen: Mapping[str, float] = field(repr=False, metadata=IN_MEMORY)
+    """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``."""
     picture: str | None = None
     picture_note: str | None = None
 
@@ -106,6 +108,7 @@ class Calibration(Result):
             "data": list(self.bags),
             "sheet": self.vehicle,
             "heldout_rmse_Nm": self.json["heldout_rmse_Nm"],
+            "seen": dict(self.seen),
             "ci95": {row.key: list(row.ci95) for row in self.parameters},
             "sheet_values": {row.key: row.sheet for row in self.parameters},
         }

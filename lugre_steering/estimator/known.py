@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 from lugre_steering.vehicle import Vehicle
 
+SLACK = 1.1
+"""The causal estimates of a motion swing a little farther than the smoothed ones that were kept."""
+
 
 @dataclass(frozen=True)
 class KnownRange:
@@ -29,7 +32,7 @@ def known_range(vehicle: Vehicle) -> KnownRange:
     if isinstance(rmse, Mapping):
         rmse = rmse.get("calibrated", 0.0)
     angle, rate = (_positive(seen.get(key)) for key in ("angle_deg", "rate_deg_s"))
-    return KnownRange(math.radians(angle or math.inf), math.radians(rate or math.inf), _positive(rmse))
+    return KnownRange(SLACK * math.radians(angle or math.inf), SLACK * math.radians(rate or math.inf), _positive(rmse))
 
 
 def _positive(value: object) -> float:
