@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, cast
 
-TARGETS = {"bag": "lugre_steering.bench.fuzz_bag"}
+TARGETS = {name: f"lugre_steering.bench.fuzz_{name}" for name in ("bag", "vehicle", "parameters", "effects", "import")}
 TIME_LIMIT_S, MEMORY_LIMIT_MB = 10.0, 1024.0
 _RUNAWAY = 4 << 30  # bytes of address space, so that one case cannot take the machine with it
 GOOD = ("read", "refused")  # any other verdict is a fault
