@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.data.dataset import prepare
-from lugre_steering.effects.registry import effect
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Calibration, Candidate, Problem
 from lugre_steering.fitting.split import CLUSTER_S
@@ -26,6 +26,8 @@ LONGEST_S = 0.035
 """Devices that stamp on receipt are 0 to 30 ms apart; more is told by name (time_delay) or as wiring (clock_skew)."""
 SHORTEST_S, SURE = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
+ALIKE_S = 1e-3
+"""Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
 WORTH_SAYING_S = 2e-3
 ROUNDS = 6
 SLOWER = 0.6
@@ -49,7 +51,7 @@ def synchronised(
 ) -> tuple[Problem, dict[str, Finding]]:
     """The recordings prepared with one clock, and a finding for each, by its name, whose offset is worth saying."""
     problem = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], calibrations)
-    if any(entry.id in ("time_delay", "pressure_lag") for entry in vehicle.effects):
+    if any(CATALOGUE[entry.id].hooks.keys() & {"delay", "lag"} for entry in vehicle.effects):
         return problem, {}
     original, start = problem, _baseline(problem, None)
     baseline, late = start, np.zeros(len(recordings))
@@ -67,12 +69,20 @@ def synchronised(
             prepare(_earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, late, strict=True)
         ], calibrations)  # fmt: skip
         baseline = _baseline(problem, baseline)
-    if not late.any() or _slow_sensor(original, start, baseline, late):
+    if not late.any() or _alike(late, deviation) or _slow_sensor(original, start, baseline, late):
         return original, {}
     return problem, {
         recording.name: _finding(vehicle, float(shift), float(spread))
         for recording, shift, spread in zip(recordings, late, deviation, strict=True) if abs(shift) > WORTH_SAYING_S
     }  # fmt: skip
+
+
+def _alike(late: Array, deviation: Array) -> bool:
+    """Whether every one of several recordings shows the same delay: a property of the machine, which has a name."""
+    if late.size < 2 or not late.all():
+        return False
+    apart = np.abs(late - late.mean())
+    return bool(np.all(apart <= np.maximum(ALIKE_S, SURE * deviation)))
 
 
 def _baseline(problem: Problem, start: Fit | None) -> Fit:
@@ -111,9 +121,11 @@ def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bo
     """Whether the lag of a slow sensor explains the recordings as stamped better than offsets of the clock do."""
     if late.mean() <= 0.0:
         return False
-    lag = Candidate(effect("pressure_lag"), free=("tau",))
+    slow_sensor = next(effect for effect in CATALOGUE.values() if "lag" in effect.hooks)
+    (tau,) = slow_sensor.parameters
+    lag = Candidate(slow_sensor, free=(tau.name,))
     weight = original.valid / np.concatenate([run.sigma for run in original.runs])
-    slow = fit(original, weight, [(lag, {"tau": float(late.mean())})], start.x, linearisations=10, robust=True, tolerance=1e-4)
+    slow = fit(original, weight, [(lag, {tau.name: float(late.mean())})], start.x, linearisations=10, robust=True, tolerance=1e-4)
     used = np.count_nonzero(weight)
     return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from lugre_steering.calibration.coverage import QUICK, record
+from lugre_steering.data.dataset import prepare
 from lugre_steering.data.dead import inspect_dead
 from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
 from lugre_steering.data.quality import inspect
@@ -20,6 +21,7 @@ from lugre_steering.data.stamps import evened
 from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import wrong_entry, wrong_sheet
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.online import sheet_words
@@ -82,19 +84,31 @@ def test_noise_and_steps_are_measured(noise: float, step: float) -> None:
     assert 0.9 < found.sigma() / float(np.std(value - truth)) < 1.5  # steps as wide as the motion between samples look rougher
 
 
-@pytest.mark.parametrize("late_s", [0.02, -0.012])
-def test_an_offset_between_clocks_is_measured_and_taken_out(late_s: float) -> None:
-    apart = [
-        replace(r, pressure={line: Signal(s.time_s + late_s, s.value) for line, s in r.pressure.items()}) for r in sound()
+def shifted(*late_s: float) -> list[Recording]:
+    """The sound recordings with pressures stamped late, each by its own time."""
+    return [
+        replace(r, pressure={line: Signal(s.time_s + late, s.value) for line, s in r.pressure.items()})
+        for r, late in zip(sound(), late_s, strict=True)
     ]
+
+
+def test_offsets_between_clocks_are_measured_and_taken_out() -> None:
+    late_s = (0.02, -0.012)
+    apart = shifted(*late_s)
     problem, findings = synchronised(apart, VEHICLE)
     assert len(findings) == len(apart)
-    for recording, run in zip(apart, problem.runs, strict=True):
+    for recording, run, late in zip(apart, problem.runs, late_s, strict=True):
         said = float(findings[recording.name].statement.split("stamped ")[1].split(" ms")[0])
-        assert said == pytest.approx(1e3 * abs(late_s), abs=1.0)
-        assert ("too late" in findings[recording.name].statement) == (late_s > 0.0)
+        assert said == pytest.approx(1e3 * abs(late), abs=1.0)
+        assert ("too late" in findings[recording.name].statement) == (late > 0.0)
         assert run.time.size > 0
     assert synchronised(sound(), VEHICLE)[1] == {}
+
+
+def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
+    problem, findings = synchronised(shifted(0.02, 0.02), VEHICLE)
+    assert findings == {}
+    np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
 
 
 def test_a_hot_start_is_weather() -> None:

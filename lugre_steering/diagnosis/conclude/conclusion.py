@@ -34,7 +34,7 @@ def conclude(
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
     # and an improvement that may be none is none.
-    clock = _clocks_alone(found.final)
+    clock = _clocks_alone(found.final, len(problem.runs))
     named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock
     final = found.final if named or clock else found.baseline
     whole = _whole(done, final)
@@ -79,10 +79,13 @@ def conclude(
     ).in_words()
 
 
-def _clocks_alone(final: Fit) -> bool:
-    """Whether all that was found is what two clocks may be apart, beyond what was measured and taken out of it."""
+def _clocks_alone(final: Fit, bags: int) -> bool:
+    """Whether all that was found is what two clocks may be apart in one recording; what all of several show is the machine's."""
     return bool(final.effects) and all(
-        candidate.effect.id == "time_delay" and abs(values["delay"]) < LONGEST_S for candidate, values in final.effects
+        "delay" in candidate.effect.hooks
+        and abs(candidate.effect.law("delay", values)) < LONGEST_S
+        and (bags == 1 or candidate.bags is not None)
+        for candidate, values in final.effects
     )
 
 
