@@ -141,6 +141,7 @@ class Effect:
         """A law without memory over arrays: its own parameters from ``values`` (0 where absent)."""
         compiled = self.hooks[hook]
         plain = getattr(compiled, "py_func", compiled)
+        values = {"torque_unit": 1.0, "angle_unit": 1.0, **values}
         arguments = [quantities.get(name, values.get(name, 0.0)) for name in inspect.signature(plain).parameters]
         try:
             return plain(*arguments)

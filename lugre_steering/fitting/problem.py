@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeVar
 
@@ -22,6 +22,7 @@ from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.size import FRICTION_NM, TRAVEL_RAD, VEHICLE, Size, decade
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -118,6 +119,27 @@ def standing_effects(vehicle: Vehicle) -> tuple[tuple[Candidate, Values], ...]:
     return tuple(found)
 
 
+def size_of(vehicle: Vehicle, runs: Sequence[Run]) -> Size:
+    """The size of a machine: of its sheet if it is a vehicle, else as its recordings show."""
+    if vehicle.contact is None:
+        return VEHICLE
+    travel = max(float(np.ptp(run.theta)) for run in runs)
+    torque = max(float(np.percentile(np.abs(run.measured), 99.0)) for run in runs)
+    angle = 1.0 if vehicle.coordinate.unit == "rad" else decade(travel, TRAVEL_RAD)
+    return Size(decade(torque / len(vehicle.sides), FRICTION_NM), angle)
+
+
+def resized(effect: Effect, size: Size) -> Effect:
+    """An entry of the catalogue with the scales and bounds of its parameters in the units of a machine."""
+
+    def of(p: Parameter) -> Parameter:
+        worth = size.of(p.unit)
+        grid = p.grid if p.relative_to else tuple(worth * value for value in p.grid)
+        return replace(p, scale=p.scale * worth, low=p.low * worth, high=p.high * worth, grid=grid)
+
+    return effect if size == VEHICLE else replace(effect, parameters=tuple(of(p) for p in effect.parameters))
+
+
 class Problem:
     """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, effect parameters)."""
 
@@ -134,6 +156,7 @@ class Problem:
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
+        self.size = size_of(vehicle, self.runs)
         self.standing = standing_effects(vehicle)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 

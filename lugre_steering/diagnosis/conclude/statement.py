@@ -10,11 +10,13 @@ from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.problem import resized
+from lugre_steering.vehicle.size import VEHICLE, Size
 
 
-def at_end(effect: Mapping[str, Any]) -> list[tuple[str, float, str]]:
+def at_end(effect: Mapping[str, Any], size: Size = VEHICLE) -> list[tuple[str, float, str]]:
     """Name, value and unit of the amplitudes of a named effect that were fitted to an end of their range other than zero."""
-    entry = CATALOGUE[effect["id"]]
+    entry = resized(CATALOGUE[effect["id"]], size)
     amplitudes = {parameter.name: (parameter.low, parameter.high) for parameter in entry.parameters if not parameter.is_shape}
     alone = next(iter(amplitudes.values()), ())  # one that acts on a line goes by the name of the line
     return [
@@ -48,7 +50,7 @@ def statement(
         for effect in effects
         if effect["indistinguishable_from"]
     ]
-    ends = [f"{effect['id']} with {name} = {value:.3g} {unit}" for effect in effects for name, value, unit in at_end(effect)]
+    ends = [f"{effect['id']} with {name} = {value:.3g} {unit}" for effect in effects for name, value, unit in at_end(effect, done.problem.size)]
     last = done.problem.runs[-1].name
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "

@@ -16,11 +16,12 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.diagnosis.search import onset
-from lugre_steering.effects.entry import Seen
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.entry import Effect, Seen
+from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
+from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, resized
 from lugre_steering.recording import Array
+from lugre_steering.vehicle import Vehicle
 
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
@@ -64,12 +65,20 @@ class Score:
         return {**dict(self.candidate.shapes), **free}
 
 
+def possible(vehicle: Vehicle, effect: Effect) -> bool:
+    """Whether a machine can have it: all that the effect needs is there, and a single joint has words for it."""
+    joint = vehicle.contact is not None and vehicle.rubber is None and len(vehicle.sides) == 1
+    shipped = effect.id not in ORIGINS
+    return all(getattr(vehicle, section) is not None for section in effect.needs) and not (joint and shipped and not effect.joint_title)
+
+
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
     for effect in CATALOGUE.values():
-        if not effect.observable or effect.id in without or any(getattr(problem.vehicle, section) is None for section in effect.needs):
+        if not effect.observable or effect.id in without or not possible(problem.vehicle, effect):
             continue
+        effect = resized(effect, problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
             for shapes in effect.variants(_seen(problem)):

@@ -88,7 +88,7 @@ def _families(problem: Problem, baseline: Fit) -> tuple[_Family, ...]:
     travel = max(float(np.ptp(run.theta)) for run in runs)
     sides = [run.theta for run in runs]
     rates = [run.omega.sum(axis=0) for run in runs]
-    signs = [np.sign(np.where(np.abs(run.omega) > 1e-3, run.omega, 0.0)).sum(axis=0) for run in runs]
+    signs = [np.sign(np.where(np.abs(run.omega) > 1e-3 * run.angle_unit, run.omega, 0.0)).sum(axis=0) for run in runs]
     steps = [float(run.time[1] - run.time[0]) for run in runs]
     model = np.split(baseline.prediction, problem.edges[1:-1])
 
