@@ -119,6 +119,8 @@ class Effect:
     """It has its own window in time, or acts at the start only."""
     one_sided: bool = False
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
+    of_angle: bool = False
+    """Its law is one of an angle and means nothing along a line."""
     joint_title: str = ""
     """Title for a single joint, which has no tracks and no kingpin."""
     variants: Callable[[Seen], Sequence[Variant]] | None = None

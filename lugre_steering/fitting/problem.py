@@ -22,7 +22,7 @@ from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, build_model
-from lugre_steering.vehicle.size import FRICTION_NM, TRAVEL_RAD, VEHICLE, Size, decade
+from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -40,6 +40,11 @@ def _pool() -> ThreadPoolExecutor:
     """One pool for the process; the mapped functions never map themselves. LUGRE_STEERING_THREADS limits its size."""
     wanted = os.environ.get("LUGRE_STEERING_THREADS", "")
     return ThreadPoolExecutor(int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1)
+
+
+def is_rig(vehicle: Vehicle) -> bool:
+    """Whether it is a single joint or axis: its friction is given as torque, and nothing warms."""
+    return vehicle.contact is not None and vehicle.rubber is None and len(vehicle.sides) == 1
 
 
 @dataclass(frozen=True)
@@ -70,9 +75,25 @@ GAIN = Calibration("pressure_gain", (), 0.03, -0.3, 0.3)
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
 
 
+RIG = (
+    replace(FRICTION, prior=0.5, low=-2.0, high=2.0),
+    STATIC,
+    replace(STIFFNESS, prior=0.7, low=-3.0, high=3.0),
+    replace(STRIBECK, prior=0.7, low=-3.0, high=3.0),
+)
+"""Of a single joint or axis, whose sheet holds rough numbers."""
+
+
 def calibrations_for(vehicle: Vehicle) -> tuple[Calibration, ...]:
-    """The standard set; a vehicle without rubber has nothing thermal to calibrate."""
-    return STANDARD if vehicle.rubber is not None else (FRICTION, STATIC, STIFFNESS, STRIBECK)
+    """The standard set; without rubber there is nothing thermal to calibrate."""
+    if vehicle.rubber is not None:
+        return STANDARD
+    if not is_rig(vehicle):
+        return STANDARD[:4]
+    assert vehicle.contact is not None
+    static, coulomb = vehicle.contact.static_torque_Nm, vehicle.contact.coulomb_torque_Nm
+    # Beside viscous friction of unknown size, a static level below the sliding one would be another viscous friction.
+    return tuple(replace(c, low=-(static - coulomb) / coulomb) if c is STATIC else c for c in RIG)
 
 
 @dataclass(frozen=True)
@@ -126,7 +147,7 @@ def size_of(vehicle: Vehicle, runs: Sequence[Run]) -> Size:
     travel = max(float(np.ptp(run.theta)) for run in runs)
     torque = max(float(np.percentile(np.abs(run.measured), 99.0)) for run in runs)
     angle = 1.0 if vehicle.coordinate.unit == "rad" else decade(travel, TRAVEL_RAD)
-    return Size(decade(torque / len(vehicle.sides), FRICTION_NM), angle)
+    return Size(decade(SPARE * torque / len(vehicle.sides), FRICTION_NM), angle)
 
 
 def resized(effect: Effect, size: Size) -> Effect:

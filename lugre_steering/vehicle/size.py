@@ -12,6 +12,8 @@ from lugre_steering.vehicle.sections import Vehicle
 
 FRICTION_NM, STRIBECK_RAD_S, TRAVEL_RAD = 25e3, 0.026, 0.8
 """Friction torque and Stribeck speed of one track, and travel, of the vehicle whose size counts as one."""
+SPARE = 5.0
+"""By how much the torque of a rig is overstated, so that ranges written for a vehicle, which rests on friction, are wide enough for it."""
 
 _DIMENSIONS = {"N m": (1, 0), "rad": (0, 1), "W": (1, 1), "J": (1, 1), "kg m2": (1, -1)}
 """Exponents of torque and angle; power and energy are torque times angle, so a linear axis has them right too."""

@@ -220,7 +220,7 @@ def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(proble
     final = fit(hidden, fitted, [linear, offset])
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     item = build_up.Found(score, ("line_loss_quadratic",), (), 1.0)
-    result, found = build_up._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()))
+    result, found = build_up._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()), stays=False)
     assert [candidate.effect.id for candidate, _ in result.effects] == ["line_loss_quadratic", "slope_bias"]
     assert found.score.candidate.effect.id == "line_loss_quadratic"
     change = problem.predict_all(result.x, result.effects[:1]) - problem.predict_all(result.x, [(result.effects[0][0], {"c": 0.0})])

@@ -19,7 +19,7 @@ from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.entry import Effect, Seen
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, resized
+from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, is_rig, resized
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
@@ -67,9 +67,11 @@ class Score:
 
 def possible(vehicle: Vehicle, effect: Effect) -> bool:
     """Whether a machine can have it: all that the effect needs is there, and a single joint has words for it."""
-    joint = vehicle.contact is not None and vehicle.rubber is None and len(vehicle.sides) == 1
-    shipped = effect.id not in ORIGINS
-    return all(getattr(vehicle, section) is not None for section in effect.needs) and not (joint and shipped and not effect.joint_title)
+    if is_rig(vehicle) and effect.id not in ORIGINS and not effect.joint_title:
+        return False
+    if effect.of_angle and vehicle.coordinate.unit != "rad":
+        return False
+    return all(getattr(vehicle, section) is not None for section in effect.needs)
 
 
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
@@ -140,8 +142,10 @@ def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Cand
     return columns
 
 
-def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Sequence[str] = ()) -> list[Score]:
-    """Every candidate against the residual of ``fit``, best first; ``draws`` (m, n) are residuals that hide nothing.
+def screen(
+    problem: Problem, fit: Fit, weight: Array, draws: Array, without: Sequence[str] = (), among: Sequence[Candidate] | None = None
+) -> list[Score]:
+    """Every candidate (or those ``among``) against the residual of ``fit``, best first; ``draws`` (m, n) are residuals that hide nothing.
 
     ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
     """
@@ -174,7 +178,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
                 found += [part] if part is not None else []
         return found
 
-    scores = list(itertools.chain.from_iterable(in_threads(score, candidates(problem, without))))
+    scores = list(itertools.chain.from_iterable(in_threads(score, candidates(problem, without) if among is None else among)))
     trials: dict[str, int] = {}
     for item in scores:
         trials[item.candidate.effect.id] = trials.get(item.candidate.effect.id, 0) + 1
