@@ -280,7 +280,7 @@ def _confront(
 ) -> tuple[Fit, Found]:
     """One accepted effect against its known and met rivals, everything else of the final model in place.
 
-    One that ``stays`` keeps its place among those that fit as well.
+    One that ``stays`` is there on every joint: its rivals are told and do not take its place.
     """
     own, values = final.effects[index]
     rest = [effect for i, effect in enumerate(final.effects) if i != index]
@@ -313,8 +313,8 @@ def _confront(
     ]
     group = ranked([champion, *trials], before)
     rivals = tied(problem, weight, split, group[0], group[1:], before, samples)
-    if stays and champion in rivals:
-        chosen, rivals = champion, [trial for trial in group if trial is not champion and trial in (group[0], *rivals)]
+    if stays:
+        chosen, rivals = champion, [trial for trial in (group[0], *rivals) if trial is not champion]
     else:
         chosen, rivals = simplest(group[0], rivals, before)
     names_left = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
