@@ -50,7 +50,11 @@ def statement(
         for effect in effects
         if effect["indistinguishable_from"]
     ]
-    ends = [f"{effect['id']} with {name} = {value:.3g} {unit}" for effect in effects for name, value, unit in at_end(effect, done.problem.size)]
+    ends = [
+        f"{effect['id']} with {name} = {value:.3g} {unit}"
+        for effect in effects
+        for name, value, unit in at_end(effect, done.problem.size)
+    ]
     last = done.problem.runs[-1].name
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "

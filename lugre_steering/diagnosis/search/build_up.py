@@ -42,6 +42,9 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
+MOST = 0.5
+"""Share of the excess, fitted and held out, from which names stand although more is there; and of their own gain that a pattern
+outside the catalogue must leave them."""
 SLIGHT, SURE = 0.02, 0.3
 """Share of the whole excess that a further effect must explain (no law of the first is truer than that), unless its energy
 is so large against the noise."""
@@ -94,12 +97,16 @@ def search(
     given = _rig_steps(problem, noise, weight, baseline, samples, progress) if is_rig(problem.vehicle) else []
     built = _build_up(problem, noise, split, baseline, None, progress, given)
     first, tried, needed, kept = built.first, built.trials, bool(built.steps), standing(built)
+    builds = [built]
     for opening in _others(problem, weight, built) if needed and not kept else ():
         progress(f"building up again from {opening.trials[0].candidate.label}")
         built = _build_up(problem, noise, split, built.baseline, opening, progress)
         tried, kept = tried + built.trials, standing(built)
+        builds.append(built)
         if kept:
             break
+    if needed and not kept:
+        kept, built = max(((_most(problem, noise, split, each), each) for each in builds), key=lambda found: found[0])
     baseline, start_cost = built.baseline, cost(problem, built.baseline, weight)
     excess = start_cost - samples
     final, found = _confirmed(problem, noise, weight, split, baseline, built.steps[:kept], samples, len(given), progress)
@@ -107,7 +114,7 @@ def search(
     pattern = strongest(problem, baseline, weight) if not found or excess > PATTERN_EXCESS * samples else None
     if pattern is not None and found:
         named = [cost(problem, built.steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
-        if _foreign(pattern.cost(problem, weight), named, start_cost):
+        if _foreign(pattern.cost(problem, weight), named, start_cost) and not _beside(problem, weight, pattern, final, start_cost):
             final, found = (built.steps[len(given) - 1][0], found[: len(given)]) if given else (baseline, [])
     explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
     return Search(
@@ -368,6 +375,32 @@ def _keep(
         if whole >= needed and gained >= LAST:
             kept = i + 1
     return kept
+
+
+def _most(problem: Problem, noise: Noise, split: Split, built: _Built) -> int:
+    """How many steps stand though much is left: each helps where it was not fitted, and together they are most of what is there.
+
+    A name that stands is no less true for what else there is.
+    """
+    kept = 0
+    fitted, held = (np.where(role, 1.0 / noise.sigma, 0.0) for role in (split.fit, split.held))
+    start = [cost(problem, built.baseline, weight) for weight in (fitted, held)]
+    noisy = [float(split.fit.sum()), float(split.held.sum())]
+    last = start[1]
+    for i, (result, _, _) in enumerate(built.steps):
+        left = [cost(problem, result, weight) for weight in (fitted, held)]
+        if last - left[1] < max(OWN_ERROR * noisy[1], SLIGHT * (start[1] - noisy[1])):
+            break
+        last = left[1]
+        if all(before - after > MOST * (before - n) for before, after, n in zip(start, left, noisy, strict=True)):
+            kept = i + 1
+    return kept
+
+
+def _beside(problem: Problem, weight: Array, pattern: Pattern, named: Fit, start: float) -> bool:
+    """Whether names are needed beside a pattern: with it they still take most of what they take alone."""
+    both = strongest(problem, named, weight).cost(problem, weight)
+    return pattern.cost(problem, weight) - both > MOST * (start - cost(problem, named, weight))
 
 
 def choose(scores: Sequence[Score], samples: float) -> list[Score]:
