@@ -97,7 +97,8 @@ def diagnose_recordings(
         noise, roles, found = investigate(problem, seed, progress)
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
-    return conclude(done, findings, seed=seed, material=material, progress=progress)
+    usable = [quality.recording for quality in qualities]
+    return conclude(done, findings, usable, seed=seed, material=material, progress=progress)
 
 
 def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:
@@ -126,7 +127,7 @@ def _insufficient(
     json = {
         "schema": SCHEMA, "bags": [quality.recording.name for quality in qualities], "verdict": "insufficient_data",
         "statement": statement, "noise_floor_Nm": floor, "baseline": fit_entry,
-        "augmented": {**fit_entry, "improvement": None, "improvement_ci95": None}, "effects": [],
+        "augmented": {**fit_entry, "improvement": None, "improvement_ci95": None, "causal_rmse_Nm": None}, "effects": [],
         "unexplained": {"structured": False, "description": "not examined", "formula": None, "where": None},
         "detection_limits": {}, "data_quality": findings, "next_experiment": advice,
     }  # fmt: skip

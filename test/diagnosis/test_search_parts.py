@@ -14,6 +14,7 @@ from lugre_steering.diagnosis.conclude import experiment, limits, verify
 from lugre_steering.diagnosis.search import build_up, fingerprint, flexible, foreign, ties, trial
 from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.relief_saturation import CEILINGS
 from lugre_steering.fitting import noise, split
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem
@@ -231,9 +232,10 @@ def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(proble
 
 def test_relief_ceilings_follow_the_arms_of_the_sheet(problem: Problem) -> None:
     relief = CATALOGUE["relief_saturation"]
-    found = fingerprint._ceilings(problem, relief)
-    assert len(found) == len(fingerprint.CEILINGS)
-    shapes = dict(found[-1].shapes)
+    assert relief.variants is not None
+    found = relief.variants(fingerprint._seen(problem))
+    assert len(found) == len(CEILINGS)
+    shapes = found[-1]
     run = problem.runs[0]
     pushed = np.maximum(run.torque_per_line, 0.0).sum(axis=0)
     theta = run.theta.mean(axis=0)
@@ -241,8 +243,8 @@ def test_relief_ceilings_follow_the_arms_of_the_sheet(problem: Problem) -> None:
     assert np.ptp(pushed / arm) < 0.01 * pushed.mean()  # one pressure makes this torque at every angle
     # One line alone pushes in one direction only, and says nothing about the other.
     single = [replace(each, gains=np.where(np.arange(each.gains.shape[1])[:, None] == 0, each.gains, 0.0)) for each in problem.runs]
-    for candidate in fingerprint._ceilings(Problem(problem.vehicle, single), relief):
-        assert all(np.isfinite(value) for _, value in candidate.shapes)
+    for variant in relief.variants(fingerprint._seen(Problem(problem.vehicle, single))):
+        assert all(np.isfinite(value) for value in variant.values())
 
 
 def test_the_next_experiment_does_not_depend_on_when_an_effect_began(problem: Problem) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import limits, verify
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
+from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
@@ -21,15 +22,17 @@ from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.recording import Recording
 
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 
 
 def conclude(
-    done: Finished, findings: list[dict[str, Any]], *, seed: int, material: float, progress: Callable[[str], None]
+    done: Finished, findings: list[dict[str, Any]], recordings: Sequence[Recording], *,
+    seed: int, material: float, progress: Callable[[str], None],
 ) -> Diagnosis:
-    """The result of a search; ``findings``: what the check of the data found, ``material``: see ``diagnose``."""
+    """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     problem, found = done.problem, done.found
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
@@ -56,6 +59,7 @@ def conclude(
         "heldout_rmse_Nm": after,
         "improvement": judged.gain if named else 0.0,
         "improvement_ci95": list(judged.interval) if named else [0.0, 0.0],
+        "causal_rmse_Nm": causal_rmse(vehicle, recordings, problem.runs),
     }
     progress("next experiment")
     json = {

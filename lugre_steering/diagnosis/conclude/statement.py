@@ -60,7 +60,8 @@ def statement(
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
         f"from {torque(baseline['heldout_rmse_Nm'])} to {torque(augmented['heldout_rmse_Nm'])} "
         f"(improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
-        f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}."
+        f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}. "
+        f"Without looking ahead, as the live node must, the error on all samples is {torque(augmented['causal_rmse_Nm'])}."
         + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
         + (f" At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another." if ends else "")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from lugre_steering.diagnosis.search.fingerprint import Score, candidates, screen
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, cost
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial, cost, refine
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Candidate, Problem, Values
@@ -36,10 +36,12 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit, least:
         if order or cost(problem, leaner[index], weight) - cost(problem, full, weight) > least:
             order.insert(0, full.effects[index][0])
         full = leaner[index]
-    found, current = [], baseline
+    found: list[tuple[Fit, Score]] = []
+    current = baseline
     for candidate in order:
         (score,) = (s for s in screen(problem, current, weight, noise.draws, among=[candidate]) if s.candidate == candidate)
         current = _fitted(problem, weight, [*current.effects, (candidate, score.values)], current)
+        current = refine(problem, weight, Trial(score, current, cost(problem, current, weight))).fit
         found.append((current, score))
     return found
 
