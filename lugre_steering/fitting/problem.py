@@ -24,6 +24,9 @@ from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, build_model
 from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
 
+LEAST_ARM = 0.1
+"""Share of the drawing's moment arm that a true one has at least."""
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -275,7 +278,12 @@ class Problem:
         if "angle" in known.hooks:
             torque = torque + ((run.theta - known.law("angle", values, theta=run.theta)) * run.side_slope).sum(axis=0)
         if "arm" in known.hooks:
-            torque = torque - ((known.law("arm", values, theta=run.theta) - 1.0) * run.side_torque).sum(axis=0)
+            factor = known.law("arm", values, theta=run.theta)
+            size = np.abs(run.gains).sum(axis=1)
+            mean = np.maximum((factor * size).sum(axis=0) / size.sum(axis=0), LEAST_ARM)
+            # The error counts in the torque as measured: else a smaller arm would make both smaller, and look better.
+            error = (factor * run.side_torque).sum(axis=0) - torque
+            torque = run.side_torque.sum(axis=0) - error / mean
         return np.asarray(torque)
 
     def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:

@@ -8,9 +8,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.fitting.problem import resized
+from lugre_steering.fitting.problem import STATIC, resized
 from lugre_steering.vehicle.size import VEHICLE, Size
 
 
@@ -23,6 +25,18 @@ def at_end(effect: Mapping[str, Any], size: Size = VEHICLE) -> list[tuple[str, f
         (name, found["value"], found["unit"])
         for name, found in effect["parameters"].items()
         if any(end and math.isclose(found["value"], end, rel_tol=1e-6) for end in (alone if entry.per_line else amplitudes.get(name, ())))
+    ]
+
+
+def calibrations_at_bounds(done: Finished) -> list[str]:
+    """Baseline values that recalibration left at an end of their range, in words."""
+    problem, x = done.problem, done.found.final.x
+    low, high = problem.bounds()
+    return [
+        c.name.replace("_", " ")
+        for c, value, least, most in zip(problem.calibrations, x, low, high, strict=False)
+        # Static friction that is no more than the sliding one is nothing to wonder at.
+        if min(np.inf if c.name == STATIC.name else value - least, most - value) < 1e-6 * (most - least)
     ]
 
 
@@ -56,6 +70,7 @@ def statement(
         for name, value, unit in at_end(effect, done.problem.size)
     ]
     last = done.problem.runs[-1].name
+    bounds = calibrations_at_bounds(done)
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
         f"from {torque(baseline['heldout_rmse_Nm'])} to {torque(augmented['heldout_rmse_Nm'])} "
@@ -65,6 +80,7 @@ def statement(
         + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
         + (f" At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another." if ends else "")
+        + (f" Recalibrated as far as is allowed, so perhaps another machine or another law: {', '.join(bounds)}." if bounds else "")
         + (f" {' and '.join(ended)} does not act in {last}, the last recording: augmented.yaml is without." if ended else "")
         + (f" Structure is left: {left}." if left else "")
     )
