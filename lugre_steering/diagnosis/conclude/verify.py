@@ -19,8 +19,8 @@ RESAMPLES = 2000
 STRETCHES = 6
 ENOUGH = 5
 """Stretches of CLUSTER_S that must be left to judge by."""
-BEND = 0.1
-"""Standard deviation of what a law is off its own torque at any place."""
+BEND = 0.03
+"""Standard deviation of what a law is off its own torque at any place: a few per cent, by judgement; laws fit no better."""
 NORMAL = float(stats.norm.ppf(0.975))
 WIDTH = float(stats.t.ppf(0.975, STRETCHES - 1))
 """Half width of a 95 % interval in standard deviations known from STRETCHES estimates."""

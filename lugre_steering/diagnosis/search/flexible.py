@@ -44,6 +44,8 @@ def _shape(problem: Problem, current: Fit, weight: Array, index: int) -> tuple[A
     basis = current.basis()
     error = (problem.measured - current.prediction) * weight
     columns = bends(problem, current, weight, index)
+    if columns.shape[1] < 3:
+        columns = columns[:, :0]
     return error - basis @ (basis.T @ error), columns - basis @ (basis.T @ columns)
 
 
@@ -57,8 +59,8 @@ def bends(problem: Problem, current: Fit, weight: Array, index: int) -> Array:
     part = locate.contribution(problem, current, index)
     acting = np.abs(part) * weight > 1e-3 * np.max(np.abs(part) * weight)
     knots = np.unique(np.quantile(coordinate[acting], np.linspace(0.0, 1.0, KNOTS))) if acting.any() else np.zeros(0)
-    if knots.size < 3:
-        return np.zeros((part.size, 0))
+    if knots.size < 3:  # a direction has no places
+        return np.asarray((part * weight)[:, None])
     columns = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
     return np.asarray((columns * part).T * weight[:, None])
 
