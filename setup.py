@@ -49,6 +49,7 @@ setup(
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "import": ["pyarrow>=14.0", "h5py>=3.8"],
+        "frame": ["pandas>=2.0"],
         "report": ["matplotlib>=3.6", "plotly>=5.18"],
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import json
 import os
 import sys
 import warnings
@@ -22,8 +21,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from lugre_steering import __version__
+from lugre_steering import serialise
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
+from lugre_steering.version import __version__
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -132,7 +132,7 @@ def doubts_told_once() -> Iterator[None]:
 
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
-    print(json.dumps(result, indent=2, allow_nan=False))
+    print(serialise.as_json(result))
 
 
 def command(name: str | None = None) -> Callable[[F], F]:
@@ -178,6 +178,9 @@ def replay(
     parameters: Annotated[
         Path | None, typer.Option(help="parameter file of the node (YAML), to replay with the same time options")
     ] = None,
+    initial_temperature: Annotated[
+        str | None, typer.Option(help="of the rubber at the start of each bag [degC], or 'air': the first recorded air")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
@@ -190,7 +193,7 @@ def replay(
     if horizon is not None:
         options = replace(options, feed_forward_horizon_s=horizon)
     with progress_bar() as progress:
-        result = run(bags, vehicle, out, options, progress)
+        result = run(bags, vehicle, out, options, progress, initial_temperature)
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:
@@ -395,18 +398,20 @@ def effects(
 def prove(
     out: OutFolder,
     quick: Annotated[bool, typer.Option("--quick", help="a stratified few, under five minutes on two cores")] = False,
-    cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'single/end_stop/*'")] = None,
+    cases: Annotated[str | None, typer.Option(help="only cases whose name fits this pattern, e.g. 'null/*'")] = None,
+    simulator: Annotated[str, typer.Option(help="2 (a world like the sheet's), 3 (other friction, machines, sensors) or all")] = "all",
+    kinds: Annotated[str | None, typer.Option(help="only these kinds of cases, e.g. 'dirty,sheet'")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="repeat or resume the run with this seed [a new one]")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hide physics in recordings of a second simulator, diagnose them blind, and score the answers."""
+    """Hide physics in recordings of two other simulators, diagnose them blind, and score the answers."""
     from lugre_steering.proof.command import run
     from lugre_steering.proof.table import show_board
 
     with progress_bar() as progress:
         result = run(
-            out, quick=quick, cases=cases, seed=seed, peers=peers,
+            out, quick=quick, cases=cases, simulator=simulator, kinds=kinds, seed=seed, peers=peers,
             announce=lambda text: print(f"lugre-steering: {text}", file=sys.stderr), progress=progress,
         )  # fmt: skip
     if as_json:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from lugre_steering.errors import DataError
+from lugre_steering.serialise import as_json
 
 MAKER = "lugre_steering"
 VEHICLE_MARK = f"# Written by {MAKER}"
@@ -72,7 +73,7 @@ def write_text(text: str, file: Path) -> None:
 
 def write_record(record: Mapping[str, Any], file: Path) -> None:
     """A result as JSON, whole or not at all."""
-    write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", file)
+    write_text(as_json(record) + "\n", file)
 
 
 @contextmanager
@@ -263,7 +264,9 @@ def refuse_foreign(files: Iterable[Path]) -> None:
             raise not_ours(file)
 
 
-def earlier_result(out: Path, record: str, schema: str, others: Iterable[str], vehicle_file: Path) -> dict[str, Any] | None:
+def earlier_result(
+    out: Path, record: str, schema: str, others: Iterable[str], vehicle_file: Path | None = None
+) -> dict[str, Any] | None:
     """The record of an earlier run in ``out``, if there is one, whose files may then be replaced.
 
     ``DataError`` if the ``record`` there is of another ``schema``, if one of the ``others`` to be written is not ours, or if
@@ -271,7 +274,7 @@ def earlier_result(out: Path, record: str, schema: str, others: Iterable[str], v
     """
     others = list(others)
     for name in (record, *others):
-        if (out / name).resolve() == vehicle_file.resolve():
+        if vehicle_file is not None and (out / name).resolve() == vehicle_file.resolve():
             raise DataError(f"{vehicle_file}: would be replaced by the result; choose another --out")
     old = None
     if os.path.lexists(out / record):

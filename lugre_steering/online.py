@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,9 @@ from lugre_steering.vehicle.model import baseline_parameters
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3
 LARGE_SHARE = 0.7
+ALIKE, WRONG_TIMES, UNIT_TIMES = 0.85, 1.6, 30.0
+"""Correlation about zero from which measured and estimated torque have one shape, the factor between them that no nominal value and
+hardly any weather explains, and the one from which units are likelier."""
 NOTABLE_SHARE = 0.05
 """Of the static friction: below, the torque is too small to compare with."""
 
@@ -43,9 +45,39 @@ class Range:
             self.high, self.high_s = other.high, other.high_s
 
 
+@dataclass(frozen=True)
+class Peaks:
+    """Largest and smallest torque [N m], and when [s]."""
+
+    max_Nm: float
+    max_at_s: float
+    min_Nm: float
+    min_at_s: float
+
+
+@dataclass(frozen=True)
+class PeaksOfBoth:
+    """Peaks of the measured torque (of cylinders or a torque sensor) and of the estimate."""
+
+    cylinder_torque: Peaks
+    estimate: Peaks
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well estimates agree with measured torque: RMSE and bias (mean residual) [N m], R2 (None where the measured torque never
+    changes), and peaks."""
+
+    samples: int
+    rmse_Nm: float
+    r2: float | None
+    bias_Nm: float
+    peaks: PeaksOfBoth
+
+
 @dataclass
-class Fit:
-    """How well estimates agree with measured torque [N m].
+class Comparison:
+    """Estimates against measured torque [N m] as they come.
 
     Mean and variance are merged from batches after Chan, Golub and LeVeque (1983), The American Statistician 37(3),
     which loses no digits to a large mean, unlike sums of squares.
@@ -65,7 +97,7 @@ class Fit:
         if not measured.size:
             return
         mean = float(measured.mean())
-        batch = Fit(
+        batch = Comparison(
             measured.size,
             mean,
             float(((measured - mean) ** 2).sum()),
@@ -77,7 +109,7 @@ class Fit:
         batch.estimate.add(time_s, measured - residual)
         self.merge(batch)
 
-    def merge(self, other: Fit) -> None:
+    def merge(self, other: Comparison) -> None:
         """Take in the samples of another one."""
         if not other.count:
             return
@@ -92,27 +124,48 @@ class Fit:
         self.measured.merge(other.measured)
         self.estimate.merge(other.estimate)
 
-    def result(self) -> dict[str, Any] | None:
-        """RMSE, R2 (None where the measured torque never changes), bias and peaks; None without samples."""
+    def result(self) -> Agreement | None:
+        """What they came to; None without samples."""
         if not self.count:
             return None
 
-        def peaks(seen: Range) -> dict[str, float]:
-            return {"max_Nm": seen.high, "max_at_s": seen.high_s, "min_Nm": seen.low, "min_at_s": seen.low_s}
+        def peaks(seen: Range) -> Peaks:
+            return Peaks(seen.high, seen.high_s, seen.low, seen.low_s)
 
-        return {
-            "samples": self.count,
-            "rmse_Nm": math.sqrt(self.squares / self.count),
-            "r2": 1.0 - self.squares / self.spread if self.spread > 0.0 else None,
-            "bias_Nm": self.error / self.count,
-            "peaks": {"cylinder_torque": peaks(self.measured), "estimate": peaks(self.estimate)},
-        }
+        return Agreement(
+            samples=self.count,
+            rmse_Nm=math.sqrt(self.squares / self.count),
+            r2=1.0 - self.squares / self.spread if self.spread > 0.0 else None,
+            bias_Nm=self.error / self.count,
+            peaks=PeaksOfBoth(peaks(self.measured), peaks(self.estimate)),
+        )
 
 
 def is_large(residual_rms: float, estimate_rms: float, measured_rms: float, vehicle: Vehicle) -> bool:
     """Whether a residual is so large beside the torque that wrong units, signs or plugs are likelier than missing physics."""
     friction = len(vehicle.sides) * float(baseline_parameters(vehicle)["static_torque"])
     return estimate_rms > NOTABLE_SHARE * friction and residual_rms > LARGE_SHARE * min(estimate_rms, measured_rms)
+
+
+def sheet_words(residual_squares: float, estimate_squares: float, measured_squares: float, vehicle: Vehicle) -> str | None:
+    """What to say where the measured torque follows the estimate in shape but not in size, so that entries of the vehicle file are
+    likely wrong; None where it does not. Sums of squares over the same samples [N2 m2].
+
+    The sum of products follows from them, residual = measured - estimate; the best factor on the estimate is that over the
+    estimate's squares.
+    """
+    friction = len(vehicle.sides) * float(baseline_parameters(vehicle)["static_torque"])
+    product = 0.5 * (measured_squares + estimate_squares - residual_squares)
+    if not product > ALIKE * math.sqrt(estimate_squares * measured_squares) or friction <= 0.0:
+        return None
+    times = product / estimate_squares
+    if not WRONG_TIMES < max(times, 1.0 / times) < UNIT_TIMES:
+        return None
+    level = "friction.coulomb" if vehicle.friction is not None else "contact.coulomb_torque_Nm"
+    entries = [*(["axle.load_N"] if vehicle.axle is not None else []), level]
+    entries.append("bores" if vehicle.hydraulics is not None else "the unit of the torque sensor")
+    warm = ", and how warm the rubber was (--initial-temperature)" if vehicle.rubber is not None else ""
+    return f"measured torque is {times:.2g} times what this sheet can give; check {', '.join(entries)}{warm}"
 
 
 def r2_words(r2: float | None, name: str = "R2") -> str:

@@ -23,7 +23,9 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from lugre_steering.errors import DataError
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -32,6 +34,16 @@ RATE_LIMIT = 100.0  # rad/s, far beyond any steering: such a rate counts as not 
 
 
 AIR_LIMIT_DEGC = 100.0  # no air is warmer or colder: kelvin, or no temperature at all
+
+
+Samples = ArrayLike | tuple[ArrayLike, ArrayLike]
+"""One channel as arrays: values on the clock of the recording, or a pair of its own times [s] and values."""
+BySide = ArrayLike | Mapping[str, Samples]
+_LIMITS = {
+    "angle/": (np.pi, "rad"), "rate/": (RATE_LIMIT, "rad/s"), "pressure/": (1e9, "Pa"), "measured_torque": (1e9, "N m"),
+    "air_temperature": (AIR_LIMIT_DEGC, "degC"),
+}  # fmt: skip
+"""Largest magnitude of each channel: beyond, it comes in another unit."""
 
 
 class Kind(IntEnum):
@@ -76,6 +88,22 @@ class Finding:
     intervals_s: tuple[tuple[float, float], ...] = ()
 
 
+    def in_bag(self, bag: str) -> BagFinding:
+        """The finding with the name of the bag it was made in."""
+        return BagFinding(self.finding, self.topic, bag, self.intervals_s, self.statement)
+
+
+@dataclass(frozen=True)
+class BagFinding:
+    """A finding about one bag: what (``finding``, one word), the topic if there is one, stretches [s] since the first stamp."""
+
+    finding: str
+    topic: str
+    bag: str
+    intervals_s: tuple[tuple[float, float], ...]
+    statement: str
+
+
 @dataclass(frozen=True)
 class Recording:
     """Signals of one bag, each sorted and free of duplicates, with what was rejected on the way in."""
@@ -89,6 +117,88 @@ class Recording:
     measured_torque: Signal | None = None
     rejected: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        *,
+        angle: BySide,
+        torque: Samples | None = None,
+        pressure: Mapping[str, Samples] | None = None,
+        rate: BySide | None = None,
+        air: Samples | None = None,
+        name: str = "recording",
+    ) -> Recording:
+        """A recording made of arrays, for everything that takes a bag.
+
+        ``time`` (n,) [s] strictly increasing, of any origin; ``angle`` [rad] and ``rate`` [rad/s] as {side: samples}, or one array
+        for the joint 'left' of a vehicle with a single one; ``torque`` [N m] of a torque sensor, or ``pressure`` [Pa] as {line:
+        samples}, gauge or absolute as the vehicle file says; ``air`` [degC]. Samples are an array (n,), or a pair (time, array)
+        where a sensor has a clock of its own. Samples that are no finite number are left out and counted in ``rejected``.
+        ``DataError`` for anything that cannot be meant.
+        """
+        given = {f"angle/{side}": samples for side, samples in _by_side(angle).items()}
+        given |= {f"rate/{side}": samples for side, samples in _by_side(rate or {}).items()}
+        given |= {f"pressure/{line}": samples for line, samples in (pressure or {}).items()}
+        given |= {label: samples for label, samples in (("measured_torque", torque), ("air_temperature", air)) if samples is not None}
+        clock = _clock(time, "time")
+        signals, rejected = {}, {}
+        for label, samples in given.items():
+            signals[label], lost = _signal(label, samples, clock)
+            if lost:
+                rejected[label] = {"not_finite": lost}
+        start = min(float(signal.time_s[0]) for signal in signals.values())
+        signals = {label: Signal(signal.time_s - start, signal.value) for label, signal in signals.items()}
+
+        def part(kind: str) -> dict[str, Signal]:
+            return {label.removeprefix(kind): signal for label, signal in signals.items() if label.startswith(kind)}
+
+        return cls(
+            name=name, start_ns=max(round(start * 1e9), 1), angle=part("angle/"), pressure=part("pressure/"), rate=part("rate/"),
+            air_temperature=signals.get("air_temperature"), measured_torque=signals.get("measured_torque"), rejected=rejected,
+        )  # fmt: skip
+
+
+def _by_side(samples: BySide) -> Mapping[str, Samples]:
+    return samples if isinstance(samples, Mapping) else {"left": samples}
+
+
+def _clock(time: ArrayLike, label: str) -> Array:
+    """Times (n,) [s], checked."""
+    clock = _numbers(time, label)
+    if clock.size < 2 or not np.isfinite(clock).all() or not (np.diff(clock) > 0.0).all():
+        raise DataError(f"{label}: got {clock.size} times, expected at least two finite ones [s] that increase strictly")
+    return clock
+
+
+def _signal(label: str, samples: Samples, clock: Array) -> tuple[Signal, int]:
+    """The finite samples of one channel, checked, and how many are left out."""
+    if isinstance(samples, tuple):
+        if len(samples) != 2:
+            raise DataError(f"{label}: got {len(samples)} arrays, expected an array or a pair (time, array)")
+        clock, samples = _clock(samples[0], f"time of {label}"), samples[1]
+    value = _numbers(samples, label)
+    if value.size != clock.size:
+        raise DataError(f"{label}: got {value.size} samples for {clock.size} times, expected one for each")
+    finite = np.isfinite(value)
+    if not finite.any():
+        raise DataError(f"{label}: got no finite sample, expected some")
+    limit, unit = next(bound for kind, bound in _LIMITS.items() if label.startswith(kind))
+    largest = float(np.abs(value[finite]).max())
+    if largest > limit:
+        raise DataError(f"{label}: got {largest:g}, expected values in {unit} up to {limit:g}")
+    return Signal(clock[finite], value[finite]), int((~finite).sum())
+
+
+def _numbers(values: ArrayLike, label: str) -> Array:
+    try:
+        array = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise DataError(f"{label}: got {type(values).__name__}, expected an array of numbers") from None
+    if array.ndim != 1:
+        raise DataError(f"{label}: got an array of shape {array.shape}, expected (n,)")
+    return array
 
 
 NODE = "steering_torque_estimator"

@@ -12,6 +12,7 @@ import re
 from typing import Any
 
 from lugre_steering.effects.entry import Effect
+from lugre_steering.serialise import mapped
 from lugre_steering.vehicle import Vehicle
 
 _MASS = {("m", "N"): "kg"}
@@ -86,13 +87,9 @@ def law(vehicle: Vehicle, text: str) -> str:
     return words(vehicle, text)
 
 
-def in_words(vehicle: Vehicle, tree: Any, key: str = "") -> Any:
+def in_words(vehicle: Vehicle, tree: Any) -> Any:
     """A diagnosis with ``words`` in all its prose; its keys and names are those of the contract."""
-    if isinstance(tree, dict):
-        return {name: in_words(vehicle, item, name) for name, item in tree.items()}
-    if isinstance(tree, list):
-        return [in_words(vehicle, item, key) for item in tree]
-    return words(vehicle, tree) if isinstance(tree, str) and key in _PROSE else tree
+    return mapped(tree, lambda leaf, key: words(vehicle, leaf) if isinstance(leaf, str) and key in _PROSE else leaf)
 
 
 def title(vehicle: Vehicle, effect: Effect) -> str:

@@ -5,6 +5,7 @@
 import dataclasses
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Signal
 from lugre_steering.replay.run import replay
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep
-from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.model import build_model
 
 ROOT = Path(__file__).parent.parent
 SHEET_FILE = ROOT / "config" / "test_vehicle.yaml"
@@ -98,7 +99,7 @@ def test_an_error_in_temperature_sensitivity_goes_into_the_heat_capacity(long_ru
     said = next(a for a in done.result["assumed"] if a["name"] == "temperature_sensitivity")["shifts"]["heat_capacity"]
     exponent = 1.02
     other = Problem(SHEET, done.problem.runs, done.problem.calibrations)
-    other.model = Model(other.model.parameters, other.model.rubber**exponent)
+    other.model = replace(other.model, rubber=other.model.rubber**exponent)
     index = [c.name for c in other.calibrations].index("heat_capacity")
     moved = fit(other, done.estimate.weight, start=done.estimate.x, robust=True, linearisations=40).x[index]
     assert (moved - done.estimate.x[index]) / math.log(exponent) == pytest.approx(said, rel=0.15)
@@ -189,6 +190,10 @@ def test_files_of_the_command(commanded):
     assert printed["schema"] == "lugre_steering/calibration/1"
     assert (out / "calibration.png").read_bytes().startswith(b"\x89PNG")
     note = vehicle_file.load(out / "calibrated.yaml").provenance["calibration"]
+    recording = read_recording(BAG, SHEET.channels)
+    farthest = max(float(np.abs(signal.value).max()) for signal in recording.angle.values())
+    assert note["seen"]["angle_deg"] == pytest.approx(np.degrees(farthest), abs=0.05)
+    assert 3.0 < note["seen"]["rate_deg_s"] < 20.0
     assert note["data"] == [str(BAG)]
     assert note["heldout_rmse_Nm"] == printed["heldout_rmse_Nm"]
     assert note["sheet"] == str(sheet)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lugre_steering.online import BINS, Curves, Fit, Timeline
+from lugre_steering.online import BINS, Comparison, Curves, Timeline
 
 
 @given(
@@ -20,31 +20,31 @@ from lugre_steering.online import BINS, Curves, Fit, Timeline
 def test_fit_does_not_depend_on_how_the_data_are_cut(seed: int, cuts: list[int], mean: float) -> None:
     rng = np.random.default_rng(seed)
     time, measured, residual = np.arange(500.0), mean + rng.normal(0.0, 1e3, 500), rng.normal(5.0, 50.0, 500)
-    fit = Fit()
+    fit = Comparison()
     for part in np.split(np.arange(500), sorted(cuts)):
         fit.add(time[part], measured[part], residual[part])
     result = fit.result()
     assert result is not None
-    assert result["samples"] == 500
-    assert result["rmse_Nm"] == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
-    assert result["bias_Nm"] == pytest.approx(residual.mean(), rel=1e-9)
+    assert result.samples == 500
+    assert result.rmse_Nm == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+    assert result.bias_Nm == pytest.approx(residual.mean(), rel=1e-9)
     # A mean of 1e9 leaves 1e-7 of a deviation of 1e3 in a double.
-    assert result["r2"] == pytest.approx(
+    assert result.r2 == pytest.approx(
         1.0 - np.sum(residual**2) / np.sum((measured - measured.mean()) ** 2), rel=1e-6
     )
-    peaks = result["peaks"]["cylinder_torque"]
-    assert (peaks["max_Nm"], peaks["max_at_s"]) == (measured.max(), time[measured.argmax()])
-    assert (peaks["min_Nm"], peaks["min_at_s"]) == (measured.min(), time[measured.argmin()])
+    peaks = result.peaks.cylinder_torque
+    assert (peaks.max_Nm, peaks.max_at_s) == (measured.max(), time[measured.argmax()])
+    assert (peaks.min_Nm, peaks.min_at_s) == (measured.min(), time[measured.argmin()])
 
 
 def test_fit_of_nothing_and_of_a_constant() -> None:
-    fit = Fit()
+    fit = Comparison()
     fit.add(np.empty(0), np.empty(0), np.empty(0))
     assert fit.result() is None
     fit.add(np.arange(3.0), np.full(3, 7.0), np.zeros(3))
     result = fit.result()
     assert result is not None
-    assert result["r2"] is None
+    assert result.r2 is None
 
 
 @given(seed=st.integers(0, 2**32 - 1), cuts=st.lists(st.integers(0, 20_000), max_size=5))

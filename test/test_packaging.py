@@ -22,14 +22,14 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 NAME = "lugre_steering"
 HEADER = ["# Copyright 2026 The lugre_steering contributors", "# SPDX-License-Identifier: Apache-2.0"]
-ROS = re.compile(r"rclpy|rcl_interfaces|builtin_interfaces|launch(_ros)?|ament_\w+|\w+_msgs")
+ROS = re.compile(r"rclpy|rcl_interfaces|builtin_interfaces|launch(_ros)?|ament_\w+|\w+_msgs|std_srvs")
 PLOTTING = {"matplotlib", "plotly"}
 NOT_CORE = ("live", "report", "bench")
 DRAWING = ("figure.py", "figures.py", "plots.py", "page.py", "show.py", "effect_card.py")
 """Pictures lie beside the command that writes them, in files of these names."""
 ROS_KEYS = {
-    "rclpy", "rcl_interfaces", "builtin_interfaces", "sensor_msgs", "geometry_msgs", "std_msgs", "trajectory_msgs",
-    "diagnostic_msgs", "launch", "launch_ros", "ament_index_python",
+    "rclpy", "rcl_interfaces", "builtin_interfaces", "sensor_msgs", "geometry_msgs", "std_msgs", "std_srvs",
+    "trajectory_msgs", "diagnostic_msgs", "launch", "launch_ros", "ament_index_python",
 }  # fmt: skip
 ROSDEP_KEYS = {f"python3-{name}" for name in ("numpy", "scipy", "numba", "yaml", "matplotlib", "pytest")}
 

@@ -227,9 +227,11 @@ def test_again_into_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None
 
 
 def test_plans_take_effect_in_recorded_order(tmp_path: Path) -> None:
-    messages = drive()
+    # Pressures late only: made up as they are, they speak against the feed-forward.
+    alone = [row for row in drive() if "pressure" not in row[0] or row[2] > make.T0 + 5 * SECOND]
+    messages = alone.copy()
     # One plan right between two samples, one with a zero stamp ("from now on"), one with the log time of a sample.
-    for k, (i, stamp) in enumerate(((301, make.T0 + 2 * SECOND), (700, 0))):
+    for k, (i, stamp) in enumerate(((101, make.T0 + 2 * SECOND), (233, 0))):
         messages.insert(i + k, command(stamp, messages[i + k][2] - 100, [0.1, 0.2, 0.3]))
     bag = make.write(tmp_path / "run", messages)
     options = Options(feed_forward_horizon_s=0.4)
@@ -239,7 +241,7 @@ def test_plans_take_effect_in_recorded_order(tmp_path: Path) -> None:
     }  # fmt: skip
     expected = one_by_one(bag, load(VEHICLE), options)
     assert_same(tmp_path / "out" / "run", expected, sides=2)
-    without = one_by_one(make.write(tmp_path / "no_plan", drive()), load(VEHICLE), options)
+    without = one_by_one(make.write(tmp_path / "no_plan", alone), load(VEHICLE), options)
     changed = [
         i
         for i, ((_, a), (_, b)) in enumerate(zip(expected["estimates"], without["estimates"], strict=True))
@@ -360,7 +362,7 @@ def test_a_joint_of_another_name_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1e-5, -1.0, 0.5, 0.0])
 def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float) -> None:
-    """Pressures in bar, with the other sign, half of them, and none."""
+    """Pressures in bar, with the other sign, half of them (as a sheet of twice the load looks too), and none."""
     messages = []
     for topic, kind, log, raw in read(DOUBLE_CYCLE):
         if kind == make.FLUID_PRESSURE:
@@ -368,7 +370,9 @@ def test_a_residual_as_large_as_the_torque_is_told(tmp_path: Path, scale: float)
             raw = make.pressure(stamp_of(message), scale * message.fluid_pressure)
         messages.append((topic, kind, log, raw))
     (bag,) = replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")["bags"]
-    assert [finding["finding"] for finding in bag["findings"]] == ([] if scale == 1.0 else ["large_residual"])
+    expected = {1.0: [], 0.5: ["wrong_sheet"]}.get(scale, ["large_residual"])
+    assert [finding["finding"] for finding in bag["findings"]] == expected
+    assert all("0.5 times" in f["statement"] for f in bag["findings"] if f["finding"] == "wrong_sheet")
 
 
 def test_a_velocity_of_zeros_is_not_believed(tmp_path: Path) -> None:

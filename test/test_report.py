@@ -26,8 +26,22 @@ from lugre_steering.cli import app
 from lugre_steering.diagnosis import effect_card as card
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.report.page import Written, render, write_report
-from lugre_steering.diagnosis.result import SCHEMA, BagTrace, Diagnosis, Evidence
+from lugre_steering.diagnosis.result import (
+    SCHEMA,
+    Augmented,
+    BagTrace,
+    Diagnosis,
+    Errors,
+    Evidence,
+    Experiment,
+    FittedValue,
+    Limit,
+    NamedEffect,
+    Place,
+    Unexplained,
+)
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.recording import BagFinding
 from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle, load
 
@@ -61,61 +75,52 @@ def trace(name: str, seed: int) -> BagTrace:
 def missing(vehicle: Vehicle, text: str = "run") -> Diagnosis:
     """An end stop found in two bags; every free text is ``text``."""
     traces = (trace(f"{text} a", 1), trace(f"{text} b", 2))
-    entry = {"coordinate": "steering angle", "range": [0.4, 0.55], "unit": "rad"}
-    where = [{"bag": t.name, "intervals_s": [list(s) for s in t.intervals["end_stop"]], **entry} for t in traces]
-    result: dict[str, Any] = {
-        "schema": SCHEMA, "bags": [t.name for t in traces], "verdict": "missing_physics",
-        "statement": f"{text} stands in the statement.", "noise_floor_Nm": NOISE,
-        "baseline": {"rmse_Nm": 2000.0, "heldout_rmse_Nm": 2100.0},
-        "augmented": {"rmse_Nm": 80.0, "heldout_rmse_Nm": 84.0, "improvement": 0.96, "improvement_ci95": [0.94, 0.97]},
-        "effects": [{
-            "id": "end_stop", "stage": "parallel_torque", "statement": text, "p_value": 1e-9,
-            "parameters": {
-                "engage_angle": {"value": 0.4, "ci95": [0.3996, 0.4004], "unit": "rad"},
-                "stiffness": {"value": 60e3, "ci95": [59.9e3, 60.1e3], "unit": "N m/rad"},
-            },
-            "where": where, "energy_share": 0.93, "masked_share": 0.41, "indistinguishable_from": ["soil_shear"],
-        }],
-        "unexplained": {"structured": True, "description": text, "formula": f"M = {text}", "where": where},
-        "detection_limits": {"yaw_inertia": {"parameter": "inertia", "smallest": 321.0, "unit": "kg m2"}},
-        "data_quality": [{"finding": "stuck_sensor", "topic": text, "bag": text, "intervals_s": [[0.0, 1.0]],
-                          "statement": text}],
-        "next_experiment": {"manoeuvre": text, "separates": ["end_stop", text], "why": text},
-    }  # fmt: skip
     evidence = (
         Evidence("end_stop", "Elastic end stop", 0.9, 0.4, 1e-9, 0.96, "named"),
         *(Evidence(f"rival {i}", text, 0.01 * i, 0.5, 0.3, None, text) for i in range(20)),
     )
     provenance = {"made_by": text, "numbers": [1.25, 2.0], "nested": {"key": text}}
     changed = vehicle.replace(name=text, provenance=provenance)
-    return Diagnosis(result, changed, traces, evidence, {"end_stop": "steering angle"})
+    where = tuple(Place(t.name, tuple(t.intervals["end_stop"]), "steering angle", (0.4, 0.55), "rad") for t in traces)
+    return Diagnosis(
+        schema=SCHEMA, bags=tuple(t.name for t in traces), verdict="missing_physics",
+        statement=f"{text} stands in the statement.", noise_floor_Nm=NOISE, baseline=Errors(2000.0, 2100.0),
+        augmented=Augmented(80.0, 84.0, 0.96, (0.94, 0.97), changed),
+        effects=(NamedEffect(
+            "end_stop", "parallel_torque", text, 1e-9,
+            {
+                "engage_angle": FittedValue(0.4, (0.3996, 0.4004), "rad"),
+                "stiffness": FittedValue(60e3, (59.9e3, 60.1e3), "N m/rad"),
+            },
+            where, 0.93, 0.41, ("soil_shear",),
+        ),),
+        unexplained=Unexplained(True, text, f"M = {text}", where),
+        detection_limits={"yaw_inertia": Limit("inertia", 321.0, "kg m2")},
+        data_quality=(BagFinding("stuck_sensor", text, text, ((0.0, 1.0),), text),),
+        next_experiment=Experiment(text, ("end_stop", text), text),
+        traces=traces, evidence=evidence, coordinate_of={"end_stop": "steering angle"},
+    )  # fmt: skip
 
 
 def consistent(vehicle: Vehicle) -> Diagnosis:
     full = missing(vehicle)
-    fit = full.json["baseline"]
-    result = full.json | {
-        "verdict": "consistent", "effects": [], "next_experiment": None, "data_quality": [],
-        "augmented": {**fit, "improvement": 0.0, "improvement_ci95": [0.0, 0.0]},
-        "unexplained": {"structured": False, "description": "", "formula": None, "where": None},
-    }  # fmt: skip
-    traces = tuple(dataclasses.replace(t, contributions={}, intervals={}) for t in full.traces)
-    return Diagnosis(result, vehicle, traces, full.evidence[1:], {})
+    return dataclasses.replace(
+        full, verdict="consistent", effects=(), next_experiment=None, data_quality=(),
+        augmented=Augmented(full.baseline.rmse_Nm, full.baseline.heldout_rmse_Nm, 0.0, (0.0, 0.0), vehicle),
+        unexplained=Unexplained(False, ""), evidence=full.evidence[1:], coordinate_of={},
+        traces=tuple(dataclasses.replace(t, contributions={}, intervals={}) for t in full.traces),
+    )  # fmt: skip
 
 
 def unlisted(vehicle: Vehicle) -> Diagnosis:
-    plain, full = consistent(vehicle), missing(vehicle)
-    result = plain.json | {"verdict": "unlisted_physics", "unexplained": full.json["unexplained"]}
-    return dataclasses.replace(plain, json=result)
+    return dataclasses.replace(consistent(vehicle), verdict="unlisted_physics", unexplained=missing(vehicle).unexplained)
 
 
 def insufficient(vehicle: Vehicle) -> Diagnosis:
-    nothing = {"rmse_Nm": 0.0, "heldout_rmse_Nm": None}
-    result = consistent(vehicle).json | {
-        "verdict": "insufficient_data", "baseline": nothing, "detection_limits": {},
-        "augmented": {**nothing, "improvement": None, "improvement_ci95": None},
-    }  # fmt: skip
-    return Diagnosis(result, vehicle)
+    return dataclasses.replace(
+        consistent(vehicle), verdict="insufficient_data", baseline=Errors(0.0, None), detection_limits={},
+        augmented=Augmented(0.0, None, None, None, vehicle), traces=(), evidence=(),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

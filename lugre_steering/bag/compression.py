@@ -1,18 +1,69 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Decompression that keeps what can be kept of a torn stream (every codec a rosbag2 recording may use)."""
+"""Decompression that keeps what can be kept of a torn stream (every codec a rosbag2 recording may use).
+
+Compressed data may be made to unpack without end: everything comes out in small pieces, and stops at a limit.
+"""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable
+import io
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import lz4.frame  # type: ignore[import-untyped]
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+CHUNK_LIMIT = 128 << 20  # bytes of one chunk, packed or not: read at once, and a few copies of it must fit into memory
+MESSAGE_LIMIT = 32 << 20  # bytes of one message: more than any camera or laser sends
+_FED, _STEP = 1 << 16, 1 << 17  # bytes given to a codec, and taken from it, at a time (zstd makes blocks of 128 kB)
+_FREE, _RATIO = 256 << 20, 20  # recordings of sensors shrink to a tenth at best
+
+
+class TooLargeError(Exception):
+    """Compressed data unpack to more than any recording would."""
+
+
+class Allowance:
+    """How much one pass over a file of ``size`` bytes may unpack: bounds what a small hostile file can cost."""
+
+    def __init__(self, size: int) -> None:
+        self._total = self._left = _FREE + _RATIO * size
+
+    def spend(self, size: int) -> None:
+        """Take ``size`` bytes off."""
+        if size > self._left:
+            self._left = 0
+            raise TooLargeError(f"they unpack to more than the {self._total >> 20} MB that a file of this size may")
+        self._left -= size
+
+
+class _Zstandard:
+    """The interface of the standard library over the package zstandard, fed so little that its output stays small."""
+
+    def __init__(self) -> None:
+        self._inner = importlib.import_module("zstandard").ZstdDecompressor().decompressobj()
+        self._fed = b""
+
+    def decompress(self, data: bytes, _: int) -> bytes:
+        self._fed += data
+        now, self._fed = self._fed[:64], self._fed[64:]
+        return bytes(self._inner.decompress(now))
+
+    @property
+    def needs_input(self) -> bool:
+        return not self._fed
+
+    @property
+    def eof(self) -> bool:
+        return bool(self._inner.eof)
+
+    @property
+    def unused_data(self) -> bytes:
+        return bytes(self._inner.unused_data) + self._fed
 
 
 def _zstd_decompressor() -> Callable[[], Any]:
@@ -20,35 +71,60 @@ def _zstd_decompressor() -> Callable[[], Any]:
     for package in ("compression", "backports"):
         if importlib.util.find_spec(package) and importlib.util.find_spec(f"{package}.zstd"):
             return importlib.import_module(f"{package}.zstd").ZstdDecompressor  # type: ignore[no-any-return]
-    zstandard = importlib.import_module("zstandard")
-    return lambda: zstandard.ZstdDecompressor().decompressobj()
+    return _Zstandard
 
 
 zstd_decompressor = _zstd_decompressor()
+_DECOMPRESSORS: dict[str, Callable[[], Any]] = {
+    "zstd": zstd_decompressor,
+    "lz4": lz4.frame.LZ4FrameDecompressor,
+}
 
 
-def expand(data: bytes, compression: str) -> bytes:
-    """Decompress a whole or torn stream; of a torn one, what its complete blocks hold. Damage may raise anything."""
-    if compression == "":
-        return data
-    if compression == "zstd":
-        return bytes(zstd_decompressor().decompress(data))
-    if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data))
-    raise ValueError(f"unknown compression {compression!r}")
+def _pieces(read: Callable[[int], bytes], compression: str) -> Iterator[bytes]:
+    """What comes out of a stream, a little at a time: damage costs no more than its own piece. It may raise anything."""
+    if compression not in _DECOMPRESSORS:
+        raise ValueError(f"unknown compression {compression!r}")
+    decompressor = _DECOMPRESSORS[compression]()
+    while data := read(_FED):
+        yield decompressor.decompress(data, _STEP)
+        while not (decompressor.eof or decompressor.needs_input):
+            yield decompressor.decompress(b"", _STEP)
+        if decompressor.eof:
+            if rest := decompressor.unused_data or read(1):
+                raise ValueError(f"{len(rest)} or more bytes follow the compressed data")
+            return
+    raise EOFError("compressed data end early")
+
+
+def expand(
+    data: bytes | bytearray | memoryview, compression: str, limit: int, allowance: Allowance
+) -> tuple[bytearray, str]:
+    """What a stream of at most ``limit`` bytes holds, and "" or why it ends early (what came before is kept)."""
+    plain = bytearray()
+    try:
+        for piece in _pieces(io.BytesIO(data).read, compression):
+            if len(plain) + len(piece) > limit:
+                raise TooLargeError(f"they unpack to more than {limit} bytes")
+            allowance.spend(len(piece))
+            plain += piece
+    except TooLargeError:
+        raise
+    except Exception as error:  # whatever a codec raises on damaged bytes
+        return plain, str(error)
+    return plain, ""
 
 
 def expand_file(source: Path, target: Path) -> str:
     """Decompress a zstd file to ``target``; returns "" or why it stopped early (what came before is kept)."""
-    decompressor = zstd_decompressor()
+    allowance = Allowance(source.stat().st_size)
     with source.open("rb") as compressed, target.open("wb") as plain:
         try:
-            while data := compressed.read(1 << 20):
-                plain.write(decompressor.decompress(data))
-                if getattr(decompressor, "eof", False):
-                    if rest := decompressor.unused_data + compressed.read(1):
-                        return f"{len(rest)} or more bytes follow the compressed data"
-                    return ""
-        except Exception as error:
-            return f"compressed data are damaged: {error}"
-    return "compressed data end early"
+            for piece in _pieces(compressed.read, "zstd"):
+                allowance.spend(len(piece))
+                plain.write(piece)
+        except OSError:
+            raise
+        except Exception as error:  # whatever a codec raises on damaged bytes
+            return f"only a part of the compressed data can be used: {error}"
+    return ""

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lugre_steering.bag.reader import Bag, Block
+from lugre_steering.bag.reader import Bag, Block, shortened
 from lugre_steering.errors import BagError
 from lugre_steering.recording import (
     AIR_LIMIT_DEGC,
@@ -37,20 +37,28 @@ SET_BACK_RUN = 5  # messages in a row between others: no mere lateness
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 
+_Columns = tuple[IntArray, IntArray, Array, Array]  # stamp, log time, value, rate
+_NOTHING: _Columns = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
+
 
 def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
     """Read, check and sort all wanted channels; see ``Recording.rejected`` for what was left out and why."""
     with Bag(path) as bag:
         topics = bag.match(channels)
-        blocks = list(bag.blocks(channels))
+        # Only columns are kept: the serialised messages of a long recording would fill the memory.
+        pieces: list[list[_Columns]] = [[] for _ in channels]
+        for block in bag.blocks(channels):
+            for i, piece in enumerate(pieces):
+                piece.append(_of_channel(block, i))
         name, malformed = bag.name, bag.malformed
         findings = list(bag.findings)
-        found = ", ".join(sorted(bag.topics)) or "none"
+        found = shortened(sorted(bag.topics)) or "none"
     rejected: dict[str, Counter[str]] = {topic: Counter(malformed=count) for topic, count in malformed.items()}
     clean: dict[Channel, tuple[IntArray, Array, Array]] = {}
     for i, channel in enumerate(channels):
         if channel in topics:
-            stamp, log, value, rate = _of_channel(blocks, i)
+            stamp, log, value, rate = map(np.concatenate, zip(_NOTHING, *pieces[i], strict=True))
+            pieces[i].clear()
             use, reasons, reordered = _usable(channel, stamp, log, value)
             # Both joints may come in one message, which is lost once.
             rejected[topics[channel]] = rejected.get(topics[channel], Counter()) | Counter(reasons)
@@ -63,7 +71,10 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
         wanted = ", ".join(sorted({channel.topic for channel in channels}))
         counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
         left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
-        raise BagError(f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}")
+        damage = f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
+        raise BagError(
+            f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}"
+        )
     start_ns = min(int(stamp[0]) for stamp, _, _ in clean.values())
     signals: dict[Kind, dict[str, Signal]] = {kind: {} for kind in Kind}
     rates: dict[str, Signal] = {}
@@ -93,15 +104,24 @@ def read_recordings(
 
     A copy would count as new evidence, whatever its file is called.
     """
-    recordings: list[Recording] = []
-    for bag in bags:
+
+    def read(bag: Path) -> Recording:
         progress(f"reading {bag.name}")
-        read = read_recording(bag, channels)
-        for other, path in zip(recordings, bags, strict=False):
-            if _same(read, other):
-                raise BagError(f"{bag}: holds the same recording as {path}; a copy proves nothing, give each recording once")
-        recordings.append(replace(read, name=unused_name(read.name, [recording.name for recording in recordings])))
-    return recordings
+        return read_recording(bag, channels)
+
+    return distinct((str(bag), read(bag)) for bag in bags)
+
+
+def distinct(sources: Iterable[tuple[str, Recording]]) -> list[Recording]:
+    """Recordings, each with where it comes from, by names of their own; ``BagError`` for the same one twice."""
+    found: list[tuple[str, Recording]] = []
+    for source, recording in sources:
+        for path, other in found:
+            if _same(recording, other):
+                raise BagError(f"{source}: holds the same recording as {path}; a copy proves nothing, give each recording once")
+        name = unused_name(recording.name, [other.name for _, other in found])
+        found.append((source, replace(recording, name=name)))
+    return [recording for _, recording in found]
 
 
 def _same(first: Recording, second: Recording) -> bool:
@@ -120,16 +140,9 @@ def _signals(recording: Recording) -> dict[tuple[Kind, str], Signal]:
     return found if recording.measured_torque is None else {**found, (Kind.TORQUE, ""): recording.measured_torque}
 
 
-def _of_channel(blocks: Sequence[Block], i: int) -> tuple[IntArray, IntArray, Array, Array]:
-    """(stamp, log time, value, rate) of one channel."""
-    rows = [block.channel == i for block in blocks]
-    empty = np.empty(0, np.int64)
-    return (
-        np.concatenate([empty, *(b.stamp_ns[r] for b, r in zip(blocks, rows, strict=True))]),
-        np.concatenate([empty, *(b.log_ns[r] for b, r in zip(blocks, rows, strict=True))]),
-        np.concatenate([empty.astype(float), *(b.value[r] for b, r in zip(blocks, rows, strict=True))]),
-        np.concatenate([empty.astype(float), *(b.rate[r] for b, r in zip(blocks, rows, strict=True))]),
-    )
+def _of_channel(block: Block, i: int) -> _Columns:
+    rows = block.channel == i
+    return block.stamp_ns[rows], block.log_ns[rows], block.value[rows], block.rate[rows]
 
 
 def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> tuple[IntArray, Counter[str], int]:
@@ -155,12 +168,12 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
     if len(use):
         s = stamp[use]
         believed = confirmed(s)
-        reject("backward_stamp", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
+        reject("backward", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
     if len(use):
-        reject("backward_stamp", _doubled(stamp[use]))
+        reject("backward", _doubled(stamp[use]))
     reordered = int(_late(stamp[use]).sum()) if len(use) else 0
     use = use[np.argsort(stamp[use], kind="stable")]
-    reject("duplicate_stamp", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
+    reject("duplicate", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
     return use, reasons, reordered
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import heapq
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,12 +13,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lugre_steering.bag.compression import ZSTD_MAGIC, expand
+from lugre_steering.bag.compression import MESSAGE_LIMIT, ZSTD_MAGIC, Allowance, TooLargeError, expand
+from lugre_steering.errors import BagError
 from lugre_steering.recording import IntArray
 
 Bytes = NDArray[np.uint8]
 
 BLOCK_BYTES = 64 << 20
+_WAITING_BYTES = 256 << 20
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,8 @@ def join(parts: Sequence[Messages]) -> Messages:
     )
 
 
-def inflated(messages: Messages) -> tuple[Messages, int]:
-    """Expand messages that were compressed one by one; also returns how many of them were beyond reading.
+def inflated(messages: Messages, allowance: Allowance) -> Iterator[tuple[Messages, Counter[str]]]:
+    """Expand messages that were compressed one by one; also tells how many of them were beyond reading, by reason.
 
     Recognised by content, not by metadata: serialised messages start with 0x00, zstd frames with their magic number.
     """
@@ -104,19 +107,31 @@ def inflated(messages: Messages) -> tuple[Messages, int]:
     magic = windows(messages.data, messages.start[long], len(ZSTD_MAGIC)).view("<u4")[:, 0]
     compressed = set(long[magic == int.from_bytes(ZSTD_MAGIC, "little")].tolist())
     if not compressed:
-        return messages, 0
+        yield messages, Counter()
+        return
     kept: list[int] = []
     data: list[bytes] = []
+    lost: Counter[str] = Counter()
+    size = 0
     for i in range(len(messages)):
         raw = messages.bytes_of(i)
         if i in compressed:
             try:
-                raw = expand(raw, "zstd")
-            except Exception:
+                plain, damage = expand(raw, "zstd", MESSAGE_LIMIT, allowance)
+            except TooLargeError as error:
+                lost[str(error)] += 1
                 continue
+            if damage:
+                lost["they are damaged"] += 1
+                continue
+            raw = bytes(plain)
         kept.append(i)
         data.append(raw)
-    return from_rows(messages.connection[kept], messages.log_ns[kept], data), len(messages) - len(kept)
+        size += len(raw)
+        if size > BLOCK_BYTES:
+            yield from_rows(messages.connection[kept], messages.log_ns[kept], data), Counter()
+            kept, data, size = [], [], 0
+    yield from_rows(messages.connection[kept], messages.log_ns[kept], data), lost
 
 
 def merged(runs: Sequence[tuple[int, Iterable[Messages]]], per_block: int) -> Iterator[Messages]:
@@ -137,6 +152,11 @@ def merged(runs: Sequence[tuple[int, Iterable[Messages]]], per_block: int) -> It
             waiting.append(piece)
             count, size = count + len(piece), size + len(piece.data)
             heapq.heappush(ahead, (int(piece.log_ns[-1]), i, pieces))
+            if size > _WAITING_BYTES:  # whole chunks are held for the sake of few messages, or too much is
+                waiting = [part.packed() for part in waiting]
+                size = sum(len(part.data) for part in waiting)
+                if size > _WAITING_BYTES:
+                    raise BagError(f"more than {size >> 20} MB lie so far out of time order that they cannot be sorted")
         if not waiting or (ahead and count < enough and size < full):
             continue
         block = join(waiting)

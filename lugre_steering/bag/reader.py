@@ -13,16 +13,15 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import cdr, mcap, sqlite
-from lugre_steering.bag.compression import ZSTD_MAGIC, expand_file
+from lugre_steering.bag.compression import ZSTD_MAGIC, Allowance, expand_file
 from lugre_steering.bag.messages import Connection, Messages, inflated, merged, windows
+from lugre_steering.bag.metadata import read_metadata
 from lugre_steering.errors import BagError
 from lugre_steering.recording import NODE, TRUTH, Array, Channel, Finding, IntArray, Kind
 
@@ -33,8 +32,8 @@ MESSAGE_TYPE = {
     Kind.TORQUE: cdr.WRENCH_STAMPED,
 }
 _SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
-# The same safe loader in C where PyYAML has it.
-_YAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_TOPICS_LIMIT = 5_000  # no vehicle has as many; each costs time and memory with every block
+_LONGEST = 1 << 20  # bytes of a message of one of these types, with thousands of joints
 _PEEK = 500_000  # messages looked at to find which topic carries a joint
 
 
@@ -63,9 +62,12 @@ class Bag:
         self.name = bag_name(self.path)
         self.findings: list[Finding] = []
         self.connections: list[Connection] = []
+        self._numbers: dict[Connection, int] = {}
         self.malformed: Counter[str] = Counter()  # messages per topic that do not decode as their type
+        self._foreign: Counter[int] = Counter()  # messages per connection that speak of no wanted joint
         self.message_count: int | None = None  # as the metadata say; None where there are none
         self._files: list[mcap.McapFile | sqlite.SqliteFile] = []
+        self._size = 0  # bytes of all files
         self._stack = ExitStack()
         try:
             for file in self._locate():
@@ -100,34 +102,36 @@ class Bag:
 
     def _locate(self) -> list[Path]:
         """The storage files of the bag."""
-        if not self.path.exists():
+        if not os.path.exists(self.path):
             raise BagError(f"{self.path}: no such file or folder")
         if not self.path.is_dir():
+            if not self.path.is_file():
+                raise BagError(f"{self.path}: neither a file nor a folder (a pipe or device?)")
             return [self.path]
         found = sorted(f for f in self.path.iterdir() if f.is_file() and f.name.endswith(_SUFFIXES))
         listed: list[Path] = []
-        metadata = self.path / "metadata.yaml"
-        if metadata.is_file():
+        file = self.path / "metadata.yaml"
+        if os.path.isfile(file):
             try:
-                content: Any = yaml.load(metadata.read_bytes(), _YAML)["rosbag2_bagfile_information"]
-                listed = [self.path / Path(str(name)).name for name in content["relative_file_paths"]]
-                self.message_count = int(content["message_count"])
-            except (yaml.YAMLError, KeyError, TypeError, ValueError, OSError) as error:
-                summary = str(error).partition("\n")[0]
-                self._say(
-                    "damaged_metadata", f"metadata.yaml is not readable ({summary}); the files themselves were read"
-                )
+                metadata = read_metadata(file)
+                listed = list(dict.fromkeys(self.path / Path(name).name for name in metadata.files))
+                self.message_count = metadata.messages
+            except (ValueError, OSError) as error:
+                self._say("damaged_metadata", f"metadata.yaml is not readable ({error}); the files themselves were read")
         else:
             self._say("no_metadata", "the folder has no metadata.yaml (interrupted recording?); its files were read")
-        for missing in (f for f in listed if not f.exists()):
-            self._say("missing_file", f"{missing.name}, listed in metadata.yaml, is missing: its messages are lost")
-        files = [f for f in listed if f.exists()] or found
+        # Anything but a file (a named pipe, say) may never end, or never begin.
+        if missing := [f.name for f in listed if not os.path.isfile(f)]:
+            names = shortened(missing)
+            self._say("missing_file", f"{names}, listed in metadata.yaml, missing or no file: the messages are lost")
+        files = [f for f in listed if os.path.isfile(f)] or found
         if not files:
             raise BagError(f"{self.path}: holds no .mcap or .db3 file, so it is not a rosbag2 folder")
         return files
 
     def _open(self, path: Path) -> None:
         """Open one file by its content, not by its name."""
+        shown, reason = path, ""
         try:
             with path.open("rb") as file:
                 head = file.read(16)
@@ -135,43 +139,58 @@ class Bag:
                 folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="lugre_steering_")))
                 plain = folder / path.name.removesuffix(path.suffix)
                 if reason := expand_file(path, plain):
-                    self._say("truncated_bag", f"{path.name}: {reason}; what came before was read")
+                    reason = f"{reason}; "
+                    self._say("truncated_bag", f"{path.name}: {reason}what came before was read")
                 path = plain
                 with path.open("rb") as file:
                     head = file.read(16)
             if not head:
-                raise BagError(f"{path}: the file is empty")
+                raise BagError(f"{shown}: {reason}the file is empty")
             if head.startswith(mcap.MAGIC):
-                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self.connections, self.findings)
+                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self._number, self.findings, unpacked=path is not shown)
             elif head.startswith(sqlite.MAGIC):
-                opened = sqlite.SqliteFile(path, self.connections, self.findings)
+                opened = sqlite.SqliteFile(path, self._number, self.findings)
             else:
-                raise BagError(f"{path}: not a recording (neither MCAP nor sqlite3 by its first bytes)")
+                raise BagError(f"{shown}: {reason}not a recording (neither MCAP nor sqlite3 by its first bytes)")
             self._stack.callback(opened.close)
+            self._size += path.stat().st_size
             self._files.append(opened)
         except OSError as error:
-            raise BagError(f"{path}: cannot be read ({error.strerror or error})") from error
+            raise BagError(f"{shown}: cannot be read ({error.strerror or error})") from error
         except BagError as error:
             if not self.path.is_dir():
                 raise
             self._say("lost_file", f"{error}; its messages are lost")
+
+    def _number(self, connection: Connection) -> int:
+        """The index of a connection among all of the bag."""
+        if connection not in self._numbers:
+            if len(self.connections) == _TOPICS_LIMIT:
+                raise BagError(f"{self.path}: more than {_TOPICS_LIMIT} topics, expected the recording of a vehicle")
+            self._numbers[connection] = len(self.connections)
+            self.connections.append(connection)
+        return self._numbers[connection]
 
     # ------------------------------------------------------------- messages
 
     def messages(self, wanted: set[int] | None = None, messages_per_block: int = 50_000) -> Iterator[Messages]:
         """Serialised messages in log order; ``wanted`` limits them to some of ``connections``."""
         count = 0
+        left_out: Counter[str] = Counter()  # compressed messages, by reason
+        allowance = Allowance(self._size)
         try:
             runs = [run for file in self._files for run in file.runs(wanted)]
             for block in merged(runs, messages_per_block):
-                messages, lost = inflated(block)
-                count += len(block)
-                if lost:
-                    self._say("damaged_bag", f"{lost} compressed messages are damaged and left out")
-                yield messages
-        except (OSError, sqlite3.Error) as error:
+                for messages, lost in inflated(block, allowance):
+                    count += len(messages)
+                    left_out.update(lost)
+                    yield messages
+        except (OSError, sqlite3.Error, BagError) as error:
             raise BagError(f"{self.path}: reading stopped ({error})") from error
-        if wanted is None and self.message_count is not None and count != self.message_count:
+        for reason, number in left_out.items():
+            self._say("damaged_bag", f"{number} compressed messages are left out: {reason}")
+        everything = wanted is None or len(wanted) == len(self.connections)
+        if everything and self.message_count is not None and count != self.message_count:
             self._say("message_count", f"metadata.yaml promises {self.message_count} messages, {count} could be read")
 
     def blocks(
@@ -186,6 +205,7 @@ class Bag:
                     readers.setdefault(k, []).append(i)
         seen: Counter[int] = Counter()
         self.malformed.clear()
+        self._foreign.clear()
         for messages in self.messages(None if all_messages else set(readers), messages_per_block):
             block = self._decode(messages, channels, readers)
             seen.update(dict(enumerate(np.bincount(block.channel, minlength=len(channels)).tolist())))
@@ -195,6 +215,10 @@ class Bag:
         for i, channel in enumerate(channels):
             if channel in topics and not seen[i] and channel.joint:
                 self._say("no_data", f"no message speaks of joint {channel.joint!r}", topics[channel])
+        for k, count in self._foreign.items():
+            if count and len(readers[k]) == 1 and seen[readers[k][0]]:  # a topic that several share has others by right
+                statement = f"{count} messages speak of other joints only, not of {channels[readers[k][0]].joint!r}"
+                self._say("foreign_joint", statement, self.connections[k].topic)
 
     def _decode(self, messages: Messages, channels: Sequence[Channel], readers: Mapping[int, Sequence[int]]) -> Block:
         rows: list[tuple[IntArray, NDArray[np.int32], IntArray, Array, Array]] = []
@@ -205,9 +229,13 @@ class Bag:
             length = messages.length[of_topic]
             for size in np.unique(length):
                 alike = of_topic[length == size]
+                if size > _LONGEST:
+                    self.malformed[self.connections[k].topic] += alike.size
+                    continue
                 decoded = cdr.decode(windows(messages.data, messages.start[alike], int(size)), msgtype, joints)
                 if bad := int((~decoded.valid).sum()):
                     self.malformed[self.connections[k].topic] += bad
+                self._foreign[k] += int((decoded.valid & ~decoded.carried.any(axis=0)).sum())
                 for j, i in enumerate(wanted):
                     use = decoded.valid & decoded.carried[j]
                     value, rate = decoded.value[j, use], decoded.rate[j, use]
@@ -328,6 +356,12 @@ def bag_name(path: Path) -> str:
         return absolute.name
     endings = [ending for ending in _SUFFIXES if absolute.name.endswith(ending)]
     return absolute.name.removesuffix(endings[0]) if endings else absolute.stem
+
+
+def shortened(names: Sequence[str], most: int = 20) -> str:
+    """Names for a message that a person is to read, however many there are."""
+    rest = f" and {len(names) - most} others" if len(names) > most else ""
+    return ", ".join(names[:most]) + rest
 
 
 def _full_name(msgtype: str) -> str:

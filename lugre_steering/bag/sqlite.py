@@ -4,24 +4,34 @@
 
 The standard library does the reading; rosbags counts every message of every topic before it starts and gives up on
 damaged files.
+
+A file is not trusted: only its two tables are read, as tables and not as views or computed columns, in no more steps
+than its bytes could need; and whatever SQLite would have to write happens in a private copy.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
+import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from lugre_steering.bag.compression import MESSAGE_LIMIT
 from lugre_steering.bag.messages import Connection, Messages, from_rows
 from lugre_steering.bag.sqlite_pages import leaf_rows
 from lugre_steering.errors import BagError
 from lugre_steering.recording import Finding
 
 MAGIC = b"SQLite format 3\0"
+_JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"  # begins a journal, and ends one that names another file
+_STEPS, _STEPS_PER_BYTE = 10_000_000, 4  # of SQLite's machine for one query; a message takes some 15 and 60 bytes
+_STEPS_APART = 100_000
+_TEXT_LIMIT = 64 << 20  # bytes of all names, types and definitions
 _PIECE_BYTES = 8 << 20
 _PIECE_ROWS = 1_000  # twice as fast as 20 000: rows die before the garbage collector looks at them
 
@@ -29,10 +39,11 @@ Row = tuple[Any, ...]
 
 
 class SqliteFile:
-    """One .db3 file. Topics of all files of a bag share the list ``connections``."""
+    """One .db3 file; ``number`` gives the index of a topic among those of all files of the bag."""
 
-    def __init__(self, path: Path, connections: list[Connection], findings: list[Finding]) -> None:
-        self.path, self.connections, self.findings = path, connections, findings
+    def __init__(self, path: Path, number: Callable[[Connection], int], findings: list[Finding]) -> None:
+        self.path, self._number, self.findings = path, number, findings
+        self._salvaged = False
         self._stack = ExitStack()
         try:
             self._open()
@@ -53,13 +64,10 @@ class SqliteFile:
             raise BagError(f"{self.path}: not an sqlite3 file (it does not begin with the SQLite magic bytes)")
         page = int.from_bytes(header[16:18], "big")
         page = 65536 if page == 1 else page
-        size, expected = self.path.stat().st_size, int.from_bytes(header[28:32], "big") * page
-        log = self.path.with_name(self.path.name + "-wal")
-        self._opened = self.path
-        if log.exists() and log.stat().st_size:  # an interrupted recording: its last messages are in the log
-            self._opened = self._temporary() / self.path.name
-            shutil.copyfile(self.path, self._opened)
-            shutil.copyfile(log, self._opened.with_name(log.name))
+        expected = int.from_bytes(header[28:32], "big") * page
+        self._opened = self._recovered() or self.path
+        size = self._opened.stat().st_size
+        self._most_steps = _STEPS + _STEPS_PER_BYTE * size
         self._db = self._connect(self._opened, "mode=ro&immutable=1" if self._opened == self.path else "mode=rw")
         # Lets SQLite open a file that is shorter than its header says; nothing is ever written to it.
         self._db.execute("PRAGMA writable_schema=ON")
@@ -67,46 +75,108 @@ class SqliteFile:
         if page and size < expected and self._opened == self.path:
             self._salvage(f"cut off after {size} of {expected} bytes", "truncated_bag")
 
+    def _recovered(self) -> Path | None:
+        """A private copy with what an interrupted recording left beside the file; None where there is nothing."""
+        beside = [self.path.with_name(self.path.name + ending) for ending in ("-wal", "-journal")]
+        beside = [file for file in beside if os.path.isfile(file) and file.stat().st_size and _is_log(file)]
+        if not beside:
+            return None
+        copy = self._temporary() / self.path.name
+        for file in (self.path, *beside):
+            shutil.copyfile(file, copy.with_name(file.name))
+        journal = copy.with_name(f"{copy.name}-journal")
+        if journal.exists():
+            with journal.open("r+b") as stream:  # SQLite would follow the name at its end, and delete that file
+                stream.seek(-min(len(_JOURNAL_MAGIC), journal.stat().st_size), os.SEEK_END)
+                stream.write(bytes(len(_JOURNAL_MAGIC)))
+        most = sum(file.stat().st_size for file in (self.path, *beside))
+        names = " and ".join(file.name for file in beside)
+        try:
+            db = sqlite3.connect(copy)
+            db.execute("SELECT COUNT(*) FROM sqlite_master").fetchall()
+            db.close()
+            if copy.stat().st_size > most:
+                raise sqlite3.DatabaseError("it makes the file larger than both together")
+        except sqlite3.Error as error:
+            statement = f"{names} beside {self.path.name} cannot be used ({_text(error)}); read without"
+            self.findings.append(Finding("damaged_bag", "", statement))
+            return None
+        statement = f"{self.path.name}: an interrupted recording, completed from {names} in a private copy"
+        self.findings.append(Finding("interrupted_recording", "", statement))
+        return copy
+
     def _connect(self, path: Path, how: str) -> sqlite3.Connection:
         db = sqlite3.connect(f"{path.resolve().as_uri()}?{how}", uri=True)
-        db.text_factory = bytes  # damaged text must not raise
         self._stack.callback(db.close)
+        db.text_factory = bytes  # damaged text must not raise
+        db.executescript("PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON; PRAGMA query_only=ON;")
+        if sys.version_info >= (3, 11):
+            db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _TEXT_LIMIT + MESSAGE_LIMIT)
+        db.set_authorizer(_authorise)
+        db.set_progress_handler(self._count_steps, _STEPS_APART)
         return db
+
+    def _count_steps(self) -> bool:
+        """Stops a query that takes more steps than a file of this size can need."""
+        self._steps += _STEPS_APART
+        return self._steps > self._most_steps
+
+    def _execute(self, query: str, values: Sequence[object] = ()) -> sqlite3.Cursor:
+        self._steps = 0
+        return self._db.execute(query, values)
 
     def _temporary(self) -> Path:
         return Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="lugre_steering_")))
 
+    def _columns_of(self, table: str) -> set[str]:
+        """Stored columns: views have other names here, computed columns none."""
+        return {_text(row[1]) for row in self._execute(f"PRAGMA table_info({table})")}
+
     def _read_topics(self) -> dict[int, int]:
         """Topic number of the file -> index of the connection."""
-        columns = {_text(row[1]) for row in self._db.execute("PRAGMA table_info(topics)")}
-        if not columns or not self._db.execute("PRAGMA table_info(messages)").fetchall():
-            raise BagError(f"{self.path}: an sqlite3 file but not a rosbag2 recording (no tables topics and messages)")
+        columns = self._columns_of("topics")
+        missing = {"id", "name", "type", "serialization_format"} - columns
+        missing |= {"id", "topic_id", "timestamp", "data"} - self._columns_of("messages")
+        if missing:
+            raise BagError(
+                f"{self.path}: an sqlite3 file but not a rosbag2 recording "
+                f"(no tables topics and messages with {', '.join(sorted(missing))})"
+            )
         definitions: dict[str, tuple[str, str]] = {}
-        if self._db.execute("PRAGMA table_info(message_definitions)").fetchall():
+        if {"topic_type", "encoding", "encoded_message_definition"} <= self._columns_of("message_definitions"):
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-            definitions = {_text(row[0]): (_text(row[1]), _text(row[2])) for row in self._db.execute(query)}
+            definitions = {row[0]: (row[1], row[2]) for row in self._texts(query, 0)}
         qos = "offered_qos_profiles" if "offered_qos_profiles" in columns else "''"
         index: dict[int, int] = {}
-        for row in self._db.execute(f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"):
-            topic, msgtype, encoding, profiles = map(_text, row[1:])
+        for number, topic, msgtype, encoding, profiles in self._texts(
+            f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id", 1
+        ):
             definition_format, definition = definitions.get(msgtype, ("", ""))
-            connection = Connection(topic, msgtype, encoding, profiles, definition, definition_format)
-            if connection not in self.connections:
-                self.connections.append(connection)
-            index[row[0]] = self.connections.index(connection)
+            index[number] = self._number(Connection(topic, msgtype, encoding, profiles, definition, definition_format))
         return index
+
+    def _texts(self, query: str, first: int) -> Iterator[Row]:
+        """Rows whose columns from ``first`` on are text."""
+        size = 0
+        for row in self._execute(query):
+            texts = [_text(column) for column in row[first:]]
+            size += sum(map(len, texts))
+            if size > _TEXT_LIMIT:
+                raise BagError(f"{self.path}: more than {_TEXT_LIMIT >> 20} MB describe its topics")
+            yield (*row[:first], *texts)
 
     def runs(self, wanted: set[int] | None) -> list[tuple[int, Iterator[Messages]]]:
         """(first log time, its messages in log order); ``wanted`` limits them to some connections."""
         topics = [number for number, index in self._index.items() if wanted is None or index in wanted]
         try:
-            (begin,) = self._db.execute("SELECT MIN(timestamp) FROM messages").fetchone()
+            (begin,) = self._execute("SELECT MIN(timestamp) FROM messages").fetchone()
         except sqlite3.DatabaseError:
             begin = 0  # unknown: reading will tell
         return [(begin if isinstance(begin, int) else 0, self._pieces(topics))]
 
     def _pieces(self, topics: Sequence[int]) -> Iterator[Messages]:
         after: tuple[int, int] | None = None
+        self._left_out = 0
         while True:
             try:
                 cursor = self._select(topics, after)
@@ -117,44 +187,48 @@ class SqliteFile:
                     after = (rows[-1][2], rows[-1][0])
                     if len(messages):
                         yield messages
-                return
-            except sqlite3.DatabaseError as error:  # noqa: PERF203
+                break
+            except sqlite3.DatabaseError as error:
+                if self._salvaged:
+                    raise
                 self._salvage(f"damaged: {_text(error)}", "damaged_bag")
 
+        if self._left_out:
+            statement = f"{self._left_out} rows are no messages (topic, log time or content) and are left out"
+            finding = Finding("damaged_bag", "", f"{self.path.name}: {statement}")
+            if finding not in self.findings:  # a bag may be read more than once
+                self.findings.append(finding)
+
     def _select(self, topics: Sequence[int], after: tuple[int, int] | None) -> sqlite3.Cursor:
-        """Rows in log order, ``after`` some (timestamp, id)."""
-        conditions, values = [], list(topics)
+        """Rows in log order, ``after`` some (timestamp, id); without the content of those that no message is as large as."""
+        conditions: list[str] = []
         if len(topics) < len(self._index):
-            conditions.append(f"topic_id IN ({','.join('?' * len(topics))})")
-        else:
-            values.clear()
+            conditions.append(f"topic_id IN ({','.join(map(str, topics))})")
         if after is not None:
             conditions.append("(timestamp, id) > (?, ?)")
-            values += after
         where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
-        query = f"SELECT id, topic_id, timestamp, data FROM messages {where} ORDER BY timestamp, id"
-        return self._db.execute(query, values)
+        data = f"CASE WHEN typeof(data) = 'blob' AND length(data) <= {MESSAGE_LIMIT} THEN data END"
+        query = f"SELECT id, topic_id, timestamp, {data} FROM messages {where} ORDER BY timestamp, id"
+        return self._execute(query, after or ())
 
     def _columns(self, rows: list[Row]) -> Messages:
         _, topic, log_ns, data = zip(*rows, strict=True)
         try:
-            return from_rows([self._index[number] for number in topic], log_ns, data)
+            if log_ns[0] >= 0:  # the first is the earliest
+                return from_rows([self._index[number] for number in topic], log_ns, data)
         except (KeyError, TypeError, ValueError, OverflowError):
-            sound = [row for row in rows if self._is_message(row)]
-            self.findings.append(
-                Finding(
-                    "damaged_bag",
-                    "",
-                    f"{self.path.name}: {len(rows) - len(sound)} rows are no messages and are left out",
-                )
-            )
-            return from_rows([self._index[r[1]] for r in sound], [r[2] for r in sound], [r[3] for r in sound])
+            pass
+        sound = [row for row in rows if self._is_message(row)]
+        self._left_out += len(rows) - len(sound)
+        return from_rows([self._index[r[1]] for r in sound], [r[2] for r in sound], [r[3] for r in sound])
 
     def _is_message(self, row: Row) -> bool:
-        return row[1] in self._index and isinstance(row[2], int) and isinstance(row[3], bytes)
+        _, topic, log_ns, data = row
+        return topic in self._index and isinstance(log_ns, int) and log_ns >= 0 and isinstance(data, bytes)
 
     def _salvage(self, why: str, finding: str) -> None:
         """Copy every row that can be reached to a new database and read on from that one."""
+        self._salvaged = True
         copy = sqlite3.connect(self._temporary() / "salvaged.db3", isolation_level=None)
         self._stack.callback(copy.close)
         copy.executescript(
@@ -166,6 +240,7 @@ class SqliteFile:
         copy.execute("CREATE INDEX timestamp_idx ON messages(timestamp)")
         count, first, last = copy.execute("SELECT COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages").fetchone()
         upto = f" up to t={(last - first) / 1e9:.3f} s" if count else ""
+        copy.set_progress_handler(self._count_steps, _STEPS_APART)
         self._db = copy
         self.findings.append(Finding(finding, "", f"{self.path.name}: {why}; kept {count} messages{upto}"))
 
@@ -174,6 +249,23 @@ class SqliteFile:
             row = (number, *columns[1:])
             if len(row) == 4 and self._is_message(row):
                 yield row
+
+
+def _is_log(file: Path) -> bool:
+    """Whether this holds something to add or to roll back; a journal that was done with begins with zeros."""
+    with file.open("rb") as stream:
+        head = stream.read(len(_JOURNAL_MAGIC))
+    return file.name.endswith("-wal") or head == _JOURNAL_MAGIC
+
+
+_ALLOWED = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_PRAGMA}
+_FUNCTIONS = {"min", "length", "typeof"}
+
+
+def _authorise(action: int, _: str | None, name: str | None, __: str | None, view: str | None) -> int:
+    """Nothing but reading tables: what a view or a computed column would do is up to whoever made the file."""
+    allowed = action in _ALLOWED or (action == sqlite3.SQLITE_FUNCTION and name in _FUNCTIONS)
+    return sqlite3.SQLITE_OK if allowed and view is None else sqlite3.SQLITE_DENY
 
 
 def _text(value: object) -> str:

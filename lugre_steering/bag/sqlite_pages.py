@@ -12,7 +12,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from lugre_steering.bag.compression import MESSAGE_LIMIT
+
 _TABLE_LEAF = 0x0D
+_LONGEST = MESSAGE_LIMIT + 100  # bytes of a row
 _INTEGER_BYTES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}
 
 Value = int | bytes | None
@@ -20,6 +23,7 @@ Value = int | bytes | None
 
 def leaf_rows(path: Path) -> Iterator[tuple[int, list[Value]]]:
     """(row number, columns) of every row of every table that can be read; a float or a damaged column ends it."""
+    used = bytearray(path.stat().st_size // 512 // 8 + 1)  # overflow pages, a bit each: none belongs to two rows
     with path.open("rb") as file:
         header = file.read(100)
         size = int.from_bytes(header[16:18], "big")
@@ -34,19 +38,21 @@ def leaf_rows(path: Path) -> Iterator[tuple[int, list[Value]]]:
             if len(page) < size:
                 return
             if page[0] == _TABLE_LEAF:
-                yield from _rows_of_page(page, file, size, usable)
+                yield from _rows_of_page(page, file, size, usable, used)
             number += 1
 
 
-def _rows_of_page(page: bytes, file: BinaryIO, size: int, usable: int) -> Iterator[tuple[int, list[Value]]]:
+def _rows_of_page(
+    page: bytes, file: BinaryIO, size: int, usable: int, used: bytearray
+) -> Iterator[tuple[int, list[Value]]]:
     cells = int.from_bytes(page[3:5], "big")
     for i in range(min(cells, (usable - 8) // 2)):
         at = int.from_bytes(page[8 + 2 * i : 10 + 2 * i], "big")
         length, at = _varint(page, at)
         row, at = _varint(page, at)
-        payload = _payload(page, at, length, file, size, usable)
+        payload = _payload(page, at, length, file, size, usable, used)
         if payload is not None:
-            yield row, _columns(payload)
+            yield row - (row >> 63 << 64), _columns(payload)  # row numbers may be negative
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
@@ -61,8 +67,12 @@ def _varint(data: bytes, at: int) -> tuple[int, int]:
     return value << 8 | byte, at + 9
 
 
-def _payload(page: bytes, at: int, length: int, file: BinaryIO, size: int, usable: int) -> bytes | None:
+def _payload(
+    page: bytes, at: int, length: int, file: BinaryIO, size: int, usable: int, used: bytearray
+) -> bytes | None:
     """The whole content of a row, following its overflow pages; None where a part of it is missing."""
+    if length > _LONGEST:
+        return None
     if length <= usable - 35:
         return page[at : at + length] if at + length <= usable else None
     least = (usable - 12) * 32 // 255 - 23
@@ -75,8 +85,10 @@ def _payload(page: bytes, at: int, length: int, file: BinaryIO, size: int, usabl
     while missing > 0:
         file.seek((following - 1) * size if following else 0)
         overflow = file.read(size)
-        if not following or len(overflow) < size:
+        byte, bit = divmod(following, 8)
+        if not following or len(overflow) < size or used[byte] >> bit & 1:
             return None
+        used[byte] |= 1 << bit
         following = int.from_bytes(overflow[:4], "big")
         parts.append(overflow[4 : 4 + min(missing, usable - 4)])
         missing -= usable - 4

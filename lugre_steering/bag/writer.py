@@ -28,13 +28,14 @@ from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 from rosbags.typesys import Stores, TypesysError, get_typestore
 from rosbags.typesys.store import Typestore
 
-from lugre_steering.bag import mcap
+from lugre_steering.bag import mcap, mcap_records
 from lugre_steering.bag.messages import Bytes, Connection, Messages, windows
 from lugre_steering.errors import BagError
 from lugre_steering.recording import IntArray
 
 VERSION = 9  # of metadata.yaml, ROS 2 Jazzy
 _CHUNK_BYTES = 1 << 20
+_TOPICS_LIMIT = (1 << 16) - 1  # MCAP numbers them from 1 with 16 bits
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class BagWriter:
     ) -> None:
         self.folder = Path(folder)
         self._custom_data = dict(custom_data or {})
-        self.connections: list[Connection] = []
+        self._numbers: dict[Connection, int] = {}
         self._counts: list[int] = []
         self._first_ns, self._last_ns = 2**63 - 1, 0
         self._kind = storage
@@ -142,12 +143,13 @@ class BagWriter:
     def add_connection(self, connection: Connection) -> int:
         """Announce a topic as another bag had it, to copy its messages; returns its number."""
         connection = replace(connection, qos=_clear(connection.qos))
-        if connection in self.connections:
-            return self.connections.index(connection)
-        self.connections.append(connection)
-        self._counts.append(0)
-        self._storage.add_topic(len(self.connections), connection, _type_hash(connection.msgtype))
-        return len(self.connections) - 1
+        if connection not in self._numbers:
+            if len(self._numbers) == _TOPICS_LIMIT:
+                raise BagError(f"{self.folder}: more than {_TOPICS_LIMIT} topics, which no recording can hold")
+            self._numbers[connection] = len(self._numbers)
+            self._counts.append(0)
+            self._storage.add_topic(len(self._numbers), connection, _type_hash(connection.msgtype))
+        return self._numbers[connection]
 
     def write(self, parts: Sequence[Part]) -> None:
         """Write the messages of one stretch of time, sorted by log time (ties keep the order of the parts)."""
@@ -155,11 +157,13 @@ class BagWriter:
         if not parts:
             return
         messages = _Ordered(parts, self._storage.head)
+        if messages.log_ns[0] < 0:
+            raise BagError(f"{self._file}: log time {messages.log_ns[0]} ns, expected 0 or more (no format holds another)")
         try:
             self._storage.write(messages)
         except (OSError, sqlite3.Error) as error:
             raise BagError(f"{self._file}: writing failed ({error})") from error
-        for number, count in enumerate(np.bincount(messages.topic, minlength=len(self.connections))):
+        for number, count in enumerate(np.bincount(messages.topic, minlength=len(self._numbers))):
             self._counts[number] += int(count)
         self._first_ns = min(self._first_ns, int(messages.log_ns[0]))
         self._last_ns = max(self._last_ns, int(messages.log_ns[-1]))
@@ -196,7 +200,7 @@ class BagWriter:
                 },
                 "message_count": n,
             }
-            for c, n in zip(self.connections, self._counts, strict=True)
+            for c, n in zip(self._numbers, self._counts, strict=True)
         ]
         content = {
             "version": VERSION,
@@ -289,7 +293,7 @@ class _SqliteStorage:
 
 
 def _record(op: int, *content: bytes) -> bytes:
-    return mcap.RECORD.pack(op, sum(map(len, content))) + b"".join(content)
+    return mcap_records.RECORD.pack(op, sum(map(len, content))) + b"".join(content)
 
 
 def _text(text: str) -> bytes:
@@ -304,12 +308,12 @@ class _McapStorage:
 
     def __init__(self, path: Path) -> None:
         self._file: BinaryIO = path.open("xb")
-        self._schemas: dict[str, bytes] = {}
+        self._schemas: dict[str, tuple[int, bytes]] = {}
         self._channels: dict[int, bytes] = {}
         self._counts: dict[int, int] = {}
         self._chunks: list[bytes] = []
         self._span = (2**64 - 1, 0)
-        self._file.write(mcap.MAGIC + _record(mcap.HEADER, _text("ros2"), _text("lugre_steering")))
+        self._file.write(mcap.MAGIC + _record(mcap_records.HEADER, _text("ros2"), _text("lugre_steering")))
 
     def add_topic(self, number: int, connection: Connection, type_hash: str) -> None:
         c = connection
@@ -320,19 +324,19 @@ class _McapStorage:
                 + _text(c.definition_format)
                 + _text(c.definition)
             )
-            self._schemas[c.msgtype] = _record(mcap.SCHEMA, content)
-            self._file.write(self._schemas[c.msgtype])
-        schema = list(self._schemas).index(c.msgtype) + 1
+            self._schemas[c.msgtype] = len(self._schemas) + 1, _record(mcap_records.SCHEMA, content)
+            self._file.write(self._schemas[c.msgtype][1])
+        schema, _ = self._schemas[c.msgtype]
         metadata = b"".join(map(_text, ("offered_qos_profiles", c.qos, "topic_type_hash", type_hash)))
         content = struct.pack("<HH", number, schema) + _text(c.topic) + _text(c.encoding)
-        self._channels[number] = _record(mcap.CHANNEL, content, struct.pack("<I", len(metadata)), metadata)
+        self._channels[number] = _record(mcap_records.CHANNEL, content, struct.pack("<I", len(metadata)), metadata)
         self._counts[number] = 0
         self._file.write(self._channels[number])
 
     def write(self, messages: _Ordered) -> None:
         heads = np.zeros(len(messages.log_ns), mcap.MESSAGE_HEAD)
-        heads["op"] = mcap.MESSAGE
-        heads["size"] = messages.size - mcap.RECORD.size
+        heads["op"] = mcap_records.MESSAGE
+        heads["size"] = messages.size - mcap_records.RECORD.size
         heads["channel"] = messages.topic + 1
         heads["log"] = heads["publish"] = messages.log_ns
         begin = messages.end - messages.size
@@ -352,24 +356,24 @@ class _McapStorage:
         raw = data.tobytes()
         position = self._file.tell()
         head = struct.pack("<QQQI", first, last, len(raw), zlib.crc32(raw)) + _text("") + struct.pack("<Q", len(raw))
-        length = self._file.write(_record(mcap.CHUNK, head, raw))
+        length = self._file.write(_record(mcap_records.CHUNK, head, raw))
         index, places = [], []
         at = position + length
         for number in np.unique(channel).tolist():
             of_channel = channel == number
             entries = np.column_stack([log_ns[of_channel], offset[of_channel]]).astype("<i8").tobytes()
-            index.append(_record(mcap.MESSAGE_INDEX, struct.pack("<HI", number, len(entries)), entries))
+            index.append(_record(mcap_records.MESSAGE_INDEX, struct.pack("<HI", number, len(entries)), entries))
             places.append(struct.pack("<HQ", number, at))
             at += len(index[-1])
             self._counts[number] += int(of_channel.sum())
         self._file.write(b"".join(index))
         content = struct.pack("<QQQQI", first, last, position, length, 10 * len(places)) + b"".join(places)
         content += struct.pack("<Q", at - position - length) + _text("") + struct.pack("<QQ", len(raw), len(raw))
-        self._chunks.append(_record(mcap.CHUNK_INDEX, content))
+        self._chunks.append(_record(mcap_records.CHUNK_INDEX, content))
         self._span = (min(self._span[0], first), max(self._span[1], last))
 
     def close(self) -> None:
-        self._file.write(_record(mcap.DATA_END, struct.pack("<I", 0)))
+        self._file.write(_record(mcap_records.DATA_END, struct.pack("<I", 0)))
         total = sum(self._counts.values())
         counts = b"".join(struct.pack("<HQ", *item) for item in self._counts.items())
         statistics = struct.pack(
@@ -384,19 +388,19 @@ class _McapStorage:
             len(counts),
         )
         groups = {
-            mcap.SCHEMA: list(self._schemas.values()),
-            mcap.CHANNEL: list(self._channels.values()),
-            mcap.CHUNK_INDEX: self._chunks,
-            mcap.STATISTICS: [_record(mcap.STATISTICS, statistics, counts)],
+            mcap_records.SCHEMA: [record for _, record in self._schemas.values()],
+            mcap_records.CHANNEL: list(self._channels.values()),
+            mcap_records.CHUNK_INDEX: self._chunks,
+            mcap_records.STATISTICS: [_record(mcap_records.STATISTICS, statistics, counts)],
         }
         begin = at = self._file.tell()
         summary, offsets = b"", b""
         for op, records in groups.items():
             if group := b"".join(records):
                 summary += group
-                offsets += _record(mcap.SUMMARY_OFFSET, struct.pack("<BQQ", op, at, len(group)))
+                offsets += _record(mcap_records.SUMMARY_OFFSET, struct.pack("<BQQ", op, at, len(group)))
                 at += len(group)
-        footer = mcap.RECORD.pack(mcap.FOOTER, 20) + struct.pack("<QQ", begin, at)
+        footer = mcap_records.RECORD.pack(mcap_records.FOOTER, 20) + struct.pack("<QQ", begin, at)
         crc = zlib.crc32(summary + offsets + footer)
         self._file.write(summary + offsets + footer + struct.pack("<I", crc) + mcap.MAGIC)
         self._file.close()

@@ -163,7 +163,8 @@ def measure() -> list[dict[str, object]]:
     stopped = vehicle.replace(effects=(limit_device(),))
     one, lean = build_model(stopped).parameters[0], build_model(stopped, lean=True).parameters[0]
     neutral, every = p.copy(), p.copy()
-    neutral["soil_shear_span"] = 0.1  # a shape: without its amplitude it does nothing, but the stages are passed
+    shape = next(f"{effect.id}_{p.name}" for effect in CATALOGUE.values() for p in effect.parameters if p.is_shape)
+    neutral[shape] = 1.0  # without its amplitude it does nothing, but the stages are passed
     for field, value in every_effect().items():
         every[field] = value
     loop = CLoop.build()

@@ -61,7 +61,9 @@ def serve(vehicle_file: str, executor: str, size: int, results: Connection) -> N
     arguments = ["-p", f"vehicle_file:={vehicle_file}", "-p", f"executor:={executor}", "-p", "pair_tolerance_s:=1.0"]
     rclpy.init(args=["--ros-args", "--log-level", "warn", *arguments], signal_handler_options=SignalHandlerOptions.NO)
     node = SteeringTorqueEstimator(latency_window=size)
-    health = node.health
+    node.start()
+    assert node.session is not None
+    health = node.session.health
     cpu_s = _run(node, executor, results)
     results.send(
         {

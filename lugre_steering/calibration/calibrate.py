@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``lugre-steering calibrate`` without the command line: recordings in, calibrated vehicle and its uncertainty out.
+"""Calibration without the command line: recordings in, calibrated vehicle and its uncertainty out.
 
 ``calibration.json`` (schema lugre_steering/calibration/1; every number finite, ``null`` where there is none):
 
@@ -26,32 +26,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from lugre_steering import __version__, units
-from lugre_steering.bag import read_recordings
+from lugre_steering import units
+from lugre_steering.calibration import result
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.errors import DataError
-from lugre_steering.files import earlier_result, output_folder, write_record
-from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.apply import apply_calibration, seen_range
+from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
+from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
+from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Array, Recording
-from lugre_steering.report.available import no_pictures
-from lugre_steering.vehicle import Vehicle, load, save
+from lugre_steering.vehicle import Vehicle
+from lugre_steering.version import __version__
 
-SCHEMA = "lugre_steering/calibration/1"
-FILES = ("calibrated.yaml", "calibration.png")
-"""What is written beside the record."""
 SHORTEST_S = 10.0
 SLIDING = 3.0
 """Turns must reach this many presliding lengths, or friction never slides."""
@@ -112,54 +110,21 @@ ADVICE = {
 
 @dataclass(frozen=True)
 class Calibrated:
-    """Everything a report needs: the fit, the new vehicle, and ``result`` as written to calibration.json."""
+    """Everything a report needs: the fit, and what it came to."""
 
     problem: Problem
     estimate: Estimate
-    vehicle: Vehicle
-    result: dict[str, Any]
+    calibration: result.Calibration
 
+    @property
+    def vehicle(self) -> Vehicle:
+        """The calibrated one."""
+        return self.calibration.calibrated
 
-def calibrate(
-    bags: Sequence[Path],
-    vehicle_file: Path,
-    out: Path,
-    *,
-    free: Sequence[str] = (),
-    fix: Sequence[str] = (),
-    prior: Mapping[str, float] | None = None,
-    priors: bool = True,
-    progress: Progress = lambda _: None,
-) -> dict[str, Any]:
-    """Fit the vehicle file to the bags; write calibrated.yaml, calibration.json and calibration.png into ``out``.
-
-    Returns the content of calibration.json. ``free`` adds ``kingpin_arm`` or ``pressure_gain`` to the fitted values,
-    ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
-    """
-    vehicle = load(vehicle_file)
-    calibrations = chosen(vehicle, free, fix, prior or {})
-    with output_folder(out):
-        earlier_result(out, "calibration.json", SCHEMA, FILES, vehicle_file)
-        recordings = read_recordings(bags, vehicle.channels, progress)
-        done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
-        result = {
-            "schema": SCHEMA,
-            "tool_version": __version__,
-            "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-            "bags": [str(bag) for bag in bags],
-            "vehicle": str(vehicle_file),
-            **done.result,
-        }
-        progress("writing")
-        try:
-            for name in FILES:  # of an earlier run: they would not belong to this record
-                (out / name).unlink(missing_ok=True)
-            save(with_provenance(done.vehicle, result), out / "calibrated.yaml")
-            result["picture"], result["picture_note"] = _picture(done, out / "calibration.png")
-            write_record(result, out / "calibration.json")
-        except OSError as error:
-            raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
-    return result
+    @property
+    def result(self) -> dict[str, Any]:
+        """As in calibration.json."""
+        return self.calibration.json
 
 
 def chosen(
@@ -215,37 +180,50 @@ def calibrate_recordings(
         for finding in quality.blocking:
             raise DataError(f"{quality.recording.name}: the data must be put right first: {finding.statement}")
     progress("preparing")
-    runs = [prepare(quality.recording, vehicle) for quality in qualities]
-    problem = Problem(vehicle, runs, chosen(vehicle) if calibrations is None else calibrations)
+    pieces, cut = in_pieces([quality.recording for quality in qualities])
+    problem, apart = synchronised(pieces, vehicle, chosen(vehicle) if calibrations is None else calibrations)
     check_motion(problem)
+    progress("comparing with the vehicle file")
+    wrong = wrong_sheet(problem)
     progress("fitting")
-    result = estimate(problem, priors=priors)
+    fitted = estimate(problem, priors=priors)
     progress("judging on held-out stretches")
-    held = heldout_rmse(problem, result, priors)
+    held = heldout_rmse(problem, fitted, priors)
     progress("what the data cannot tell")
-    weak, assumed = identifiability(problem, result)
-    fitted = _rounded(apply_calibration(vehicle, problem, result.x))
-    rows = parameter_rows(problem, result, fitted, priors)
-    used = result.weight > 0.0
-    rmse = {
-        "sheet": _rms((problem.measured - problem.predict_all(problem.start()))[used]),
-        "calibrated": _rms(result.residual[used]),
-        "noise_floor": result.noise_floor,
-    }
+    weak, assumed = identifiability(problem, fitted)
+    calibrated = _rounded(apply_calibration(vehicle, problem, fitted.x))
+    rows = parameter_rows(problem, fitted, calibrated, priors)
+    used = fitted.weight > 0.0
+    rmse = result.FittedErrors(
+        sheet=_rms((problem.measured - problem.predict_all(problem.start()))[used]),
+        calibrated=_rms(fitted.residual[used]),
+        noise_floor=fitted.noise_floor,
+    )
     names = [calibration.name for calibration in problem.calibrations]
-    found = [{"bag": quality.recording.name, **asdict(finding)} for quality in qualities for finding in quality.findings]
-    return Calibrated(problem, result, fitted, {
-        "priors": priors,
-        "duration_s": sum(float(run.time[-1] - run.time[0]) for run in runs),
-        "parameters": rows,
-        "covariance": {"names": names, "matrix": result.covariance[: len(names), : len(names)].tolist()},
-        "rmse_Nm": rmse,
-        "heldout_rmse_Nm": held,
-        "undetermined": [asdict(combination) for combination in weak],
-        "assumed": [asdict(value) for value in assumed],
-        "data_quality": found,
-        "statement": units.words(vehicle, statement(rows, rmse, held, weak, assumed)),
-    })  # fmt: skip
+    matrix = tuple(tuple(row) for row in fitted.covariance[: len(names), : len(names)].tolist())
+    found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
+    further = [*cut.items(), *apart.items(), *weather_findings(problem, fitted.fit).items()]
+    found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])
+    first = f"The vehicle file seems wrong: {wrong.statement}. " if wrong else ""
+    return Calibrated(problem, fitted, result.Calibration(
+        schema=result.SCHEMA,
+        tool_version=__version__,
+        date=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        bags=tuple(recording.name for recording in recordings),
+        vehicle=vehicle.name,
+        priors=priors,
+        duration_s=sum(float(run.time[-1] - run.time[0]) for run in problem.runs),
+        parameters=tuple(rows),
+        covariance=result.Covariance(tuple(names), matrix),
+        rmse_Nm=rmse,
+        heldout_rmse_Nm=held,
+        undetermined=tuple(weak),
+        assumed=tuple(assumed),
+        data_quality=tuple(found),
+        statement=units.words(vehicle, first + statement(rows, rmse, held, weak, assumed)),
+        calibrated=calibrated,
+        seen=seen_range(problem),
+    ))  # fmt: skip
 
 
 def check_motion(problem: Problem) -> None:
@@ -267,51 +245,53 @@ def check_motion(problem: Problem) -> None:
         )
 
 
-def heldout_rmse(problem: Problem, result: Estimate, priors: bool) -> dict[str, float | None]:
+def heldout_rmse(problem: Problem, fitted: Estimate, priors: bool) -> result.HeldOutErrors:
     """RMSE [N m] of sheet and calibrated vehicle on held-out stretches that a fit of its own did not see."""
     parts = split(problem)
     if not parts.held.any() or not parts.fit.any():
-        return {"sheet": None, "calibrated": None}
-    weight = np.where(parts.fit, result.weight, 0.0)
-    other = fit(problem, weight, start=result.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
+        return result.HeldOutErrors(None, None)
+    weight = np.where(parts.fit, fitted.weight, 0.0)
+    other = fit(problem, weight, start=fitted.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     sheet = problem.predict_all(problem.start())
-    return {
-        "sheet": _rms((problem.measured - sheet)[parts.held]),
-        "calibrated": _rms((problem.measured - other.prediction)[parts.held]),
-    }
+    return result.HeldOutErrors(
+        _rms((problem.measured - sheet)[parts.held]), _rms((problem.measured - other.prediction)[parts.held])
+    )
 
 
-def parameter_rows(problem: Problem, result: Estimate, fitted: Vehicle, priors: bool) -> list[dict[str, Any]]:
+def parameter_rows(problem: Problem, fitted: Estimate, calibrated: Vehicle, priors: bool) -> list[result.FittedKey]:
     """One row per vehicle-file key that the fit decided about."""
     names = [calibration.name for calibration in problem.calibrations]
-    spread = np.sqrt(np.diag(result.covariance))
+    spread = np.sqrt(np.diag(fitted.covariance))
     low, high = problem.bounds()
     prior = problem.scales()[: len(names)]
     rows = []
     for key in KEYS:
-        sheet, value = key.read(problem.vehicle), key.read(fitted)
+        sheet, value = key.read(problem.vehicle), key.read(calibrated)
         if key.calibration not in names or sheet is None or value is None:
             continue
         i = names.index(key.calibration)
-        gradient = _log_gradient(problem, result.x, key)
-        deviation = float(np.sqrt(gradient @ result.covariance @ gradient))
-        reach = math.exp(min(result.quantile * deviation, 20.0))
+        gradient = _log_gradient(problem, fitted.x, key)
+        deviation = float(np.sqrt(gradient @ fitted.covariance @ gradient))
+        reach = math.exp(min(fitted.quantile * deviation, 20.0))
         edge = 0.01 * (high[i] - low[i])
-        at_bound = "low" if result.x[i] < low[i] + edge else "high" if result.x[i] > high[i] - edge else None
+        at_bound: Literal["low", "high"] | None = (
+            "low" if fitted.x[i] < low[i] + edge else "high" if fitted.x[i] > high[i] - edge else None
+        )
         dominated = bool(spread[i] > PRIOR_DOMINATED * problem.calibrations[i].prior)
-        rows.append({
-            "name": key.calibration,
-            "key": key.key,
-            "unit": units.label(problem.vehicle, key.unit),
-            "sheet": sheet,
-            "value": value,
-            "ci95": sorted((value / reach, value * reach)),
-            "relative_sd": deviation,
-            "prior_relative_sd": float(np.linalg.norm(gradient[: len(names)] * prior)) if priors else None,
-            "at_bound": at_bound,
-            "prior_dominated": dominated,
-            "advice": ADVICE[key.calibration] if dominated or at_bound else None,
-        })  # fmt: skip
+        ends = value / reach, value * reach
+        rows.append(result.FittedKey(
+            name=key.calibration,
+            key=key.key,
+            unit=units.label(problem.vehicle, key.unit),
+            sheet=sheet,
+            value=value,
+            ci95=(min(ends), max(ends)),
+            relative_sd=deviation,
+            prior_relative_sd=float(np.linalg.norm(gradient[: len(names)] * prior)) if priors else None,
+            at_bound=at_bound,
+            prior_dominated=dominated,
+            advice=ADVICE[key.calibration] if dominated or at_bound else None,
+        ))  # fmt: skip
     return rows
 
 
@@ -329,28 +309,28 @@ def _log_gradient(problem: Problem, x: Array, key: Key) -> Array:
 
 
 def statement(
-    rows: Sequence[Mapping[str, Any]],
-    rmse: Mapping[str, float],
-    held: Mapping[str, float | None],
+    rows: Sequence[result.FittedKey],
+    rmse: result.FittedErrors,
+    held: result.HeldOutErrors,
     weak: Sequence[Combination],
     assumed: Sequence[Assumed],
 ) -> str:
     """What an engineer should know, in one paragraph."""
-    before, after = held["sheet"], held["calibrated"]
+    before, after = held.sheet, held.calibrated
     text = []
     if before is not None and after is not None:
         text.append(f"Torque error on held-out stretches: {after:.0f} N m; with the sheet it was {before:.0f} N m.")
-    if rmse["calibrated"] > MISFIT * rmse["noise_floor"]:
+    if rmse.calibrated > MISFIT * rmse.noise_floor:
         text.append(
-            f"The residual ({rmse['calibrated']:.0f} N m) is above the noise ({rmse['noise_floor']:.0f} N m): physics "
+            f"The residual ({rmse.calibrated:.0f} N m) is above the noise ({rmse.noise_floor:.0f} N m): physics "
             "beyond the baseline; run diagnose before trusting these values."
         )
     for row in rows:
-        if row["at_bound"]:
-            text.append(f"{row['key']} stopped at the {row['at_bound']} end of its range.")
-        if row["prior_dominated"]:
-            text.append(f"{row['key']} is hardly determined by these recordings; drive '{row['advice']}'.")
-    said = {row["name"] for row in rows if row["prior_dominated"]}
+        if row.at_bound:
+            text.append(f"{row.key} stopped at the {row.at_bound} end of its range.")
+        if row.prior_dominated:
+            text.append(f"{row.key} is hardly determined by these recordings; drive '{row.advice}'.")
+    said = {row.name for row in rows if row.prior_dominated}
     text += [f"{c.statement[0].upper()}{c.statement[1:]}." for c in weak if not set(c.parts) <= said]
     for value in assumed:
         name = max(value.shifts, key=lambda n: abs(value.shifts[n]) if n not in said else 0.0)
@@ -360,29 +340,6 @@ def statement(
                 f"{name.replace('_', ' ')} by {value.shifts[name]:+.2g} %."
             )
     return " ".join(text)
-
-
-def with_provenance(vehicle: Vehicle, result: Mapping[str, Any]) -> Vehicle:
-    """The vehicle with a note of how its values came about."""
-    note = {
-        "tool": f"lugre_steering {result['tool_version']} calibrate",
-        "date": result["date"],
-        "data": result["bags"],
-        "sheet": result["vehicle"],
-        "heldout_rmse_Nm": dict(result["heldout_rmse_Nm"]),
-        "ci95": {row["key"]: row["ci95"] for row in result["parameters"]},
-        "sheet_values": {row["key"]: row["sheet"] for row in result["parameters"]},
-    }
-    return vehicle.replace(provenance={**vehicle.provenance, "calibration": note})
-
-
-def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
-    if note := no_pictures():
-        return None, note
-    from lugre_steering.calibration.figure import draw_calibration
-
-    draw_calibration(done, file)
-    return str(file), None
 
 
 def _rounded(vehicle: Vehicle) -> Vehicle:

@@ -109,11 +109,11 @@ def cases(count: int, manoeuvres: Sequence[Manoeuvre] = QUICK, first: int = 0) -
         known = {key.key: key.read(truth) for key in KEYS}
         yield [
             Row(
-                row["key"],
-                float(known[row["key"]] or 0.0),
-                row["value"],
-                tuple(row["ci95"]),
-                not row["prior_dominated"],
+                row.key,
+                float(known[row.key] or 0.0),
+                row.value,
+                row.ci95,
+                not row.prior_dominated,
             )
             for row in parameter_rows(problem, result, fitted, priors=True)
         ]

@@ -38,7 +38,7 @@ STEP_REMAINDER = 0.25
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles).
+    """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles and weather).
 
     ``weight`` (n,) [1/(N m)] zero where not used, ``noise_floor`` [N m], ``residual`` (n,) [N m], ``draws`` (draws,
     n) and ``step_error`` (n,) [N m] what noise and the finite time step may put into it, ``cluster`` (n,) the block of
@@ -95,7 +95,7 @@ def estimate(problem: Problem, *, priors: bool = True, seed: int = 0, draws: int
     cluster = _clusters(problem, residual * weight)
     scales = problem.scales()
     # Same information as the prior rows of the fit; initial bristles have a wide one of their own.
-    information = np.where(np.arange(scales.size) < len(problem.calibrations), float(priors), 0.3) ** 2 / scales**2
+    information = problem.prior_weights(priors) ** 2 / scales**2
     blocks = np.unique(cluster[weight > 0.0]).size
     result = Estimate(
         final, weight, noise.floor, residual, noise.draws, step, cluster, information,

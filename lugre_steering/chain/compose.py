@@ -113,6 +113,8 @@ class Composition:
     parameters: np.dtype[np.void]
     state: np.dtype[np.void]
     lines: np.dtype[np.void]
+    starts: Mapping[str, float | str]
+    """Memory that does not begin at zero: its field of the state, and a number or the baseline parameter that it begins with."""
     step: Law
     arm_factor: Law
     line_error: Law
@@ -125,6 +127,7 @@ class Composition:
 
 
 _made: dict[str, Composition] = {}
+_asked: dict[tuple[tuple[str, int], ...], Composition] = {}
 
 
 def composition_of(name: str) -> Composition:
@@ -139,6 +142,18 @@ def name_of(fields: Sequence[str]) -> str:
 
 def compose(effects: Sequence[Physics]) -> Composition:
     """The step of the baseline with the given effects in place, in their order."""
+    asked = tuple((effect.id, id(effect)) for effect in effects)
+    if asked not in _asked:
+        _asked[asked] = _compose(effects)
+        _kept.extend(effects)
+    return _asked[asked]
+
+
+_kept: list[Physics] = []
+"""What ``_asked`` knows by its identity, which stays its own as long as it lives."""
+
+
+def _compose(effects: Sequence[Physics]) -> Composition:
     laws = {f"{effect.id}__{hook}": function for effect in effects for hook, function in effect.hooks.items()}
     text = _text(effects)
     sources = [text, *(_source(function) for function in laws.values())]
@@ -159,6 +174,7 @@ def compose(effects: Sequence[Physics]) -> Composition:
         np.dtype([(field, np.float64) for field in (*BASELINE_FIELDS, *_parameter_fields(effects, per_line=False), name)]),
         np.dtype([*((field, np.float64) for field in STATE_FIELDS), *_memory_fields(effects)]),
         np.dtype([(field, np.float64) for field in (*_parameter_fields(effects, per_line=True), name)]),
+        _starts(effects),
         scope["step"],
         scope["arm_factor"],
         scope["line_error"],
@@ -280,12 +296,7 @@ def _instead(effects: Sequence[Physics], hook: str) -> list[str]:
 
 def _text(effects: Sequence[Physics]) -> str:
     """The step module."""
-    memory = [
-        f"s.{effect.id}_{name} = " + (f"p.{start}" if isinstance(start, str) else repr(start))
-        for effect in effects
-        for name, start in effect.memory.items()
-        if not isinstance(start, tuple) and start != 0.0
-    ]
+    memory = [f"s.{name} = " + (f"p.{start}" if isinstance(start, str) else repr(start)) for name, start in _starts(effects).items()]
     winding = _filled(WIND_UP, {"wind_up": list(_slot(effects, "wind_up"))}) if _acting(effects, "wind_up") else ""
     slots = {hook: list(_slot(effects, hook)) for hook in HOOKS if hook not in ("wind_up", "contact", "delay", "lag")}
     slots |= {hook: _instead(effects, hook) for hook in ("wind_up", "contact")}
@@ -293,6 +304,15 @@ def _text(effects: Sequence[Physics]) -> str:
     text = _filled(STEP, slots) + "\n\n" + _filled(SENSED, slots)
     header = '"""One step of one track, composed of: ' + (", ".join(effect.id for effect in effects) or "the baseline alone") + '."""\n\n'
     return header + re.sub(r"^def (?!step\(|arm_factor\(|line_error\()", "@law\ndef ", text, flags=re.MULTILINE)
+
+
+def _starts(effects: Sequence[Physics]) -> dict[str, float | str]:
+    return {
+        f"{effect.id}_{name}": start
+        for effect in effects
+        for name, start in effect.memory.items()
+        if not isinstance(start, tuple) and start != 0.0
+    }
 
 
 def _filled(template: str, slots: Mapping[str, Sequence[str]]) -> str:

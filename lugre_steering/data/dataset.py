@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lugre_steering.data.sensing import Sensing, sensed
 from lugre_steering.data.smoother import smooth_angle
+from lugre_steering.data.stamps import evened
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.simulate.actuation import line_pressures, total_gains
@@ -18,6 +20,8 @@ from lugre_steering.vehicle.size import angle_unit
 
 MAX_RATE_HZ = 125.0
 GAP_S = 0.25
+BRIDGED_S = 0.05
+"""Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
 
@@ -47,6 +51,12 @@ class Run:
     """Instants [s] from which the recorded air has another temperature [degC]; before the first, that of the vehicle file."""
     angle_unit: float = 1.0
     """Size of the machine's travel, in which the rate is given below which it counts as standing."""
+    first_air: float | None = None
+    """Recorded air temperature [degC] at the start; None where none was recorded."""
+    angle: Sensing = field(default_factory=lambda: Sensing(0.0, 0.0))
+    """The worst angle sensor as one sample of this clock shows it [rad]."""
+    rounding: Array = field(default_factory=lambda: np.zeros(0))
+    """Step of each pressure sensor [Pa] (lines,) that its noise does not dither; 0 elsewhere, empty if none has one."""
 
     @property
     def torque_per_line(self) -> Array:
@@ -86,20 +96,28 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
             found = "nothing" if signal is None else f"{signal.time_s.size} samples"
             raise DataError(f"{recording.name}: {name} (topic '{topic}'): got {found}, expected at least 20 samples")
     present = {name: signal for name, signal in signals.items() if signal is not None}
+    present = {name: evened(signal)[0] for name, signal in present.items()}
     time, valid = _clock(recording.name, present)
-    noise = angle_noise(vehicle)
-    theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), noise) for side in vehicle.sides])
+    seen = {name: _on_clock(time, signal, sensed(signal)) for name, signal in present.items()}
+    worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
+    angle = worst if worst.sigma() > angle_noise(vehicle) else Sensing(angle_noise(vehicle), 0.0)
+    theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), angle.sigma()) for side in vehicle.sides])
     omega, alpha = motion(time, theta)
+    rounding = np.zeros(0)
     if vehicle.hydraulics is not None:
         gains = line_gains(vehicle, theta)
         pressure = np.array([_at(time, present[f"pressure/{line}"]) for line in lines]) - gauge_offset(vehicle)
         turned = line_gains(vehicle, theta + 1e-4)
-        sigma = vehicle.sensors.pressure_noise_Pa * np.sqrt((gains.sum(axis=0) ** 2).sum(axis=0))
+        sensors = [seen[f"pressure/{line}"] for line in lines]
+        noise = np.array([max(vehicle.sensors.pressure_noise_Pa, sensor.sigma()) for sensor in sensors])
+        sigma = np.sqrt(((gains.sum(axis=0) * noise[:, None]) ** 2).sum(axis=0))
+        if any(sensor.coarse and sensor.sigma() > vehicle.sensors.pressure_noise_Pa for sensor in sensors):
+            rounding = np.array([sensor.resolution if sensor.coarse else 0.0 for sensor in sensors])
     else:
         assert vehicle.torque_sensor is not None
         gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
         pressure = _at(time, present["measured_torque"])[None, :]
-        sigma = np.full(time.size, vehicle.torque_sensor.noise_Nm)
+        sigma = np.full(time.size, max(vehicle.torque_sensor.noise_Nm, seen["measured_torque"].sigma()))
     side_torque = np.einsum("slt,lt->st", gains, pressure)
     side_slope = np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure)
     measured = side_torque.sum(axis=0)
@@ -112,7 +130,8 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     return Run(
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
-        air=_air(recording.air_temperature, vehicle), angle_unit=angle_unit(vehicle),
+        air=_air(recording.air_temperature, vehicle), first_air=_first_air(recording.air_temperature), angle=angle,
+        rounding=rounding, angle_unit=angle_unit(vehicle),
     )  # fmt: skip
 
 
@@ -127,6 +146,23 @@ def _air(recorded: Signal | None, vehicle: Vehicle) -> tuple[tuple[float, float]
             now = float(np.mean(value))
             steps.append((float(time[0]), now))
     return tuple(steps)
+
+
+def with_hydraulics(run: Run, vehicle: Vehicle) -> Run:
+    """The run as the cylinders of another vehicle would show it: same motion, same pressures."""
+    gains, turned = line_gains(vehicle, run.theta), line_gains(vehicle, run.theta + 1e-4)
+    side_torque = np.einsum("slt,lt->st", gains, run.pressure)
+    return replace(
+        run, gains=gains, side_torque=side_torque, side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, run.pressure),
+        measured=side_torque.sum(axis=0),
+    )  # fmt: skip
+
+
+def _first_air(recorded: Signal | None) -> float | None:
+    """Mean of the first AIR_S of the recorded air [degC]."""
+    if recorded is None or not recorded.time_s.size:
+        return None
+    return float(np.mean(recorded.value[recorded.time_s <= recorded.time_s[0] + AIR_S]))
 
 
 def ideal_run(vehicle: Vehicle, name: str, time: Array, theta: Array, rates: tuple[Array, Array], torque: Array, sigma: float) -> Run:
@@ -163,20 +199,33 @@ def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tup
     valid = np.ones(count, bool)
     for signal in signals.values():
         after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
-        valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(GAP_S, 3.0 * step)
+        valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(BRIDGED_S, 3.0 * step)
     return time, valid
+
+
+def _on_clock(time: Array, signal: Signal, sensor: Sensing) -> Sensing:
+    """What a sample of the clock has of a sensor's noise: less where several samples are averaged."""
+    averaged = _averaged(time, signal)
+    return sensor if sensor.coarse else Sensing(sensor.sigma(averaged), 0.0)
+
+
+def _averaged(time: Array, signal: Signal) -> int:
+    """Samples of a signal per sample of the clock."""
+    return max(1, round(float(time[1] - time[0]) / float(np.median(np.diff(signal.time_s)))))
 
 
 def _at(time: Array, signal: Signal) -> Array:
     """Signal on the clock: linear interpolation; a faster signal is averaged over each step first, so nothing aliases."""
-    step = time[1] - time[0]
-    spacing = float(np.median(np.diff(signal.time_s)))
-    value = signal.value
-    width = round(step / spacing)
+    at, value = signal.time_s, signal.value
+    width = _averaged(time, signal)
     if width > 1:
         # Symmetric for even widths too (half weight at both ends): half a sample of delay would look like physics.
         kernel = np.ones(width + 1 - width % 2) / width
         if width % 2 == 0:
             kernel[[0, -1]] *= 0.5
-        value = np.convolve(np.pad(value, kernel.size // 2, mode="edge"), kernel, mode="valid")
-    return np.interp(time, signal.time_s, value)
+        # The stamps are averaged alike: where messages are lost, the mean lies elsewhere.
+        edge = kernel.size // 2
+        before, after = at[0] - (at[1] - at[0]) * np.arange(edge, 0, -1), at[-1] + (at[-1] - at[-2]) * np.arange(1, edge + 1)
+        at = np.convolve(np.concatenate([before, at, after]), kernel, mode="valid")
+        value = np.convolve(np.pad(value, edge, mode="edge"), kernel, mode="valid")
+    return np.interp(time, at, value)

@@ -9,7 +9,7 @@ and coarsely quantised recordings stay silent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
+from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
+from lugre_steering.data.sensing import worse_than_said
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -28,6 +30,8 @@ Intervals = tuple[tuple[float, float], ...]
 
 STUCK_S = 1.0
 """An exact repeat longer than this is a stuck sensor, where noise or a jump shows that the value should have moved."""
+LOST = 0.02
+"""Share of lost messages from which it is told."""
 CLIPPED_SAMPLES = 5
 """So many repeats in a row of a noisy channel's extreme value are a limit of the sensor, not chance."""
 SPIKE_SIGMA = 8.0
@@ -40,6 +44,9 @@ NOISE_RATE_HZ = 20.0
 WINDOW_S = 1.0
 FORGOTTEN = 5.0
 """Presliding lengths after which less than 1 % of a wrong bristle deflection is left."""
+WENT_ON, EDGE_SAMPLES, LONGEST_UNSEEN_S = 0.05, 10, 1.0
+"""Share of a presliding length by which the turn in a gap may miss that of the rates at its edges, samples that give those, and
+the longest gap [s] that they can speak for."""
 PARKED = 0.02
 """Share of a presliding length that a track at rest may seem to move by angle noise."""
 LATE_S = 1.0
@@ -79,8 +86,50 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
             if channel.kind is not Kind.ANGLE:
                 clean[channel] = _without(signal, finding.intervals_s)
     usable = _with_signals(recording, clean)
+    lost = tuple(_held_long(findings, looks))
+    # What no sensor shows has no wiring to look at; angles in another unit have its noise too.
+    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle) or inspect_angles(usable, vehicle)
+    if not wrong:
+        findings += [finding for channel, look in looks.items() for finding in _sensor(channel, clean[channel], look, vehicle)]
     # One angle sensor for both tracks would say everything twice.
-    return Quality(tuple(dict.fromkeys((*findings, *inspect_wiring(usable, vehicle)))), usable)
+    return Quality(tuple(dict.fromkeys((*findings, *wrong))), usable)
+
+
+def _held_long(findings: Sequence[Finding], looks: Mapping[Channel, _Look]) -> Iterator[Finding]:
+    """Angles that stood at an end of their range, or still, for a good part of the recording."""
+    for channel, look in looks.items():
+        held = sum(
+            _total(f.intervals_s) for f in findings if f.topic == channel.topic and f.finding in ("clipped_angle", "stuck_sensor")
+        )
+        duration = float(look.time[-1] - look.time[0])
+        if channel.kind is Kind.ANGLE and held > HELD * duration:
+            statement = f"{channel.topic}: shows no angle for {held / duration:.0%} of the recording; check its range and its zero"
+            yield Finding("dead_sensor", channel.topic, statement)
+
+
+def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> list[Finding]:
+    """A finding where the sensor, its clock or the logger is worse than the vehicle file lets expect."""
+    if signal.time_s.size < 100:
+        return []
+    unit = {Kind.ANGLE: vehicle.coordinate.unit, Kind.PRESSURE: "Pa", Kind.TORQUE: vehicle.coordinate.force_unit}[channel.kind]
+
+    def say(value: float) -> str:
+        return f"{np.degrees(value):.2g} deg" if unit == "rad" else f"{value:.2g} {unit}"
+
+    said = worse_than_said(signal, look.sheet, say) if look.sheet > 0.0 else None
+    found = [Finding("sensor_worse_than_sheet", channel.topic, f"{channel.topic}: {said}; taken into account")] if said else []
+    lost = _lost(look)
+    if lost > LOST:
+        statement = f"{channel.topic}: {lost:.0%} of the messages are lost; what lies between the others is not taken for measured"
+        found.append(Finding("lost_messages", channel.topic, statement))
+    return found
+
+
+def _lost(look: _Look) -> float:
+    """Share of messages lost one by one or in short bursts, by how many the usual step would have brought; gaps are told as such."""
+    step = np.diff(look.time)
+    short = step[step <= _gap_limit(look.period)]
+    return float(max(0.0, 1.0 - short.size * look.period / max(float(short.sum()), 1e-9)))
 
 
 def _signal(recording: Recording, channel: Channel) -> Signal | None:
@@ -244,6 +293,8 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
         for i in np.flatnonzero(np.diff(time) > _gap_limit(period)):
             if any(_parked(other, time[i], time[i + 1], presliding) for c, other in angles.items() if c is not channel):
                 continue
+            if _went_on(signal, int(i), presliding):
+                continue
             after = slice(i + 1, None, _samples(0.2, period))
             turned = np.cumsum(np.abs(np.diff(signal.value[after], prepend=signal.value[i + 1])))
             forgotten = np.searchsorted(turned, FORGOTTEN * presliding)
@@ -259,6 +310,24 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
                 f"{far}; the measured torque is not used for {_total(tuple(lost)):.1f} s"
             )
             yield Finding("friction_memory_lost", channel.topic, statement, tuple(lost))
+
+
+def _went_on(signal: Signal, last: int, presliding: float) -> bool:
+    """The track moved through the gap after sample ``last`` as it did before and after it, so nothing happened unseen."""
+    time, value = signal.time_s, signal.value
+    gap = float(time[last + 1] - time[last])
+    if gap > LONGEST_UNSEEN_S:
+        return False
+    ends = []
+    for part in (slice(max(last - EDGE_SAMPLES, 0), last + 1), slice(last + 1, last + 2 + EDGE_SAMPLES)):
+        if time[part].size < 3 or float(np.diff(time[part]).max()) > _gap_limit(float(np.median(np.diff(time)))):
+            return False
+        slope, offset = np.polyfit(time[part] - time[last], value[part], 1)
+        ends.append((float(slope), float(offset)))
+    (before, from_), (after, back) = ends
+    turned = back + after * gap - from_
+    expected = 0.5 * (before + after) * gap
+    return before * after >= -((WENT_ON * presliding / gap) ** 2) and abs(turned - expected) < WENT_ON * presliding
 
 
 def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool:

@@ -21,6 +21,7 @@ from scipy.stats import theilslopes
 from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, angle_noise, prepare
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
@@ -29,8 +30,13 @@ from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.model import Model, build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 
-BLOCKING = frozenset({"sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew"})
+BLOCKING = frozenset({
+    "sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew", "wiring_suspect", "dead_sensor",
+    "copied_sensor", "noisy_sensor", "angle_zero",
+})  # fmt: skip
 
+UNTOLD = 0.3
+"""Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
 GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
@@ -109,6 +115,9 @@ def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
         except DataError:
             return ()
         if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
+            return ()
+        total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
+        if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))):
             return ()
         found = _wrong(recording, vehicle, run)
     if found:
@@ -434,12 +443,14 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
 
     if abs(match(seen(model))[1]) <= SKEW_S:
         return
+    gaps = [f"{effect.id}_{effect.play}" for effect in CATALOGUE.values() if effect.play]
     matches, unshifted = [], np.inf
     for softer, play in product(SOFTER, PLAY):
         trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
         for record in trial.parameters:
             record["sigma_0"] *= softer
-            record["backlash_width"] += play * presliding
+            for gap in gaps:
+                record[gap] += play * presliding
         torque = seen(trial)
         matches.append(match(torque))
         unshifted = min(unshifted, matches[-1][2], *(match(lagged(torque, step, lag))[2] for lag in LAG_S))

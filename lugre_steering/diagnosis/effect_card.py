@@ -17,9 +17,9 @@ from rich.text import Text
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.data.dataset import Run, ideal_run
-from lugre_steering.diagnosis.result import finite
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.fingerprint import candidates
+from lugre_steering.effects import registry
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.files import output_folder
@@ -27,6 +27,7 @@ from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import plain
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
 from lugre_steering.vehicle import Vehicle
@@ -111,7 +112,7 @@ def describe(effect: Effect) -> dict[str, Any]:
     """An entry as plain data for JSON; unbounded ends are null."""
     entry = {
         "id": effect.id, "stage": effect.stage, "tier": effect.tier, "title": effect.title, "equation": effect.equation,
-        "trace": effect.trace, "coordinate": effect.coordinate, "source": effect.source, "rivals": list(effect.rivals),
+        "trace": effect.trace, "coordinate": effect.coordinate, "source": effect.source, "rivals": registry.rivals(effect),
         "observable": effect.observable, "needs": effect.not_recorded or None, "per_line": effect.per_line,
         "parameters": [
             {"name": p.name, "unit": p.unit, "meaning": p.meaning, "typical": p.scale, "low": p.low, "high": p.high,
@@ -119,7 +120,7 @@ def describe(effect: Effect) -> dict[str, Any]:
             for p in effect.parameters
         ],
     }  # fmt: skip
-    result = finite(entry)
+    result = plain(entry)
     assert isinstance(result, dict)
     return result
 
@@ -214,7 +215,7 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         ("how it shows", effect.trace),
         ("told by", effect.coordinate),
         ("source", effect.source),
-        ("easily taken for", ", ".join(effect.rivals)),
+        ("easily taken for", ", ".join(registry.rivals(effect))),
         ("would need", effect.not_recorded),
     ):
         if text:

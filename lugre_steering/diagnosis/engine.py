@@ -6,30 +6,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from lugre_steering import units
 from lugre_steering.bag import read_recordings
 from lugre_steering.data.bursts import set_aside
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
-from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
+from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.sheet import LEVELS, WrongSheet, at_bounds, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
-from lugre_steering.recording import Finding, Recording
+from lugre_steering.fitting.weather import weather_findings
+from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
 
 MIN_SLIDING, MIN_SAMPLES = 2.0, 500
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart; samples that a fit needs."""
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""
+
+WORTH_A_SHEET = 0.5
+"""Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
 Progress = Callable[[str], None]
 
@@ -66,21 +70,24 @@ def diagnose_recordings(
         )
     progress("estimating the motion")
     try:
-        problem = Problem(vehicle, [prepare(quality.recording, vehicle) for quality in qualities])
+        pieces, cut = in_pieces([quality.recording for quality in qualities])
+        findings += [finding.in_bag(bag) for bag, finding in cut.items()]
+        problem, apart = synchronised(pieces, vehicle)
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
+    findings += [finding.in_bag(bag) for bag, finding in apart.items()]
     travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
     roles = split(problem)
+    progress("comparing with the vehicle file")
+    if roles.fit.sum() >= MIN_SAMPLES and (wrong := wrong_sheet(problem)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
     if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
         if travel < MIN_SLIDING:
             lacking = f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
         else:
             lacking = f"only {roles.fit.sum()} usable samples are left to fit; at least {MIN_SAMPLES} are needed (see data_quality)"
-        advice = {
-            "manoeuvre": "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description,
-            "separates": ["friction level", "stiffness"],
-            "why": lacking,
-        }
+        drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description
+        advice = Experiment(drive, ("friction level", "stiffness"), lacking)
         statement = (
             f"The recording of {sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s does not determine the "
             f"baseline: {lacking}. Nothing can be said about missing physics."
@@ -92,44 +99,49 @@ def diagnose_recordings(
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
-        findings += [_entry(finding, bag) for bag, finding in disturbed.items()]
+        findings += [finding.in_bag(bag) for bag, finding in disturbed.items()]
         problem = Problem(vehicle, runs)
         noise, roles, found = investigate(problem, seed, progress)
+    if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
+    if found.found and at_bounds(problem, found.final.x, LEVELS) and (wrong := wrong_sheet(problem, insist=True)) is not None:
+        return _wrong_sheet(qualities, vehicle, findings, wrong)
+    findings += [finding.in_bag(bag) for bag, finding in weather_findings(problem, found.final).items()]
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     usable = [quality.recording for quality in qualities]
     return conclude(done, findings, usable, seed=seed, material=material, progress=progress)
 
 
-def _findings(qualities: Sequence[Quality]) -> list[dict[str, Any]]:
-    return [_entry(finding, quality.recording.name) for quality in qualities for finding in quality.findings]
+def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
+    return [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
 
 
-def _entry(f: Finding, bag: str) -> dict[str, Any]:
-    return {
-        "finding": f.finding, "topic": f.topic, "bag": bag,
-        "intervals_s": [list(span) for span in f.intervals_s], "statement": f.statement,
-    }  # fmt: skip
+def _wrong_sheet(
+    qualities: Sequence[Quality], vehicle: Vehicle, findings: Sequence[BagFinding], wrong: WrongSheet
+) -> Diagnosis:
+    statement = (
+        f"The vehicle file is not that of this vehicle, or not of these sensors: {wrong.statement}. "
+        "No physics is named before that is put right."
+    )
+    return _insufficient(qualities, vehicle, [*findings, wrong.finding()], statement, None)
 
 
 def _insufficient(
     qualities: Sequence[Quality],
     vehicle: Vehicle,
-    findings: list[dict[str, Any]],
+    findings: Sequence[BagFinding],
     statement: str,
-    advice: dict[str, Any] | None,
+    advice: Experiment | None,
 ) -> Diagnosis:
     """The verdict when nothing can be concluded: the vehicle stays as it was."""
     floor = 1.0
     if vehicle.hydraulics is not None:
         floor = max(1.0, vehicle.sensors.pressure_noise_Pa * 5e-3)
-    fit_entry: dict[str, Any] = {"rmse_Nm": 0.0, "heldout_rmse_Nm": None}
-    json = {
-        "schema": SCHEMA, "bags": [quality.recording.name for quality in qualities], "verdict": "insufficient_data",
-        "statement": statement, "noise_floor_Nm": floor, "baseline": fit_entry,
-        "augmented": {**fit_entry, "improvement": None, "improvement_ci95": None, "causal_rmse_Nm": None}, "effects": [],
-        "unexplained": {"structured": False, "description": "not examined", "formula": None, "where": None},
-        "detection_limits": {}, "data_quality": findings, "next_experiment": advice,
-    }  # fmt: skip
-    return Diagnosis(units.in_words(vehicle, finite(json)), vehicle)
+    return Diagnosis(
+        schema=SCHEMA, bags=tuple(quality.recording.name for quality in qualities), verdict="insufficient_data",
+        statement=statement, noise_floor_Nm=floor, baseline=Errors(0.0, None),
+        augmented=Augmented(0.0, None, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
+        detection_limits={}, data_quality=tuple(findings), next_experiment=advice,
+    ).in_words()  # fmt: skip
 

@@ -1,19 +1,33 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a diagnosis came to: the contract's JSON, and beside it the arrays that the report draws."""
+"""What a diagnosis came to, with the names of the contract's JSON, and beside it the arrays that the report draws."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
-from lugre_steering.recording import Array, unused_name
-from lugre_steering.vehicle import Vehicle
+from lugre_steering import units
+from lugre_steering.errors import DataError
+from lugre_steering.files import earlier_result, write_record
+from lugre_steering.recording import Array, BagFinding, unused_name
+from lugre_steering.result import Result, folder_for, frame, html, of_bag
+from lugre_steering.serialise import IN_MEMORY, finite, mapped
+from lugre_steering.vehicle import Vehicle, save
 
-SCHEMA = "lugre_steering/diagnosis/1"
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+SCHEMA: Final = "lugre_steering/diagnosis/1"
+
+Verdict = Literal["consistent", "missing_physics", "unlisted_physics", "insufficient_data"]
+Stage = Literal["motion", "contact", "thermal", "parallel_torque", "measurement"]
+Interval = tuple[float | None, float | None]
+Share = Annotated[float, {"minimum": 0, "maximum": 1}]
 
 
 def picture_names(names: Sequence[str]) -> list[str]:
@@ -56,25 +70,172 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """``json`` follows the interface contract; ``vehicle`` is the augmented vehicle; the rest is for the report."""
+class Errors:
+    """How well a model explains the torque: RMSE [N m] over all valid samples, and over those held out (None: none were)."""
 
-    json: dict[str, Any]
-    vehicle: Vehicle
-    traces: tuple[BagTrace, ...] = ()
-    evidence: tuple[Evidence, ...] = ()
-    coordinate_of: Mapping[str, str] = field(default_factory=dict)
+    rmse_Nm: float
+    heldout_rmse_Nm: float | None
 
 
-def finite(value: Any) -> Any:
-    """The same tree with plain Python numbers, non-finite ones as None: what JSON can hold."""
-    if isinstance(value, dict):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(item) for item in value]
-    if isinstance(value, bool) or value is None or isinstance(value, str):
-        return value
-    if isinstance(value, int):
-        return value
-    number = float(value)
-    return number if math.isfinite(number) else None
+@dataclass(frozen=True)
+class Augmented(Errors):
+    """The recalibrated model with the effects found; ``improvement`` is 1 - its held-out RMSE over the baseline's, with its
+    95 % interval (None where nothing could be judged)."""
+
+    improvement: float | None
+    improvement_ci95: Interval | None
+    causal_rmse_Nm: float | None
+    """On all valid samples, without looking ahead and with bristles relaxed at the start, as the live node must."""
+    vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
+    """The vehicle file of it, to replay, simulate or run live."""
+
+    def save(self, path: str | Path) -> None:
+        """Write the vehicle file (augmented.yaml of the command)."""
+        save(self.vehicle, path)
+
+
+@dataclass(frozen=True)
+class FittedValue:
+    """One fitted parameter with its 95 % interval, in ``unit``."""
+
+    value: float | None
+    ci95: Interval
+    unit: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something acts in one bag: stretches [s] since its first stamp, and the range of the telling coordinate in ``unit``."""
+
+    bag: str
+    intervals_s: tuple[tuple[float, float], ...]
+    coordinate: str
+    range: Interval
+    unit: str
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """One effect of the catalogue that the baseline leaves out.
+
+    ``energy_share``: share of the baseline's residual energy that it explains; ``masked_share``: share of its signature that
+    recalibrating the baseline had absorbed; both 0 to 1. ``parameters``: values by name (by line for an effect of a line).
+    """
+
+    id: Annotated[str, {"pattern": "^[a-z][a-z0-9_]*$"}]
+    stage: Stage
+    statement: str
+    p_value: Share
+    parameters: Mapping[str, FittedValue]
+    where: tuple[Place, ...]
+    energy_share: Share
+    masked_share: Share
+    indistinguishable_from: Annotated[tuple[str, ...], {"maxItems": 6}]
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left: whether it is structure, where, and the best formula over named, unit-carrying variables."""
+
+    structured: bool
+    description: str
+    formula: str | None = None
+    where: tuple[Place, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Smallest ``parameter`` of an effect, in ``unit``, that these recordings would have revealed; None: none that is possible."""
+
+    parameter: str
+    smallest: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What to drive next, what that separates, and why."""
+
+    manoeuvre: str
+    separates: tuple[str, ...]
+    why: str
+
+
+@dataclass(frozen=True)
+class Diagnosis(Result):
+    """What a diagnosis came to, with the names of ``diagnosis.json``; torques in N m (the vehicle's force unit for a linear axis).
+
+    ``noise_floor_Nm``: RMSE that noise alone would leave; ``detection_limits``: by effect; ``augmented.vehicle``: the vehicle with
+    the effects in it. ``traces`` and ``evidence`` are kept in memory for pictures.
+    """
+
+    schema: Literal["lugre_steering/diagnosis/1"]
+    bags: Annotated[tuple[str, ...], {"minItems": 1}]
+    verdict: Verdict
+    statement: Annotated[str, {"minLength": 20}]
+    noise_floor_Nm: Annotated[float, {"exclusiveMinimum": 0}]
+    baseline: Errors
+    augmented: Augmented
+    effects: tuple[NamedEffect, ...]
+    unexplained: Unexplained
+    detection_limits: Mapping[str, Limit]
+    data_quality: tuple[BagFinding, ...]
+    next_experiment: Experiment | None
+    traces: tuple[BagTrace, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
+    evidence: tuple[Evidence, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
+    coordinate_of: Mapping[str, str] = field(default_factory=dict, repr=False, metadata=IN_MEMORY)
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The augmented vehicle."""
+        return self.augmented.vehicle
+
+    def in_words(self) -> Diagnosis:
+        """The same in the words of the vehicle's coordinate, with None for every number that does not exist."""
+        told: Diagnosis = units.in_words(self.vehicle, mapped(self, lambda value, _: finite(value)))
+        return told
+
+    def save(self, out: str | Path) -> None:
+        """Write diagnosis.json and augmented.yaml into a folder; replaces only an earlier diagnosis there."""
+        folder = folder_for(out)
+        earlier_result(folder, "diagnosis.json", SCHEMA, ("augmented.yaml",))
+        write_record(self.json, folder / "diagnosis.json")
+        self.augmented.save(folder / "augmented.yaml")
+
+    def to_frame(self) -> DataFrame:
+        """One row per fitted parameter of every named effect, as a pandas table."""
+        return frame(self._rows())
+
+    def plot(self, bag: int | str = 0) -> Figure:
+        """Torque and residual of one bag, by number or name, before and after; shaded: where the effects act."""
+        from lugre_steering.report.panels import Curve, Panel, panels
+
+        if not self.traces:
+            raise DataError(f"plot: there is nothing to draw, as the verdict is {self.verdict}: {self.statement}")
+        trace = of_bag(self.traces, bag)
+        unit, time = self.vehicle.coordinate.force_unit, trace.time
+        shaded = [span for effect in self.effects for span in trace.intervals.get(effect.id, ())]
+        before, after = trace.measured - trace.baseline, trace.measured - trace.augmented
+        rows = [
+            Panel(f"torque, bag {trace.name}", unit, [
+                Curve(time, trace.measured, "measured", "measured"),
+                Curve(time, trace.baseline, "recalibrated baseline", "original"),
+                Curve(time, trace.augmented, "with the effects found", "improved"),
+            ]),
+            Panel("residual", unit, [Curve(time, before, "before"), Curve(time, after, "after")], shaded),
+        ]  # fmt: skip
+        if self.effects:
+            rows.append(Panel("what each effect adds", unit, [Curve(time, trace.contributions[e.id], e.id) for e in self.effects]))
+        return panels(rows)
+
+    def _rows(self) -> list[dict[str, object]]:
+        return [
+            {"effect": effect.id, "stage": effect.stage, "parameter": name, "value": found.value, "low": found.ci95[0],
+             "high": found.ci95[1], "unit": found.unit, "energy_share": effect.energy_share, "masked_share": effect.masked_share,
+             "p_value": effect.p_value}
+            for effect in self.effects
+            for name, found in effect.parameters.items()
+        ]  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        return html(f"{self.vehicle.name}: {self.verdict}", self.statement, self._rows())

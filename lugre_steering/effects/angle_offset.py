@@ -27,7 +27,7 @@ EFFECT = Effect(
         Parameter("offset", "rad", "constant added by both angle sensors", 0.02, -0.15, 0.15),
     ),
     hooks={"angle": angle},
-    rivals=("slope_bias", "pressure_offset", "kingpin_jacking"),
+    rivals=("kingpin_jacking", "pressure_offset", "slope_bias"),
     counts_from_start=True,
     one_sided=True,
 )

@@ -27,6 +27,6 @@ EFFECT = Effect(
         Parameter("scale", "1", "relative error of the measured angle", 0.02, -0.2, 0.2),
     ),
     hooks={"angle": angle},
-    rivals=("linkage_compliance", "kingpin_jacking"),
+    rivals=("kingpin_jacking", "linkage_compliance"),
     counts_from_start=True,
 )

@@ -42,5 +42,6 @@ EFFECT = Effect(
     hooks={"wind_up": wind_up},
     rivals=("linkage_compliance",),
     counts_from_start=True,
+    play="width",
     joint_title="Free play between sensor and joint",
 )

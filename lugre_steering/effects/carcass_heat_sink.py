@@ -31,7 +31,7 @@ EFFECT = Effect(
         Parameter("capacity", "J/K", "of the carcass node", 2e4, 500.0, 1e7, (5000.0, 2e4, 1e5)),
     ),
     hooks={"heat_out": heat_out},
-    rivals=("heat_partition", "flash_temperature", "wear_polishing"),
+    rivals=("flash_temperature", "heat_partition", "stress_relaxation", "wear_polishing"),
     memory={"carcass_temperature": "rubber_temperature"},  # second thermal node [degC]
     needs=("rubber",),
     counts_from_start=True,

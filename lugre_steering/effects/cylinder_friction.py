@@ -50,7 +50,7 @@ EFFECT = Effect(
     ),
     hooks={"loss": loss},
     acts_by=("coulomb", "load_share", "viscous"),
-    rivals=("back_pressure", "line_loss_linear"),
+    rivals=("line_loss_linear",),
     memory={"seal": 0.0},  # deflection of the seals, -1 ... 1
     needs=("hydraulics",),
     joint_title="Friction of seals and bearings",

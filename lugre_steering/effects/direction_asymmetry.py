@@ -27,7 +27,7 @@ EFFECT = Effect(
         Parameter("asymmetry", "1", "relative half difference, positive: left turns harder", 0.01, -0.3, 0.3),
     ),
     hooks={"level": level},
-    rivals=("slope_bias",),
+    rivals=("slope_bias", "surface_patch"),
     joint_title="Friction differs between the two directions",
     one_sided=True,
 )

@@ -57,7 +57,7 @@ EFFECT = Effect(
     ),
     hooks={"torque": torque},
     acts_by=("stiffness", "cubic_stiffness", "damping"),
-    rivals=("soil_shear", "moment_arm_error"),
+    rivals=("moment_arm_error", "relief_saturation", "soil_shear"),
     memory={"loading": 1.0},  # 1 loading ... 0 unloading
     joint_title="Elastic end stop",
     one_sided=True,

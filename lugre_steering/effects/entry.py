@@ -88,7 +88,8 @@ class Effect:
     """Physics that the baseline leaves out.
 
     ``equation`` in the field's notation, ``source`` the primary literature, ``trace`` how it looks in a residual,
-    ``coordinate`` the axis along which it tells itself, ``rivals`` the entries it is easily taken for. ``hooks`` are its
+    ``coordinate`` the axis along which it tells itself, ``rivals`` the entries it is easily taken for
+    (each pair is declared once; ``registry.rivals`` gives all of an entry). ``hooks`` are its
     laws by the place where they act (``chain.compose.HOOKS``); ``memory`` is what they remember, with its value at the
     start (a number, numbers, or the name of a baseline parameter).
     """
@@ -117,6 +118,8 @@ class Effect:
     """Begun late, it leaves another trace than the end of the same always there (heat, path, time and age are remembered)."""
     never_late: bool = False
     """It has its own window in time, or acts at the start only."""
+    play: str = ""
+    """Its parameter that is a free play [rad], by which a torque looks as if it were stamped late."""
     one_sided: bool = False
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
     of_angle: bool = False

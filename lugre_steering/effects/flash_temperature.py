@@ -45,7 +45,7 @@ EFFECT = Effect(
         ),
     ),
     hooks={"friction_temperature": friction_temperature, "heat_out": heat_out},
-    rivals=("carcass_heat_sink", "wear_polishing"),
+    rivals=("wear_polishing",),
     memory={"power": 0.0},  # low-passed friction power [W]
     needs=("rubber",),
     counts_from_start=True,

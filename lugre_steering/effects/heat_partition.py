@@ -27,7 +27,6 @@ EFFECT = Effect(
         Parameter("ground_share", "1", "share of the friction power that the ground takes", 0.2, 0.0, 0.95),
     ),
     hooks={"heat_in": heat_in},
-    rivals=("carcass_heat_sink",),
     needs=("rubber",),
     counts_from_start=True,
 )

@@ -33,7 +33,7 @@ EFFECT = Effect(
     ),
     hooks={"torque": torque},
     acts_by=("amplitude", "second_harmonic", "even"),
-    rivals=("moment_arm_error", "angle_scale"),
+    rivals=("moment_arm_error", "soil_shear"),
     joint_title="Gravity or another conservative torque of the angle",
     one_sided=True,
     of_angle=True,

@@ -27,6 +27,6 @@ EFFECT = Effect(
         Parameter("b", "N m s/rad", "of one track", 5000.0, 0.0, 5e5),
     ),
     hooks={"loss": loss},
-    rivals=("viscous_friction",),
+    rivals=("line_loss_quadratic", "viscous_friction"),
     needs=("hydraulics",),
 )

@@ -27,6 +27,6 @@ EFFECT = Effect(
         Parameter("c", "N m s2/rad2", "of one track", 5e4, 0.0, 1e7),
     ),
     hooks={"loss": loss},
-    rivals=("viscous_friction", "line_loss_linear"),
+    rivals=("viscous_friction",),
     needs=("hydraulics",),
 )

@@ -32,7 +32,7 @@ EFFECT = Effect(
         ),
     ),
     hooks={"wind_up": wind_up},
-    rivals=("distributed_contact", "backlash"),
+    rivals=("payne_softening",),
     counts_from_start=True,
     joint_title="Elastic transmission between sensor and joint",
 )

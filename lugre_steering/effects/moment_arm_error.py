@@ -28,6 +28,5 @@ EFFECT = Effect(
         Parameter("quadratic", "1/rad^2", "even part", 0.1, -5.0, 5.0),
     ),
     hooks={"arm": arm},
-    rivals=("kingpin_jacking", "end_stop"),
     needs=("hydraulics",),
 )

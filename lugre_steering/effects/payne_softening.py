@@ -31,6 +31,5 @@ EFFECT = Effect(
         Parameter("angle", "rad", "angle since reversal at which half of it is lost", 0.02, 0.002, 0.3, (0.01, 0.03)),
     ),
     hooks={"tangent": tangent},
-    rivals=("distributed_contact", "linkage_compliance"),
     memory={"since_reversal": 0.0},  # contact angle since the last reversal [rad]
 )

@@ -27,7 +27,7 @@ EFFECT = Effect(
         Parameter("drift", "Pa/s", "rate of the reading's error", 1000.0, -1e5, 1e5),
     ),
     hooks={"line": line},
-    rivals=("slope_bias", "pressure_offset"),
+    rivals=("pressure_offset", "slope_bias"),
     needs=("hydraulics",),
     per_line=True,
     counts_from_start=True,

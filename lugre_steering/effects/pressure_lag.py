@@ -27,6 +27,6 @@ EFFECT = Effect(
         Parameter("tau", "s", "time constant", 0.01, 0.0, 2.0),
     ),
     hooks={"lag": lag},
-    rivals=("time_delay",),
+    rivals=("time_delay", "yaw_inertia"),
     joint_title="Slow torque sensor or filter",
 )

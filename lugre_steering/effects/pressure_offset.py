@@ -27,7 +27,7 @@ EFFECT = Effect(
         Parameter("offset", "Pa", "reading minus true pressure", 5e4, -5e6, 5e6),
     ),
     hooks={"line": line},
-    rivals=("slope_bias", "pressure_drift"),
+    rivals=("slope_bias",),
     needs=("hydraulics",),
     per_line=True,
 )

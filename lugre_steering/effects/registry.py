@@ -70,6 +70,11 @@ def effect(effect_id: str) -> Effect:
     return CATALOGUE[effect_id]
 
 
+def rivals(effect: Effect) -> list[str]:
+    """The entries that an effect is easily taken for, whichever of the two says so."""
+    return [other.id for other in CATALOGUE.values() if other.id in effect.rivals or effect.id in other.rivals]
+
+
 def composed(ids: Iterable[str] | None = None) -> Composition:
     """The step with the effects of these ids in place (default: all that is known)."""
     chosen = set(CATALOGUE if ids is None else ids)

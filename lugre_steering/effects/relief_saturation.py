@@ -53,7 +53,6 @@ EFFECT = Effect(
         Parameter("arm_curvature", "1/rad^2", "of the cylinder arms", 0.1, -5.0, 5.0, optional=True),
     ),
     hooks={"limit": limit},
-    rivals=("end_stop",),
     needs=("hydraulics",),
     variants=ceilings,
 )

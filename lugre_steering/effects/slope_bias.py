@@ -27,7 +27,6 @@ EFFECT = Effect(
         Parameter("torque", "N m", "of the vehicle", 200.0, -3e4, 3e4),
     ),
     hooks={"torque": bias},
-    rivals=("pressure_offset",),
     joint_title="Constant offset",
     one_sided=True,
 )

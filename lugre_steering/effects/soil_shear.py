@@ -36,7 +36,6 @@ EFFECT = Effect(
         Parameter("growth", "1/rad", "of the berm with its distance", 1.0, 0.0, 20.0, optional=True),
     ),
     hooks={"torque": berm},
-    rivals=("end_stop", "kingpin_jacking"),
     memory={"left": 0.0, "right": 0.0},  # farthest push to either side [rad]
     counts_from_start=True,
 )

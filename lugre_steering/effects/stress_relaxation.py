@@ -35,6 +35,6 @@ EFFECT = Effect(
         Parameter("recovery_angle", "rad", "motion that brings the torque back", 0.02, 0.001, 0.5, (0.015, 0.08)),
     ),
     hooks={"elastic": elastic},
-    rivals=("trapped_pressure", "carcass_heat_sink"),
+    rivals=("trapped_pressure",),
     memory={"relaxed": 0.0},  # lost share of the elastic torque
 )

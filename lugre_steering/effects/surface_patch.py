@@ -66,7 +66,7 @@ EFFECT = Effect(
         Parameter("time_end", "s", "end of the time window", 2.0, -10.0, 1e5, example=30.0),
     ),
     hooks={"level": level},
-    rivals=("wear_polishing", "direction_asymmetry"),
+    rivals=("wear_polishing",),
     places=(("angle_low", "angle_high"), ("time_start", "time_end")),
     never_late=True,
     variants=windows,

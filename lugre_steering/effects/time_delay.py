@@ -27,6 +27,6 @@ EFFECT = Effect(
         Parameter("delay", "s", "positive: pressures stamped late", 0.01, -0.5, 0.5),
     ),
     hooks={"delay": late},
-    rivals=("pressure_lag", "yaw_inertia"),
+    rivals=("yaw_inertia",),
     joint_title="Torque stamped late or early",
 )

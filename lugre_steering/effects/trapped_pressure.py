@@ -35,7 +35,6 @@ EFFECT = Effect(
         Parameter("refill_time", "s", "until the torque is back in motion", 0.1, 0.0, 2.0, optional=True),
     ),
     hooks={"limit": limit},
-    rivals=("stress_relaxation",),
     memory={"leaked": 0.0},  # how far trapped oil has leaked away, 0 ... 1
     needs=("hydraulics",),
 )

@@ -28,6 +28,5 @@ EFFECT = Effect(
         Parameter("thinning", "s/rad", "inverse rate at which it has halved", 3.0, 0.0, 100.0, optional=True),
     ),
     hooks={"viscous": viscous},
-    rivals=("line_loss_linear",),
     joint_title="Viscous friction",
 )

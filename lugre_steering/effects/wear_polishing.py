@@ -29,7 +29,6 @@ EFFECT = Effect(
     ),
     joint_title="Friction changes with the distance run",
     hooks={"level": level},
-    rivals=("carcass_heat_sink", "surface_patch", "flash_temperature"),
     memory={"slip": 0.0},  # accumulated |contact angle| [rad]
     counts_from_start=True,
 )

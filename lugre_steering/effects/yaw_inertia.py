@@ -27,6 +27,5 @@ EFFECT = Effect(
         Parameter("inertia", "kg m2", "of one track about its hinge", 200.0, 0.0, 1e5),
     ),
     hooks={"torque": torque},
-    rivals=("time_delay", "pressure_lag"),
     joint_title="Inertia of the moving parts",
 )

@@ -15,9 +15,13 @@ Rules of time (header stamps only, never arrival times):
   believed when the next sample of the same channel confirms it and, for an angle, the other side is there or jumps as
   well. A jump of both sides back in time starts the estimator anew; a side or line that jumps back alone loses its own
   samples in waiting, nothing else. So does a torque that is no finite number start it anew; ``restart`` counts them.
+* A confirmed jump of an angle moves the angle of the model, not its contact: it is never slip and never heat (``doubt``).
+* The feed-forward keeps to limits of value and rate, and goes to zero over a ramp while anything speaks against it
+  (``doubts`` of the estimate says what): a jump, a frozen or noisy angle, a residual that is not plausible, a plan that is
+  not, a temperature or motion outside what the model knows (``release``).
 * A rate that is no number counts as not given; so does one that the angles contradict, which is counted (``absurd_rate``).
 """
 
-from lugre_steering.estimator.estimator import PLAN_POINTS, WAITING_RING, Estimator, Options
+from lugre_steering.estimator.estimator import PLAN_POINTS, WAITING_RING, Estimator, Options, doubts
 
-__all__ = ["PLAN_POINTS", "WAITING_RING", "Estimator", "Options"]
+__all__ = ["PLAN_POINTS", "WAITING_RING", "Estimator", "Options", "doubts"]

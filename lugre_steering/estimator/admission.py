@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numba import njit
 
+from lugre_steering.estimator.doubt import reachable
 from lugre_steering.estimator.layout import (
     ABSURD,
     BACKWARD,
@@ -24,6 +25,10 @@ from lugre_steering.estimator.layout import (
 from lugre_steering.recording import AIR_LIMIT_DEGC, Kind
 
 CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
+
+
+REJECTED, ACCEPTED, JUMPED = range(3)
+"""What ``admit`` says of a sample."""
 
 
 @njit
@@ -43,6 +48,7 @@ def _begin_side(core, side):
     core.state[side] = np.zeros_like(core.state)[side]
     core.motion[side] = np.zeros_like(core.motion)[side]
     core.trust[side] = np.zeros_like(core.trust)[side]
+    core.guard[side] = np.zeros_like(core.guard)[side]
     core.state[side].saturated = saturated
     _clear(core.channels[side])
 
@@ -86,31 +92,34 @@ def _other_side(core, k, stamp_ns):
 
 @njit
 def admit(core, k, stamp_ns, value):
-    """Whether channel ``k`` accepts the sample; counts the reason if not."""
+    """Whether channel ``k`` accepts the sample, and whether its angle jumps; counts the reason if not."""
     c, ch = core.config[0], core.channels[k]
     if stamp_ns <= 0:
         ch.reasons[ZERO] += 1
-        return False
+        return REJECTED
     if not math.isfinite(value):
         ch.reasons[NOT_FINITE] += 1
-        return False
+        return REJECTED
     if (ch.kind == Kind.ANGLE and abs(value) > c.max_angle) or (ch.kind == Kind.PRESSURE and abs(value) > c.max_pressure):
         ch.reasons[ABSURD] += 1
-        return False
+        if ch.kind == Kind.ANGLE:
+            core.guard[ch.index].calm = 0.0
+            core.guard[ch.index].absurd = True
+        return REJECTED
     if (ch.kind == Kind.AIR_TEMPERATURE and abs(value) > AIR_LIMIT_DEGC) or abs(value) > 1e12:
         ch.reasons[ABSURD] += 1
-        return False
+        return REJECTED
     if ch.last_ns == 0:
-        return True
+        return ACCEPTED
     ahead = stamp_ns - ch.last_ns
     if ahead == 0:
         ch.reasons[DUPLICATE] += 1
-        return False
+        return REJECTED
     if -c.backward_jump_ns < ahead < 0:
         ch.reasons[BACKWARD] += 1
-        return False
+        return REJECTED
     if ch.kind == Kind.AIR_TEMPERATURE:  # air may come as rarely as it likes, and no sample of it is needed at any instant
-        return True
+        return ACCEPTED
     follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < CONFIRM_NS
     if ahead < 0 or ahead > c.forward_jump_ns:
         other_side = _other_side(core, k, stamp_ns) if ch.kind == Kind.ANGLE else _THERE
@@ -118,21 +127,24 @@ def admit(core, k, stamp_ns, value):
             ch.reasons[JUMP] += 1
             ch.suspect_ns = stamp_ns
             ch.suspect_value = value
-            return False
+            return REJECTED
         if ahead < 0:
             if other_side == _SHARED:
                 restart(core, k)
-                return True
+                return ACCEPTED
             if ch.kind != Kind.ANGLE:
                 _clear(ch)
-                return True
+                return ACCEPTED
             # This side alone had strayed ahead: it goes on from the sample before, which the stray one made suspect.
             ch.last_ns = ch.suspect_ns
             ch.cursor = ch.head
             ahead = stamp_ns - ch.last_ns
     if ch.kind == Kind.ANGLE:
         reach = c.max_rate * ahead * 1e-9 + 10.0 * c.angle_noise
-        if abs(value - ch.last_value) > reach:
+        change = value - ch.last_value
+        # After absurd readings the next ones are no better than they: the angle is believed where it can have gone.
+        strayed = core.guard[ch.index].absurd and not reachable(core, ch.index, ch.last_ns, stamp_ns, change)
+        if strayed or abs(change) > reach:
             near = (
                 follows_suspect
                 and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
@@ -141,11 +153,13 @@ def admit(core, k, stamp_ns, value):
                 ch.reasons[SPIKE] += 1
                 ch.suspect_ns = stamp_ns
                 ch.suspect_value = value
-                return False
+                return REJECTED
             if ch.head == 1:  # two agree against the first one
                 _begin_side(core, ch.index)
-                return True
+                return ACCEPTED
+            ch.suspect_ns = 0
+            return JUMPED
     if ahead > c.max_gap_ns:
         ch.reasons[GAP] += 1
     ch.suspect_ns = 0
-    return True
+    return ACCEPTED

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -16,8 +16,11 @@ from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.errors import DataError
-from lugre_steering.estimator.admission import admit
+from lugre_steering.estimator.admission import JUMPED, REJECTED, admit
+from lugre_steering.estimator.doubt import DOUBTS, GUARD
+from lugre_steering.estimator.known import known_range
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
+from lugre_steering.estimator.memory import Memory, hand_over, recall, remembered
 from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
@@ -28,10 +31,15 @@ from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
 from lugre_steering.vehicle.model import build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 
+RUBBER_DEGC = (-80.0, 150.0)
 LINE_RING = 8192
 PENDING_RING = 8192
 WAITING_RING = 1024  # one side may come two seconds later than the other, at 500 Hz
 PLAN_POINTS = 1024
+LIMIT_STATIC = 3.0
+LIMIT_RATE_RAD_S = 1.0
+BOUND_RMSE = 5.0
+"""A residual this many times as large as the held-out one of the calibration is implausible."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,11 @@ class Options:
     forward_jump_s: float = quantity(0.1, 1e6, default=10.0)
     max_rate_rad_s: float = quantity(0.01, 1e3, default=10.0)
     feed_forward_horizon_s: float = quantity(0.0, 5.0, default=0.0)
+    feed_forward_limit_Nm: float = quantity(0.0, 1e9, default=0.0)  # of each side; 0: LIMIT_STATIC times static friction
+    feed_forward_rate_limit_Nm_s: float = quantity(0.0, 1e12, default=0.0)  # 0: what the bristle's stiffness makes of LIMIT_RATE
+    withdrawal_ramp_s: float = quantity(0.0, 60.0, default=0.2)
+    recovery_ramp_s: float = quantity(0.0, 60.0, default=1.0)
+    plan_tolerance_rad: float = quantity(0.0, 4.0, default=0.2)
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -59,12 +72,13 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
     for i in range(channel.size):
         k = channel[i]
         core.config[0].message += 1
-        if not admit(core, k, stamp_ns[i], value[i]):
+        verdict = admit(core, k, stamp_ns[i], value[i])
+        if verdict == REJECTED:
             continue
         ch = core.channels[k]
         ch.accepted += 1
         if ch.kind == Kind.ANGLE:
-            n_estimates = advance(core, k, stamp_ns[i], value[i], rate[i], estimates, n_estimates)
+            n_estimates = advance(core, k, stamp_ns[i], value[i], rate[i], verdict == JUMPED, estimates, n_estimates)
         elif ch.kind == Kind.AIR_TEMPERATURE:
             ch.last_ns = stamp_ns[i]
             for side in range(core.state.size):
@@ -109,12 +123,45 @@ class Estimator:
         )
         return estimates[:e], residuals[:r]
 
+    def begin_at(self, rubber_degC: float) -> None:
+        """Rubber temperature [degC] from which every start is made, in place of the vehicle file's; to be given before the first sample.
+
+        Raises ``DataError`` for a vehicle without rubber or a temperature that no rubber has.
+        """
+        if self.vehicle.rubber is None:
+            raise DataError("initial temperature: this vehicle has no rubber, so nothing of it depends on temperature")
+        low, high = RUBBER_DEGC
+        if not low <= rubber_degC <= high:
+            raise DataError(f"initial temperature: got {rubber_degC:g}, expected {low:g} to {high:g} degC")
+        self._core.parameters["rubber_temperature"] = rubber_degC
+
     def set_plan(self, stamp_ns: IntArray, theta: Array) -> None:
-        """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan."""
+        """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan.
+
+        ``DataError`` if it is faster than an angle may be, or begins too far from the present one; the former plan stays.
+        Without points there is no plan any more.
+        """
+        faster = np.abs(np.diff(theta)) > self.options.max_rate_rad_s * np.diff(stamp_ns) * 1e-9
+        if faster.any():
+            raise DataError(f"faster than {self.options.max_rate_rad_s:g} rad/s")
+        if stamp_ns.size and self._away(stamp_ns, theta):
+            raise DataError(f"more than {self.options.plan_tolerance_rad:g} rad from the present angle")
         n = min(stamp_ns.size, self._core.plan_ns.size)
         self._core.plan_ns[:n] = stamp_ns[:n]
         self._core.plan_theta[:, :n] = theta[:, :n]
         self._core.config[0]["plan_size"] = n
+
+    def _away(self, stamp_ns: IntArray, theta: Array) -> bool:
+        """Whether a plan, at the newest angle's stamp or where it begins later, cannot be gone to from there."""
+        for channel, angles in zip(self._core.channels, theta, strict=False):
+            now_ns = int(channel["last_ns"])
+            if now_ns and now_ns <= stamp_ns[-1]:
+                reach = self.options.plan_tolerance_rad + self.options.max_rate_rad_s * max(0.0, (stamp_ns[0] - now_ns) * 1e-9)
+                since = (stamp_ns - stamp_ns[0]) * 1e-9
+                planned = np.interp((now_ns - stamp_ns[0]) * 1e-9, since, angles)
+                if abs(planned - channel["last_value"]) > reach:
+                    return True
+        return False
 
     @property
     def counters(self) -> Mapping[str, Mapping[str, int]]:
@@ -142,6 +189,36 @@ class Estimator:
         """Steps so far with a rubber temperature outside the rubber table."""
         return int(self._core.state["saturated"].sum())
 
+    @property
+    def memory(self) -> Memory:
+        """What the vehicle has been through: rubber temperatures, bristles, memories of effects."""
+        return remembered(self._core, self.vehicle.sides)
+
+    def resume(self, memory: Memory) -> None:
+        """Begin with such a memory, before the first sample; ``DataError`` if it is of another model."""
+        recall(self._core, self.vehicle.sides, memory)
+
+    def continued(self, vehicle: Vehicle) -> Estimator:
+        """An estimator with the model of another file of this vehicle that goes on where this one is, no sample lost.
+
+        ``DataError`` if that file has other sides or inputs.
+        """
+        if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
+            raise DataError("it has other sides, topics or joints")
+        new = Estimator(vehicle, self.options)
+        hand_over(self._core, new._core)
+        return new
+
+    def set_options(self, options: Options) -> None:
+        """Go on with other options."""
+        _set_options(self._core.config, self._core.parameters, options)
+        self.options = options
+
+    def set_released(self, feed_forward: Sequence[float]) -> None:
+        """The feed-forward [N m] of each side was last this; it comes back from there over the recovery ramp."""
+        self._core.released[: len(feed_forward)] = feed_forward
+        self._core.config["weight"] = 0.0
+
     def snapshot(self) -> list[np.ndarray[Any, Any]]:
         """A copy of the whole state, for ``restore``."""
         return [array.copy() for array in self._core]
@@ -152,20 +229,33 @@ class Estimator:
             array[...] = saved
 
 
+def doubts(row: Records) -> list[str]:
+    """Why the feed-forward of an estimate is held back, in words; nothing where it is not."""
+    bits = int(row["doubts"])
+    return [text for bit, text in enumerate(DOUBTS) if bits >> bit & 1]
+
+
 def _label(kind: Kind, name: str) -> str:
     return {Kind.ANGLE: f"angle/{name}", Kind.PRESSURE: f"pressure/{name}"}.get(kind, kind.name.lower())
+
+
+def _set_options(config: Records, parameters: Records, options: Options) -> None:
+    """Write the options as the compiled loop reads them."""
+    for name in ("pair_tolerance", "max_gap", "backward_jump", "forward_jump"):
+        config[f"{name}_ns"] = round(getattr(options, f"{name}_s") * 1e9)
+    config["max_rate"] = options.max_rate_rad_s
+    config["horizon"] = options.feed_forward_horizon_s
+    config["limit"] = options.feed_forward_limit_Nm or LIMIT_STATIC * parameters["static_torque"].max()
+    config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * parameters["sigma_0"].max()
+    config["withdrawal_ramp"], config["recovery_ramp"] = options.withdrawal_ramp_s, options.recovery_ramp_s
+    config["plan_tolerance"] = options.plan_tolerance_rad
 
 
 def _new_core(vehicle: Vehicle, options: Options) -> Core:
     model = build_model(vehicle, lean=True)
     sides = len(vehicle.sides)
     config = np.zeros(1, CONFIG)
-    config["pair_tolerance_ns"] = round(options.pair_tolerance_s * 1e9)
-    config["max_gap_ns"] = round(options.max_gap_s * 1e9)
-    config["backward_jump_ns"] = round(options.backward_jump_s * 1e9)
-    config["forward_jump_ns"] = round(options.forward_jump_s * 1e9)
     config["max_angle"] = math.pi
-    config["max_rate"] = options.max_rate_rad_s
     config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
@@ -173,9 +263,14 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["delay_ns"] = round(delay_s(vehicle) * 1e9)
     config["lag"] = lag_s(vehicle)
     config["effects"] = any(has_effects(p) for p in model.parameters)
-    config["horizon"] = options.feed_forward_horizon_s
     config["message"] = -1
+    config["friction"] = sum(float(p["static_torque"][0]) for p in model.parameters)
+    config["weight"] = 1.0
+    known = known_range(vehicle)
+    config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
 
+    parameters = np.concatenate(model.parameters)
+    _set_options(config, parameters, options)
     channels = np.zeros(len(vehicle.channels), CHANNEL)
     lines = 0
     for row, channel in zip(channels, vehicle.channels, strict=True):
@@ -193,11 +288,14 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     return Core(
         config=config,
         channels=channels,
-        parameters=np.concatenate(model.parameters),
+        parameters=parameters,
         line_parameters=model.lines if vehicle.hydraulics is not None else np.zeros(lines, model.composition.lines),
         state=np.zeros(sides, model.composition.state),
         motion=np.zeros(sides, MOTION),
         trust=np.zeros(sides, TRUST),
+        guard=np.zeros(sides, GUARD),
+        shadow=np.zeros(sides, model.composition.state),
+        released=np.zeros(sides),
         output=np.zeros(sides, OUTPUT),
         waiting=np.zeros((sides, WAITING_RING), WAITING),
         rubber=model.rubber,

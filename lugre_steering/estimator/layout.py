@@ -13,10 +13,10 @@ from lugre_steering.recording import Array, IntArray
 
 REASONS = (
     "duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun",
-    "restart", "absurd_rate",
+    "restart", "absurd_rate", "angle_jump",
 )  # fmt: skip
 (
-    DUPLICATE, BACKWARD, ZERO, NOT_FINITE, ABSURD, SPIKE, JUMP, UNPAIRED, GAP, OVERRUN, RESTART, RATE,
+    DUPLICATE, BACKWARD, ZERO, NOT_FINITE, ABSURD, SPIKE, JUMP, UNPAIRED, GAP, OVERRUN, RESTART, RATE, ANGLE_JUMP,
 ) = range(len(REASONS))  # fmt: skip
 
 ESTIMATE = np.dtype(
@@ -30,6 +30,7 @@ ESTIMATE = np.dtype(
         ("total", np.float64),
         ("predicted", np.float64),  # total as the pressure sensors would show it (lagged)
         ("message", np.int64),  # the pushed message that completed it, counted from 0
+        ("doubts", np.int64),  # bits after ``doubt.DOUBTS``: why the feed-forward is not to be trusted
     ]
 )
 RESIDUAL = np.dtype(
@@ -59,6 +60,24 @@ CONFIG = np.dtype(
         ("pending_count", np.int64),
         ("plan_size", np.int64),
         ("effects", np.bool_),
+        ("swing_ns", np.int64),  # stamp of the last measured torque
+        ("swing_from", np.float64),  # measured torque of late, followed slowly while the angles stand still [N m]
+        ("residual_ns", np.int64),  # stamp of the last residual
+        ("residual_square", np.float64),  # of late [(N m)^2], and the same of the measured and the estimated torque
+        ("measured_square", np.float64),
+        ("estimate_square", np.float64),
+        ("residual_bound", np.float64),  # RMS [N m] beyond which a residual is implausible; 0: none is known
+        ("friction", np.float64),  # static torque of all sides [N m]
+        ("seen_angle", np.float64),  # largest angle [rad] and rate [rad/s] that the calibration saw; inf: not told
+        ("seen_rate", np.float64),
+        ("released_ns", np.int64),  # stamp of the last feed-forward
+        ("weight", np.float64),  # of the feed-forward, 0 ... 1
+        ("limit", np.float64),  # of its value [N m] and rate [N m/s], each side
+        ("rate_limit", np.float64),
+        ("withdrawal_ramp", np.float64),  # [s]
+        ("recovery_ramp", np.float64),  # [s]
+        ("plan_tolerance", np.float64),  # [rad]
+        ("plan_rate", np.float64),  # fastest plan [rad/s]
         ("message", np.int64),  # number of the message being processed, from 0
     ]
 )
@@ -85,6 +104,7 @@ WAITING = np.dtype(
         ("torque", np.float64),
         ("temperature", np.float64),
         ("feed_forward", np.float64),
+        ("doubts", np.int64),
     ]
 )
 
@@ -99,6 +119,9 @@ class Core(NamedTuple):
     state: Records
     motion: Records
     trust: Records
+    guard: Records
+    shadow: Records
+    released: Array
     output: Records
     waiting: Records
     rubber: Array

@@ -8,6 +8,7 @@ from numba import njit
 
 from lugre_steering.chain.hydraulics import moment_arm
 from lugre_steering.chain.step import arm_factor, line_error
+from lugre_steering.estimator.doubt import weigh_pressures, weigh_residual
 
 
 @njit
@@ -72,5 +73,7 @@ def form_residuals(core, first_line, residuals, count):
         r.measured_torque = measured_torque(core, e, value)
         r.residual = r.measured_torque - e.predicted
         r.message = c.message
+        weigh_pressures(core, e.stamp_ns, r.measured_torque)
+        weigh_residual(c, e.stamp_ns, r.measured_torque, r.residual)
         count += 1
     return count

@@ -12,9 +12,20 @@ from lugre_steering.chain.lag import lag_weights
 from lugre_steering.chain.rates import follow
 from lugre_steering.chain.step import step
 from lugre_steering.estimator.admission import restart
+from lugre_steering.estimator.doubt import (
+    RANGE,
+    TABLE,
+    angle_doubts,
+    noise_of,
+    re_anchor,
+    standing_doubts,
+    trust,
+    watch,
+)
 from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
+from lugre_steering.estimator.release import release
 
 LONGEST_PERIOD_NS = 50_000_000  # of a sensor whose stamps may pair by half their period
 
@@ -53,6 +64,7 @@ def _complete(core, k, stamp_ns, e):
     e.stamp_ns = stamp_ns
     e.message = c.message
     e.total = 0.0
+    e.doubts = standing_doubts(core, stamp_ns)
     for side in range(core.waiting.shape[0]):
         w = core.waiting[side, core.channels[side].cursor % ring]
         core.channels[side].cursor += 1
@@ -61,7 +73,9 @@ def _complete(core, k, stamp_ns, e):
         e.torque[side] = w.torque
         e.temperature[side] = w.temperature
         e.feed_forward[side] = w.feed_forward
+        e.doubts |= w.doubts
         e.total += w.torque
+    release(core, e)
     if not math.isfinite(e.total):
         e.predicted = e.total
         restart(core, k)
@@ -83,8 +97,11 @@ def _complete(core, k, stamp_ns, e):
 
 
 @njit
-def advance(core, k, stamp_ns, value, rate, estimates, count):
-    """One accepted angle sample: advance its side, and publish when the other side has the same stamp."""
+def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
+    """One accepted angle sample: advance its side, and publish when the other side has the same stamp.
+
+    ``jumped``: a confirmed jump, which moves the angle but not the contact.
+    """
     c, ch = core.config[0], core.channels[k]
     side = ch.index
     if c.start_ns == 0 or stamp_ns < c.start_ns:
@@ -95,25 +112,30 @@ def advance(core, k, stamp_ns, value, rate, estimates, count):
     else:
         ch.period_ns = stamp_ns - ch.last_ns
         dt = ch.period_ns * 1e-9
-    trust = core.trust[side]
-    rate = believed(trust, ch, c, dt, value, rate)
+    motion, saturated = core.motion[side], core.state[side].saturated
+    if jumped:
+        re_anchor(core, side, ch, stamp_ns, value)
+    else:
+        rates = core.trust[side]
+        rate = believed(rates, ch, c, dt, value, rate)
+        watch(core, side, ch, dt, value)
+        before = motion.theta if motion.started != 0.0 else value
+        follow(motion, dt, value, rate, noise_of(core, side))
+        rates.travel += abs(motion.theta - before)
+        step(
+            core.parameters[side],
+            core.state[side],
+            core.rubber,
+            core.output[side],
+            dt,
+            motion.theta,
+            motion.omega,
+            motion.alpha,
+            c.effects,
+        )
+        trust(core, side, dt)
     ch.last_ns = stamp_ns
     ch.last_value = value
-    motion = core.motion[side]
-    before = motion.theta if motion.started != 0.0 else value
-    follow(motion, dt, value, rate, c.angle_noise)
-    trust.travel += abs(motion.theta - before)
-    step(
-        core.parameters[side],
-        core.state[side],
-        core.rubber,
-        core.output[side],
-        dt,
-        motion.theta,
-        motion.omega,
-        motion.alpha,
-        c.effects,
-    )
     ring = core.waiting.shape[1]
     if ch.head - ch.cursor == ring:
         ch.reasons[UNPAIRED] += 1
@@ -125,6 +147,11 @@ def advance(core, k, stamp_ns, value, rate, estimates, count):
     waiting.omega = motion.omega
     waiting.torque = core.output[side].torque
     waiting.temperature = core.output[side].temperature
+    waiting.doubts = angle_doubts(core, side, stamp_ns)
+    if core.state[side].saturated > saturated:
+        waiting.doubts |= TABLE
+    if abs(motion.theta) > c.seen_angle or abs(motion.omega) > c.seen_rate:
+        waiting.doubts |= RANGE
     waiting.feed_forward = preview(core, side, stamp_ns)
     latest = _pair(core)
     if latest == 0:

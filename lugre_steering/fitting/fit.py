@@ -76,7 +76,7 @@ def fit(
     p0 = np.concatenate([x0 / scale, [parameter.scaled(values0[i].get(parameter.name, 0.0)) for i, parameter in free]])
     low = np.concatenate([low / scale, [parameter.scaled(parameter.low) for _, parameter in free]])
     high = np.concatenate([high / scale, [parameter.scaled(parameter.high) for _, parameter in free]])
-    prior = np.array([float(priors)] * len(problem.calibrations) + [0.3] * len(problem.runs) + [0.0] * len(free))
+    prior = np.concatenate([problem.prior_weights(priors), np.zeros(len(free))])
     n = problem.nuisances
 
     def unpack(p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:
@@ -169,8 +169,8 @@ def _column(
     moved = p.copy()
     moved[j] += step
     x, effects = unpack(moved)
-    bag = j - len(problem.calibrations)
-    if 0 <= bag < len(problem.runs) and j < nuisances:
+    if len(problem.calibrations) <= j < nuisances:
+        bag = (j - len(problem.calibrations)) % len(problem.runs)
         column = np.zeros_like(base)
         part = slice(problem.edges[bag], problem.edges[bag + 1])
         column[part] = (problem.predict(bag, x, effects) - base[part]) / step

@@ -37,6 +37,8 @@ AT_LEAST = 0.5
 """Share of the noise that the sheet gives its sensors, below which none is believed to be."""
 SLOW_MEMORY_S, SURENESS, LEAST_REST_S = 0.4, 3.0, 2.0
 """Memory of slow noise, standard deviations of its estimate that are allowed for, and the shortest standstill counted."""
+ROUNDING_DOUBT = 0.75
+"""Energy, in noise variances, by which the error of steps that no noise dithers may exceed its draws: it is no chance."""
 SUDDEN = 3.0
 """Times its expected fast energy beyond which a window holds an event rather than noise."""
 
@@ -188,21 +190,40 @@ def _parts(problem: Problem) -> list[tuple[Run, slice]]:
 
 def repeated_motion(problem: Problem, draws: int, seed: int) -> list[list[Run]]:
     """The runs of each bag with their motion as ``draws`` fresh draws of angle noise would have shown it."""
-    sheet = angle_noise(problem.vehicle)
-
     def repeat(bag: int) -> list[Run]:
         rng, run = np.random.default_rng([seed, bag]), problem.runs[bag]
         # One sensor for both tracks makes one error.
         sensors = 1 if problem.vehicle.sensors.angle_from else len(run.theta)
+        sigma = run.angle.sigma() or angle_noise(problem.vehicle)
         repeated = []
         for _ in range(draws):
-            noisy = run.theta + sheet * rng.standard_normal((sensors, run.time.size))
-            theta = np.array([smooth_angle(row, sheet) for row in noisy])
+            noisy = _sensed_again(run, sigma, rng, sensors)
+            theta = np.array([smooth_angle(row, sigma) for row in noisy])
             omega, alpha = motion(run.time, theta)
             repeated.append(replace(run, theta=theta, omega=omega, alpha=alpha))
         return repeated
 
     return in_threads(repeat, range(len(problem.runs)))
+
+
+def _sensed_again(run: Run, sigma: float, rng: np.random.Generator, sensors: int) -> Array:
+    """Angles (sides, n) [rad] as the sensor might have shown them too: white noise, and steps where it does not dither them."""
+    draw = rng.standard_normal((sensors, run.time.size))
+    if not run.angle.coarse:
+        return np.asarray(run.theta + sigma * draw)
+    step, shift = run.angle.resolution, rng.uniform(0.0, 1.0, (sensors, 1))
+    return np.asarray((np.round((run.theta + run.angle.noise * draw) / step + shift) - shift) * step)
+
+
+def rounding_error(run: Run, rng: np.random.Generator) -> Array:
+    """Torque error (n,) [N m] that coarse pressure sensors make: rounding of smoothed pressures at a drawn place of the grid."""
+    error = np.zeros(run.time.size)
+    width = max(1, round(WINDOW_S / (run.time[1] - run.time[0])))
+    for step, gain, pressure in zip(run.rounding, run.torque_per_line, run.pressure, strict=False):
+        if step > 0.0:
+            place = uniform_filter1d(pressure, width) / step + rng.uniform()
+            error += gain * step * (np.round(place) - place)
+    return error
 
 
 def noise_model(
@@ -232,10 +253,13 @@ def noise_model(
             swift_sigma = np.maximum(np.sqrt(fast_variance(run, problem.measured[part] - base[part], known)), AT_LEAST * run.sigma)
             if quiet.assumed:  # white noise is as strong below as above
                 slow *= float(np.mean(swift_sigma / (np.std(swift) * run.sigma)))
+        if run.rounding.size:
+            errors[bag] = errors[bag] + np.array([rounding_error(run, rng) for _ in range(draws)])
         variance = uniform_filter1d(np.mean(errors[bag] ** 2, axis=0), max(1, round(MOTION_PROFILE_S / dt)))
         slow_variance = np.var(slow) * run.sigma**2
         sigmas.append(np.sqrt(slow_variance + swift_sigma**2 + variance))
-        doubts.append(slow_doubt(run) * slow_variance / sigmas[-1] ** 2)
+        coarse = ROUNDING_DOUBT if run.angle.coarse or run.rounding.size else 0.0
+        doubts.append(slow_doubt(run) * slow_variance / sigmas[-1] ** 2 + coarse)
         residuals.append(slow * run.sigma + swift / np.std(swift) * swift_sigma - errors[bag])
     sigma = np.concatenate(sigmas)
     return Noise(sigma, np.concatenate(residuals, axis=1), float(np.mean(np.concatenate(doubts))))

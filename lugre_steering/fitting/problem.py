@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -75,6 +75,10 @@ COOLING = Calibration("cooling", ("cooling",), 0.15, -0.6, 0.6)
 KINGPIN = Calibration("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
 GAIN = Calibration("pressure_gain", (), 0.03, -0.3, 0.3)
 """Scales the torque that the pressures show, no field of the chain."""
+EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 50.0
+"""Rubber over air at the start of a bag beyond that of the vehicle file: standard deviation and range; 30 K after a drive."""
+AIR_K, AIR_FAR_K, AIR_KNOWN_K = 15.0, 50.0, 1.0
+"""Air against the vehicle file where none was recorded: standard deviation and range; standard deviation where it was."""
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
 
 
@@ -165,7 +169,11 @@ def resized(effect: Effect, size: Size) -> Effect:
 
 
 class Problem:
-    """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, effect parameters)."""
+    """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, weather, effect parameters).
+
+    Weather, of a vehicle with rubber: what the rubber is warmer than the air at the start of each bag, beyond the vehicle file [K],
+    then what the air of each bag is warmer than recorded, or than the vehicle file says [K].
+    """
 
     def __init__(
         self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None
@@ -186,20 +194,49 @@ class Problem:
 
     @property
     def nuisances(self) -> int:
-        """Calibration values and one initial bristle deflection per bag."""
-        return len(self.calibrations) + len(self.runs)
+        """Calibration values, one initial bristle deflection per bag, and its weather."""
+        return len(self.calibrations) + len(self.runs) + self._weather[0].size
 
     def start(self) -> Array:
         return np.zeros(self.nuisances)
 
     def scales(self) -> Array:
         """Finite-difference and normalisation scale of the nuisance part of x."""
-        return np.array([c.prior for c in self.calibrations] + [1.0] * len(self.runs))
+        return np.concatenate([[c.prior for c in self.calibrations] + [1.0] * len(self.runs), self._weather[0]])
+
+    def prior_weights(self, priors: bool) -> Array:
+        """Weight of the prior on each scaled nuisance; the sheet's off without ``priors``, but weather has no other source."""
+        return np.array([float(priors)] * len(self.calibrations) + [0.3] * len(self.runs) + [1.0] * self._weather[0].size)
 
     def bounds(self) -> tuple[Array, Array]:
-        low = np.array([c.low for c in self.calibrations] + [-1.5] * len(self.runs))
-        high = np.array([c.high for c in self.calibrations] + [1.5] * len(self.runs))
+        _, coldest, warmest = self._weather
+        low = np.concatenate([[c.low for c in self.calibrations] + [-1.5] * len(self.runs), coldest])
+        high = np.concatenate([[c.high for c in self.calibrations] + [1.5] * len(self.runs), warmest])
         return low, high
+
+    @cached_property
+    def _weather(self) -> tuple[Array, Array, Array]:
+        """Standard deviation, lowest and highest value of each weather nuisance."""
+        if self.vehicle.rubber is None:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        excess = [(EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K)] * len(self.runs)
+        unknown, known = (AIR_K, -AIR_FAR_K, AIR_FAR_K), (AIR_KNOWN_K, -4.0 * AIR_KNOWN_K, 4.0 * AIR_KNOWN_K)
+        air = [unknown if run.first_air is None else known for run in self.runs]
+        deviation, low, high = np.array(excess + air).T
+        return deviation, low, high
+
+    def one_bag(self, x: Array) -> Array:
+        """The calibration of x for another run alone, with bristle and weather of the vehicle file."""
+        return np.concatenate([x[: len(self.calibrations)], np.zeros(1 if self.vehicle.rubber is None else 3)])
+
+    def temperatures(self, bag: int, x: Array) -> tuple[float, float]:
+        """Rubber and air [degC] at the start of a bag; of a vehicle with rubber."""
+        initial = self.vehicle.initial
+        assert initial is not None
+        first, recorded = len(self.calibrations) + len(self.runs), self.runs[bag].first_air
+        excess, warmer = float(x[first + bag]), float(x[first + len(self.runs) + bag])
+        air = (initial.air_temperature_degC if recorded is None else recorded) + warmer
+        return air + initial.rubber_temperature_degC - initial.air_temperature_degC + excess, air
 
     def fields(self, x: Array) -> dict[str, float]:
         """Baseline parameter-record values for the calibration part of x."""
@@ -230,12 +267,16 @@ class Problem:
         for field, value in self.fields(x).items():
             record[field] = value
         record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
+        warmer = 0.0
+        if self.vehicle.rubber is not None:
+            record["rubber_temperature"], record["air_temperature"] = self.temperatures(bag, x)
+            warmer = float(x[len(self.calibrations) + 2 * len(self.runs) + bag])
         phases = []
         for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)}):
             acting = record.copy()
             for since, air in run.air:
                 if since <= start:
-                    acting["air_temperature"] = air
+                    acting["air_temperature"] = air + warmer
             for candidate, values in effects:
                 for name, value in values.items() if candidate.start(bag) <= start else ():
                     if not candidate.effect.per_line:

@@ -69,7 +69,8 @@ def outliers(value: Array) -> IntArray:
         return np.empty(0, np.int64)
     low, high = np.quantile(value, [0.01, 0.99])
     usual = max(float(np.quantile(np.abs(step), 0.95)), 1e-3 * float(high - low))
-    found = (step[:-1] * step[1:] < 0.0) & (np.minimum(np.abs(step[:-1]), np.abs(step[1:])) > OUTLIER_FACTOR * usual)
+    with np.errstate(over="ignore"):  # what overflows is farther than any outlier
+        found = (step[:-1] * step[1:] < 0.0) & (np.minimum(np.abs(step[:-1]), np.abs(step[1:])) > OUTLIER_FACTOR * usual)
     return np.flatnonzero(found) + 1
 
 

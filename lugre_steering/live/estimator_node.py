@@ -1,102 +1,159 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The node: each input message is one sample pushed into the estimator; what comes out is published at once."""
+"""The managed node: its life cycle, its parameters, its services, its report; the samples are the session's."""
 
 from __future__ import annotations
 
-import math
+import threading
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import WrenchStamped
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import FluidPressure, JointState, Temperature
-from trajectory_msgs.msg import JointTrajectory
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
-from lugre_steering.ackermann import other_track
-from lugre_steering.chain.step import Records
-from lugre_steering.errors import DataError
-from lugre_steering.estimator import Estimator, Options
-from lugre_steering.live.health import Health
-from lugre_steering.live.outputs import Outputs
-from lugre_steering.live.parameters import declare
-from lugre_steering.live.plan import planned_angles
-from lugre_steering.recording import NODE, Kind
+from lugre_steering.effects.registry import add_files
+from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.live.console import Console
+from lugre_steering.live.parameters import changed, declare
+from lugre_steering.live.session import Session
+from lugre_steering.live.state_file import read_state, write_state
+from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
 
 LATENCY_WINDOW = 4096
+REPORT_S = 1.0
+TICK_S = 0.02
+NEWS_S = 0.1
+"""A change of what speaks against the feed-forward is reported this soon, or this long after the report before."""
+NAMES_EVERY = 5
+"""Reports: how often the network is asked for a node of the same name."""
 
-_SCALARS: Mapping[Kind, tuple[type, Callable[[Any], float]]] = {
-    Kind.PRESSURE: (FluidPressure, lambda message: message.fluid_pressure),
-    Kind.AIR_TEMPERATURE: (Temperature, lambda message: message.temperature),
-    Kind.TORQUE: (WrenchStamped, lambda message: message.wrench.torque.z),
-}
 
-
-class SteeringTorqueEstimator(Node):
-    """See INTERFACE: topics in, topics out. Raises ``LugreSteeringError`` for bad parameters or a bad vehicle file."""
+class SteeringTorqueEstimator(LifecycleNode):
+    """See INTERFACE: topics in, topics out. Raises ``LugreSteeringError`` for bad parameters; ``start`` for a bad vehicle file."""
 
     def __init__(self, *, latency_window: int = LATENCY_WINDOW) -> None:
         super().__init__(NODE)
-        self.settings = settings = declare(self)
+        self.settings = declare(self)
+        self.session: Session | None = None
+        self.callbacks = 0
+        self.last_exception = ""
+        self._refusal: LugreSteeringError | None = None
+        self._latency_window = latency_window
+        self._began_ns = self._reported_ns = self._saved_ns = time.monotonic_ns()
+        self._reports = 0
+        self._namesakes = 0
+        self._console = Console(self.get_logger())
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        # Steady, so that health is reported while simulated time stands still.
+        self.create_timer(TICK_S, self.guarded(self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_service(Trigger, "~/reload", self._reload)
+        self._writer: threading.Thread | None = None
+        change = self._service_change_state
+        change.callback = self._answered(change.callback)
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._take_over)
+
+    def start(self) -> None:
+        """Configure and activate, unless a lifecycle manager is to do so. Raises what makes that impossible."""
+        if not self.settings.autostart:
+            self.get_logger().info("not configured (autostart is false), ready for a lifecycle manager")
+            return
+        for step in (self.trigger_configure, self.trigger_activate):
+            if step() != TransitionCallbackReturn.SUCCESS:
+                raise self._refusal or DataError(self.last_exception or "the node cannot be started")
+
+    # ------------------------------------------------------------ life cycle
+
+    def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Load the vehicle file, compile or load compiled code, join the topics; the state begins to follow the inputs."""
+        begin = time.monotonic()
+        try:
+            vehicle = self._load(self.settings.vehicle_file)
+            self.get_logger().info("loading compiled code (the first start compiles it, which takes up to a minute)")
+            self.session = Session(self, self.settings, vehicle, self.guarded, self._latency_window)
+        except LugreSteeringError as error:
+            self._refusal = error
+            self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it
+            self.fault(error)
+            return TransitionCallbackReturn.ERROR
+        self._restore(self.session)
+        self.get_logger().info(
+            f"'{vehicle.name}' ready, executor '{self.settings.executor}'; compiled code loaded in {time.monotonic() - begin:.2f} s"
+        )
+        return TransitionCallbackReturn.SUCCESS
+
+    def _load(self, file: Path) -> Vehicle:
+        """The vehicle file, with what is doubtful in it told as warnings."""
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always")
-            self.vehicle = load(settings.vehicle_file)
+            add_files(self.settings.effects_files)
+            vehicle = load(file)
         for doubt in doubts:
             self.get_logger().warning(str(doubt.message))
-        begin = time.monotonic()
-        self.get_logger().info("loading compiled code (the first start compiles it, which takes up to a minute)")
-        warm_up(self.vehicle, settings.options)
-        self.estimator = Estimator(self.vehicle, settings.options)
-        self.health = Health(self.vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
-        self.outputs = Outputs(self, self.vehicle, settings)
-        self._fresh_ns = round(settings.angle_timeout_s * 1e9)
-        self._joints = [getattr(self.vehicle.topics, f"{side}_joint") for side in self.vehicle.sides]
-        self._torque_ns = 0  # stamp of the newest torque
-        self._now_ns: Callable[[], int] = time.time_ns
-        self._choose_clock()
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._reported_ns = time.monotonic_ns()
-        # Steady, so that health is reported while simulated time stands still.
-        self.create_timer(1.0, self._guarded(self._report), clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._subscribe()
-        self.get_logger().info(
-            f"'{self.vehicle.name}' ready, executor '{settings.executor}'; "
-            f"compiled code loaded in {time.monotonic() - begin:.2f} s"
-        )
+        return vehicle
 
-    # --------------------------------------------------------------- inputs
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        if self.session is not None:
+            self.session.activate()
+        return super().on_activate(state)
 
-    def _subscribe(self) -> None:
-        """One subscription per resolved topic; joints that share a topic share its subscription."""
-        qos = QoSProfile(depth=self.settings.input_depth, reliability=ReliabilityPolicy.BEST_EFFORT)
-        joints: dict[str, list[tuple[int, str]]] = {}
-        topics = []
-        for index, channel in enumerate(self.vehicle.channels):
-            topic = self.resolve_topic_name(channel.topic)
-            topics.append(topic)
-            if channel.kind is Kind.ANGLE:
-                joints.setdefault(topic, []).append((index, channel.joint))
-                continue
-            message_type, read = _SCALARS[channel.kind]
-            self.create_subscription(message_type, channel.topic, self._guarded(self._scalar(index, read)), qos)
-        for topic, wanted in joints.items():
-            name = self.vehicle.channels[wanted[0][0]].topic  # not yet remapped: create_subscription does that
-            self.create_subscription(JointState, name, self._guarded(self._joint_state(topic, wanted)), qos)
-        self.create_subscription(JointTrajectory, "steering/command", self._guarded(self._command), qos)
-        self.health.set_topics(topics)
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Outputs to zero and silent; the state goes on."""
+        if self.session is not None:
+            self.session.deactivate()
+        self.save()
+        return super().on_deactivate(state)
 
-    def _guarded(self, handle: Callable[..., None]) -> Callable[..., None]:
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._leave()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._leave()
+        return super().on_shutdown(state)
+
+    def on_error(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """After an exception in a transition: back to unconfigured, from where it can be configured anew."""
+        self._leave()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _leave(self) -> None:
+        self.save()
+        session, self.session = self.session, None
+        if session is not None:
+            session.close()
+
+    def _answered(self, change: Callable[..., Any]) -> Callable[..., Any]:
+        """A transition that is not possible now is refused; out of rclpy's service it would come as an exception."""
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return change(request, response)
+            except RCLError as error:
+                self.get_logger().warning(f"transition refused: {' '.join(str(error).split())}")
+                response.success = False
+                return response
+
+        return answer
+
+    # ----------------------------------------------------- faults and report
+
+    def guarded(self, handle: Callable[..., None]) -> Callable[..., None]:
         """``handle``, made unable to end the node: an exception would escape spin."""
 
         def callback(*message: Any) -> None:
-            self.health.callbacks += 1
+            self.callbacks += 1
             try:
                 handle(*message)
             except Exception as error:
@@ -106,125 +163,106 @@ class SteeringTorqueEstimator(Node):
 
     def fault(self, error: BaseException) -> None:
         """Count an exception, report it, and withhold the outputs for a while."""
-        self.health.fault(error, time.monotonic_ns())
-        self.outputs.interrupt_commands()
-        self.get_logger().error(f"{type(error).__name__}: {error}", throttle_duration_sec=1.0)
+        self.last_exception = f"{type(error).__name__}: {error}"
+        if self.session is not None:
+            self.session.health.fault(error, time.monotonic_ns())
+            self.session.outputs.interrupt_commands()
+        self.get_logger().error(self.last_exception, throttle_duration_sec=1.0)
 
-    def _joint_state(self, topic: str, wanted: list[tuple[int, str]]) -> Callable[[Any], None]:
-        told_apart = len({joint for _, joint in wanted}) == 1  # without names
-
-        def handle(message: Any) -> None:
-            names, position, velocity = message.name, message.position, message.velocity
-            stamp_ns = _nanoseconds(message.header.stamp)
-            carried = False
-            for channel, joint in wanted:
-                if joint in names:
-                    i = names.index(joint)
-                elif names or not told_apart:
-                    continue
-                else:
-                    i = 0
-                carried = True
-                angle = position[i] if i < len(position) else math.nan
-                rate = velocity[i] if i < len(velocity) else math.nan
-                if ratio := self.vehicle.channels[channel].ackermann:
-                    angle, rate = map(float, other_track(np.array(angle), np.array(rate), ratio))
-                self._push(channel, stamp_ns, angle, rate)
-            if not carried:
-                self.health.foreign[topic] += 1
-
-        return handle
-
-    def _scalar(self, channel: int, read: Callable[[Any], float]) -> Callable[[Any], None]:
-        def handle(message: Any) -> None:
-            self._push(channel, _nanoseconds(message.header.stamp), read(message), math.nan)
-
-        return handle
-
-    def _command(self, message: Any) -> None:
-        latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
-        try:
-            times, angles = planned_angles(message, self._joints, latest_ns)
-        except DataError as error:
-            self.health.unused[f"steering/command: {error}"] += 1
+    def _tick(self) -> None:
+        session, now_ns = self.session, time.monotonic_ns()
+        waited_s = (now_ns - self._reported_ns) * 1e-9
+        if session is None:
+            if waited_s >= REPORT_S:
+                self._reported_ns = now_ns
+                self._diagnose([DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{NODE}: outputs", message="not configured")])
             return
-        self.estimator.set_plan(times, angles)
+        session.tick()
+        if waited_s >= REPORT_S or (session.news and waited_s >= NEWS_S):
+            self._report(session, now_ns)
 
-    # -------------------------------------------------------------- outputs
-
-    def _push(self, channel: int, stamp_ns: int, value: float, rate: float) -> None:
-        # Arrival is the begin of the callback: the time of reception that rclpy offers (MessageInfo) makes
-        # EventsExecutor of rclpy 7.1 raise SystemError.
-        begin_ns = time.monotonic_ns()
-        health = self.health
-        now_ns = self._now_ns()
-        health.arrivals[channel] += 1
-        health.arrived_ns[channel] = now_ns
-        health.behind_ns[channel] = now_ns - stamp_ns
-        estimates, residuals = self.estimator.push(channel, stamp_ns, value, rate)
-        if estimates.size:
-            self._publish(estimates[0], begin_ns)
-        for residual in residuals:
-            if self.outputs.residual(residual):
-                health.add_residual(float(residual["residual"]), float(residual["measured_torque"]))
-            else:
-                health.withheld["residual is not a finite number"] += 1
-
-    def _publish(self, row: Records, begin_ns: int) -> None:
-        health, outputs = self.health, self.outputs
-        stamp_ns = int(row["stamp_ns"])
-        if stamp_ns <= self._torque_ns:  # the estimator began anew
-            outputs.interrupt_commands()
-        self._torque_ns = stamp_ns
-        if health.faulty(begin_ns):
-            self._withhold("after an exception")
-            return
-        if not outputs.torque(stamp_ns, float(row["total"])):
-            self._withhold("torque is not a finite number")
-            return
-        now_ns = self._now_ns()
-        health.estimates += 1
-        health.arrival_to_publish.add(time.monotonic_ns() - begin_ns)
-        health.stamp_to_publish.add(now_ns - stamp_ns)
-        if not outputs.estimate(stamp_ns, row):
-            self._withhold("estimate is not a finite number")
-        elif abs(now_ns - stamp_ns) <= self._fresh_ns:
-            outputs.commands(now_ns, row)
-        elif self.settings.publish_commands:
-            self._withhold("commands: stamps are not close to the clock")
-
-    def _withhold(self, reason: str) -> None:
-        self.health.withheld[reason] += 1
-        self.outputs.interrupt_commands()
-
-    def _choose_clock(self) -> None:
-        """ROS time: simulated time where it is in use, else the system clock itself (30 times cheaper to read)."""
-        clock = self.get_clock()
-        self._now_ns = (lambda: int(clock.now().nanoseconds)) if clock.ros_time_is_active else time.time_ns
-
-    def _report(self) -> None:
-        self._choose_clock()
-        monotonic_ns = time.monotonic_ns()
+    def _report(self, session: Session, monotonic_ns: int) -> None:
+        session.choose_clock()
         elapsed_s = (monotonic_ns - self._reported_ns) * 1e-9
         self._reported_ns = monotonic_ns
-        message = DiagnosticArray()
+        if self._reports % NAMES_EVERY == 0:
+            own = self.get_name(), self.get_namespace()
+            session.health.namesakes = self.get_node_names_and_namespaces().count(own) - 1
+        self._reports += 1
+        statuses = session.statuses(monotonic_ns, elapsed_s)
+        self._diagnose(statuses)
+        self._console.tell(statuses, (monotonic_ns - self._began_ns) * 1e-9)
+        due = monotonic_ns - self._saved_ns >= self.settings.state_period_s * 1e9
+        if due and (self._writer is None or not self._writer.is_alive()):
+            self._writer = threading.Thread(target=self._to_write(), daemon=True)  # a disk may be slow
+            self._writer.start()
+
+    def _diagnose(self, statuses: list[DiagnosticStatus]) -> None:
+        message = DiagnosticArray(status=statuses)
         message.header.stamp = self.get_clock().now().to_msg()
-        message.status = self.health.statuses(
-            self._now_ns(), monotonic_ns, elapsed_s, self.estimator.counters, self.estimator.saturated_steps
-        )
         self._diagnostics.publish(message)
 
+    # ------------------------------------------------- parameters and files
 
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
+    def _check(self, changes: Sequence[Parameter]) -> SetParametersResult:
+        try:
+            changed(self, changes)
+        except LugreSteeringError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
+    def _take_over(self, changes: Sequence[Parameter]) -> None:
+        self.settings = changed(self, changes)
+        if self.session is not None:
+            self.session.change(self.settings)
 
-def warm_up(vehicle: Vehicle, options: Options) -> None:
-    """Compile, or load from the cache, everything that callbacks call, on an estimator that is then thrown away."""
-    estimator = Estimator(vehicle, options)
-    for step in range(1, 200):
-        stamp_ns = 1_000_000_000 + step * 10_000_000
-        if step == 100:
-            estimator.set_plan(np.array([stamp_ns, 2 * stamp_ns], np.int64), np.zeros((len(vehicle.sides), 2)))
-        for channel in range(len(vehicle.channels)):
-            estimator.push(channel, stamp_ns, 1e-3 * step)
+    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Take over what ``vehicle_file`` says now, all of it or nothing."""
+        try:
+            if self.session is None:
+                raise DataError("the node is not configured")
+            vehicle = self._load(self.settings.vehicle_file)
+            self.session.reload(vehicle)
+            response.success, response.message = True, f"'{vehicle.name}' taken over"
+        except DataError as error:
+            response.success, response.message = False, f"{self.settings.vehicle_file}: {error}; cleanup and configure instead"
+        except LugreSteeringError as error:
+            response.success, response.message = False, str(error)
+        except Exception as error:  # would end the service, and the caller would wait for ever
+            self.fault(error)
+            response.success, response.message = False, self.last_exception
+        self.get_logger().info(f"reload: {response.message}")
+        return response
+
+    def _restore(self, session: Session) -> None:
+        file = self.settings.state_file
+        if file is None or not file.exists():
+            return
+        try:
+            session.estimator.resume(read_state(file, session.vehicle, time.time_ns(), self.settings.state_max_age_s))
+            self.get_logger().info(f"{file}: temperatures and bristles taken over")
+        except DataError as error:
+            self.get_logger().warning(f"state not used: {error}")
+
+    def save(self) -> None:
+        """Write the state file now."""
+        if self._writer is not None:
+            self._writer.join()
+        self._to_write()()
+
+    def _to_write(self) -> Callable[[], None]:
+        """What writes the present state, if there is to be a file and anything to keep; a failure is told, not raised."""
+        self._saved_ns = time.monotonic_ns()
+        file, session = self.settings.state_file, self.session
+        memory = session.estimator.memory if session is not None and file is not None else None
+        vehicle = session.vehicle if session is not None else None
+
+        def write() -> None:
+            if file is None or vehicle is None or not memory or not memory["sides"]:
+                return
+            try:
+                write_state(file, vehicle, memory)
+            except (OSError, ValueError) as error:
+                self.get_logger().warning(f"{file}: state cannot be written: {error}", throttle_duration_sec=30.0)
+
+        return write

@@ -18,6 +18,8 @@ from lugre_steering.vehicle import Vehicle
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 FAULT_HOLD_NS = 1_000_000_000
 RESIDUAL_SECONDS = 10
+FAR_NS = 10_000_000_000
+"""A clock that is wrong by more than that is another clock."""
 
 
 class Window:
@@ -47,9 +49,15 @@ class Health:
 
     def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int) -> None:
         self._node = NODE
+        self.active = True
+        self.simulated = False
+        self.namesakes = 0  # other nodes of the same name
+        self.doubted: Counter[str] = Counter()  # torques whose feed-forward was held back, by reason
+        self._then_doubted: Counter[str] = Counter()
         self._kinds = [channel.kind for channel in vehicle.channels]
         self._topics: list[str] = [""] * len(self._kinds)
-        self._timeouts_s = [angle_timeout_s if kind is Kind.ANGLE else pressure_timeout_s for kind in self._kinds]
+        self._timeouts_s: list[float] = []
+        self.set_timeouts(angle_timeout_s, pressure_timeout_s)
         self.arrivals = [0] * len(self._kinds)
         self.arrived_ns = [0] * len(self._kinds)  # ROS time of the last message
         self.behind_ns = [0] * len(self._kinds)  # ROS time minus stamp of the last message
@@ -74,6 +82,13 @@ class Health:
         self._then_exceptions = 0
         self._then_withheld: Counter[str] = Counter()
         self._then_estimates = 0
+
+    def set_timeouts(self, angle_timeout_s: float, pressure_timeout_s: float) -> None:
+        self._timeouts_s = [angle_timeout_s if kind is Kind.ANGLE else pressure_timeout_s for kind in self._kinds]
+
+    def set_vehicle(self, vehicle: Vehicle) -> None:
+        """Another file of the same vehicle."""
+        self._vehicle = vehicle
 
     def set_topics(self, topics: Sequence[str]) -> None:
         """Full names of the input topics, in the order of the channels."""
@@ -134,8 +149,12 @@ class Health:
                 troubles.append(f"{label} missing" if not self.arrivals[i] else f"{label} stale")
                 level = max(level, ERROR if self._kinds[i] is Kind.ANGLE else WARN)
             elif abs(self.behind_ns[i]) > self._timeouts_s[i] * 1e9:
-                troubles.append(f"{label} stamps are not close to the clock")
+                hint = "" if self.simulated or abs(self.behind_ns[i]) < FAR_NS else " (is use_sim_time to be set?)"
+                troubles.append(f"{label} stamps are not close to the clock{hint}")
                 level = max(level, WARN)
+        if self.namesakes:
+            troubles.append(f"{self.namesakes} other node{'s' * (self.namesakes > 1)} of this name: their outputs mix with these")
+            level = max(level, WARN)
         return self._status("inputs", level, "; ".join(troubles) or "all inputs arrive", values)
 
     def _rejected(self, counters: Mapping[str, Mapping[str, int]]) -> DiagnosticStatus:
@@ -186,18 +205,26 @@ class Health:
         faulty = self.faulty(monotonic_ns) or self.exceptions > self._then_exceptions  # every exception is told once
         self._then_exceptions = self.exceptions
         troubles = [f"exception: {self.last_exception}"] if faulty else []
-        troubles += [f"withheld: {reason}" for reason in self.withheld - self._then_withheld]
+        withheld = self.withheld - self._then_withheld
+        del withheld["node not active"]  # as it should be
+        troubles += [f"withheld: {reason}" for reason in withheld]
+        new = self.doubted - self._then_doubted
+        self._then_doubted = self.doubted.copy()
+        doubts = [f"feed-forward to zero: {reason}" for reason in new]
+        if not self.active:
+            doubts.append("node not active")
         arrived = [
             now - then
             for now, then, kind in zip(self.arrivals, self._then_arrivals, self._kinds, strict=True)
             if kind is Kind.ANGLE
         ]
-        if self.estimates == self._then_estimates and min(arrived) > 1:
+        if self.active and self.estimates == self._then_estimates and min(arrived) > 1:
             troubles.append("no torque although angles arrive")
         self._then_withheld, self._then_estimates = self.withheld.copy(), self.estimates
-        level = ERROR if troubles else (WARN if self.exceptions else OK)
-        message = "; ".join(troubles) or "running"
+        level = ERROR if troubles else (WARN if self.exceptions or doubts else OK)
+        message = "; ".join([*troubles, *doubts]) or "running"
         values: dict[str, object] = {"exceptions": self.exceptions, "last exception": self.last_exception}
+        values |= {f"feed-forward to zero: {reason}": n for reason, n in self.doubted.items()}
         values |= {f"withheld: {reason}": n for reason, n in self.withheld.items()}
         return self._status("outputs", level, message, values)
 

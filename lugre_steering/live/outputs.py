@@ -11,16 +11,14 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64MultiArray
 
 from lugre_steering.chain.step import Records
-from lugre_steering.live.commands import CommandRamp
+from lugre_steering.live.commands import CommandRamp, Fade
 from lugre_steering.live.parameters import Settings
 from lugre_steering.vehicle import Vehicle
-
-# Reliable, because ros2_control and most tools subscribe so; best-effort subscribers receive it as well.
-_QOS = QoSProfile(depth=50)
 
 
 class Outputs:
@@ -28,13 +26,18 @@ class Outputs:
 
     def __init__(self, node: Node, vehicle: Vehicle, settings: Settings) -> None:
         self._node = node
+        self._publishers: list[Publisher] = []
+        overrides = QoSOverridingOptions.with_default_policies()
         self._stamp = Time()
         joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
         self._sides = len(joints)
         frame = settings.frame_id
 
         def publisher(message: type, topic: str) -> Publisher:
-            return node.create_publisher(message, topic, _QOS)
+            # Reliable, because ros2_control and most tools subscribe so; best-effort subscribers receive it as well.
+            made = node.create_publisher(message, topic, QoSProfile(depth=50), qos_overriding_options=overrides)
+            self._publishers.append(made)
+            return made
 
         self._torque = self._wrench(frame), publisher(WrenchStamped, "~/torque")
         self._cylinder_torque = self._wrench(frame), publisher(WrenchStamped, "~/cylinder_torque")
@@ -51,7 +54,41 @@ class Outputs:
         self._commands: tuple[Float64MultiArray, Publisher] | None = None
         if settings.publish_commands:
             self._commands = Float64MultiArray(), publisher(Float64MultiArray, "~/feed_forward/commands")
-        self._ramp = CommandRamp(settings.angle_timeout_s, settings.recovery_ramp_s, self._sides)
+        self._ramp = CommandRamp(settings.angle_timeout_s, settings.options.recovery_ramp_s, self._sides)
+        self.released: list[float] = []  # feed-forward last published; empty before the first
+        self.fading: Fade | None = None
+        self._fade_commands: Fade | None = None
+
+    def close(self) -> None:
+        for publisher in self._publishers:
+            self._node.destroy_publisher(publisher)
+
+    def set_ramp(self, settings: Settings) -> None:
+        self._ramp.set_times(settings.angle_timeout_s, settings.options.recovery_ramp_s)
+
+    def begin_fade(self, now_ns: int, ramp_s: float) -> None:
+        """From now on ``fade`` leads the feed-forward to zero."""
+        self.fading = Fade(now_ns, self.released, ramp_s)
+        self._fade_commands = Fade(now_ns, self._ramp.published, ramp_s)
+
+    @property
+    def faded(self) -> bool:
+        """Whether the feed-forward that others know is zero."""
+        return not any(self.released) and not any(self._ramp.published)
+
+    def fade(self, now_ns: int) -> None:
+        """Publish the next feed-forward on the way to zero, stamped with the time."""
+        if self.fading is None or self._fade_commands is None or not self.released:
+            return
+        self._set_stamp(now_ns)
+        message, publisher = self._feed_forward
+        message.effort = self.released = self.fading(now_ns)
+        publisher.publish(message)
+        if self._commands is not None:
+            command, publisher = self._commands
+            command.data = self._fade_commands(now_ns)
+            self._ramp.set(command.data)
+            publisher.publish(command)
 
     def _wrench(self, frame: str) -> WrenchStamped:
         message = WrenchStamped()
@@ -91,8 +128,9 @@ class Outputs:
         message.position, message.velocity, message.effort = theta, omega, torque
         publisher.publish(message)
         message, publisher = self._feed_forward
-        message.effort = feed_forward
+        message.effort = self.released = feed_forward
         publisher.publish(message)
+        self.fading = None
         for (message, publisher), value in zip(self._temperatures, temperature, strict=False):
             message.temperature = value
             publisher.publish(message)

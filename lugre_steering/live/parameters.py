@@ -1,9 +1,12 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of the node: declared with ranges and descriptions, read once at start, refused with a clear message."""
+"""Parameters of the node: declared with ranges and descriptions, checked at start and at each change, refused with a clear
+message."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,9 +14,10 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
+from rclpy.parameter import Parameter as Change
 
 from lugre_steering.estimator import Options
-from lugre_steering.live.table import BY_ROS, OPTION_TABLE, TABLE, Parameter, ParameterError
+from lugre_steering.live.table import BY_ROS, OPTION_TABLE, QOS, TABLE, Parameter, ParameterError
 
 
 @dataclass(frozen=True)
@@ -21,19 +25,24 @@ class Settings:
     """The node's parameters, checked."""
 
     vehicle_file: Path
+    effects_files: tuple[Path, ...]
     executor: str
     frame_id: str
     input_depth: int
     angle_timeout_s: float
     pressure_timeout_s: float
-    recovery_ramp_s: float
     publish_commands: bool
+    autostart: bool
+    when_stale: str
+    state_file: Path | None
+    state_period_s: float
+    state_max_age_s: float
     options: Options
 
 
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     text = f"{parameter.description} ({parameter.expected})"
-    descriptor = ParameterDescriptor(description=text, read_only=True)
+    descriptor = ParameterDescriptor(description=text, read_only=parameter.fixed)
     if isinstance(parameter.default, float):
         # A declared range is also what makes rclpy refuse .nan and .inf.
         descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
@@ -44,22 +53,35 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
 
 def _value(node: Node, parameter: Parameter) -> Any:
     try:
-        value = node.declare_parameter(parameter.name, parameter.default, _descriptor(parameter)).value
+        return node.declare_parameter(parameter.name, parameter.default, _descriptor(parameter)).value
     except ParameterException as error:
         raise ParameterError(f"parameter '{parameter.name}': {error}; expected {parameter.expected}") from error
-    if parameter.choices and value not in parameter.choices:
-        raise ParameterError(f"parameter '{parameter.name}': got '{value}', expected {parameter.expected}")
-    return value
 
 
 def declare(node: Node) -> Settings:
     """Declare every parameter on the node and read it."""
-    values = {parameter.name: _value(node, parameter) for parameter in TABLE}
-    options = {parameter.name: _value(node, parameter) for parameter in OPTION_TABLE}
-    unknown = sorted(set(node._parameter_overrides) - {*values, *options, *BY_ROS})
+    values = {parameter.name: _value(node, parameter) for parameter in (*TABLE, *OPTION_TABLE)}
+    unknown = sorted(name for name in set(node._parameter_overrides) - {*values, *BY_ROS} if not name.startswith(QOS))
     if unknown:  # not refused: a file may set parameters of several nodes at once
         node.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
-    if not values["vehicle_file"]:
+    return settings_of(values)
+
+
+def settings_of(values: Mapping[str, Any]) -> Settings:
+    """Settings from the values of all parameters; ``ParameterError`` says which of them cannot be."""
+    for parameter in TABLE:
+        if parameter.choices and values[parameter.name] not in parameter.choices:
+            raise ParameterError(f"parameter '{parameter.name}': got '{values[parameter.name]}', expected {parameter.expected}")
+    given = {parameter.name: values[parameter.name] for parameter in TABLE}
+    if not given["vehicle_file"]:
         raise ParameterError("parameter 'vehicle_file': got nothing, expected a vehicle file (--ros-args -p vehicle_file:=PATH)")
-    values["vehicle_file"] = Path(values["vehicle_file"])
-    return Settings(**values, options=Options(**options))
+    given["vehicle_file"] = Path(given["vehicle_file"])
+    given["effects_files"] = tuple(Path(name) for name in given["effects_files"].split(os.pathsep) if name)
+    given["state_file"] = Path(given["state_file"]) if given["state_file"] else None
+    return Settings(**given, options=Options(**{parameter.name: values[parameter.name] for parameter in OPTION_TABLE}))
+
+
+def changed(node: Node, changes: Sequence[Change]) -> Settings:
+    """The settings as they would be after some changes; ``ParameterError`` if they cannot be."""
+    values = {parameter.name: node.get_parameter(parameter.name).value for parameter in (*TABLE, *OPTION_TABLE)}
+    return settings_of(values | {change.name: change.value for change in changes if change.name in values})

@@ -36,11 +36,13 @@ def run(args: list[str]) -> int:
         return _refused(error)
     try:
         node = SteeringTorqueEstimator()
+        node.start()
         # What exists now lives until the end: a collection during a callback need not look at it.
         gc.collect()
         gc.freeze()
-        if not spin(node, node.settings.executor, node.fault, lambda: node.health.callbacks):
-            return _refused(RuntimeError(f"no callback runs any more; the last of {_FAULTS} faults: {node.health.last_exception}"))
+        if not spin(node, node.settings.executor, node.fault, lambda: node.callbacks):
+            return _refused(RuntimeError(f"no callback runs any more; the last of {_FAULTS} faults: {node.last_exception}"))
+        node.save()
     except (LugreSteeringError, ParameterException, RCLError) as error:  # rclpy's: its own parameters, names of topics
         return _refused(error)
     finally:

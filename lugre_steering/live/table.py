@@ -14,8 +14,11 @@ from lugre_steering.recording import NODE
 from lugre_steering.schema import Reader
 
 EXECUTORS = ("events", "single")
+WHEN_STALE = ("silent", "zero")
 BY_ROS = ("use_sim_time", "start_type_description_service")
 """Parameters that rclpy declares on every node."""
+QOS = "qos_overrides."
+"""Begin of the names of those that it declares for each topic."""
 
 
 class ParameterError(LugreSteeringError):
@@ -32,6 +35,8 @@ class Parameter:
     low: float = 0.0
     high: float = 0.0
     choices: tuple[str, ...] = ()
+    fixed: bool = False
+    """Read at start only."""
 
     @property
     def expected(self) -> str:
@@ -45,19 +50,30 @@ class Parameter:
 
 
 TABLE = (
-    Parameter("vehicle_file", "", "vehicle file (YAML); required"),
+    Parameter("vehicle_file", "", "vehicle file (YAML); required. A change is taken over by the service ~/reload"),
+    Parameter("effects_files", "", "files with physics of your own (.yaml or .py), separated by ':'", fixed=True),
+    Parameter("autostart", True, "configure and activate the node at start; false leaves that to a lifecycle manager", fixed=True),
     Parameter(
         "executor",
         "events",
         "rclpy executor; only events keeps the order of arrival across topics under load",
         choices=EXECUTORS,
+        fixed=True,
     ),
-    Parameter("frame_id", "base_link", "frame of the published torques (z up)"),
-    Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000),
+    Parameter("frame_id", "base_link", "frame of the published torques (z up)", fixed=True),
+    Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000, fixed=True),
     Parameter("angle_timeout_s", 0.2, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
     Parameter("pressure_timeout_s", 0.5, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
-    Parameter("recovery_ramp_s", 1.0, "feed-forward commands are ramped over this time after an interruption [s]", 0.0, 60.0),
-    Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)"),
+    Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)", fixed=True),
+    Parameter(
+        "when_stale",
+        "silent",
+        "the feed-forward when inputs are stale: silent at once, or led to zero over withdrawal_ramp_s and then silent",
+        choices=WHEN_STALE,
+    ),
+    Parameter("state_file", "", "file in which temperatures and bristles survive a restart; empty: they do not"),
+    Parameter("state_period_s", 10.0, "time between two writings of state_file [s]", 0.1, 3600.0),
+    Parameter("state_max_age_s", 86400.0, "an older state_file is not used [s]", 0.0, 1e8),
 )
 _MEANINGS = {
     "pair_tolerance_s": "left and right stamps this close, or by half a sampling period up to 25 ms, are one instant [s]",
@@ -65,6 +81,11 @@ _MEANINGS = {
     "backward_jump_s": "a confirmed jump of all angles back in time this long is a restart [s]",
     "forward_jump_s": "a jump ahead this long must be confirmed [s]",
     "max_rate_rad_s": "a faster change of an angle is a spike [rad/s]",
+    "feed_forward_limit_Nm": "largest feed-forward of each side [N m]; 0: three times its static friction",
+    "feed_forward_rate_limit_Nm_s": "fastest change of the feed-forward [N m/s]; 0: what its presliding stiffness makes of 1 rad/s",
+    "withdrawal_ramp_s": "the feed-forward goes to zero over this time when anything speaks against it [s]",
+    "recovery_ramp_s": "and comes back over this time, as commands do after silence [s]",
+    "plan_tolerance_rad": "a steering/command farther than this from the present angle is not used [rad]",
     "feed_forward_horizon_s": "the feed-forward is the torque needed this far ahead, along steering/command if it comes [s]",
 }
 OPTION_TABLE = tuple(

@@ -16,13 +16,15 @@ import numba
 import numpy
 import scipy
 
-from lugre_steering.errors import LugreSteeringError
+from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.files import output_folder, refuse_foreign, write_record
 from lugre_steering.proof import campaign
-from lugre_steering.proof.blind import run_all, source_version
+from lugre_steering.proof.blind import source_version
+from lugre_steering.proof.journal import run_all
 from lugre_steering.proof.scoreboard import board
 from lugre_steering.resources import config_folder
 
+SIMULATORS = {"2": (2,), "3": (3,), "all": (2, 3)}
 QUICK_BUDGET_S = 225.0
 """No case is begun after this, so that a quick run ends within five minutes."""
 
@@ -32,6 +34,8 @@ def run(
     *,
     quick: bool = False,
     cases: str | None = None,
+    simulator: str = "all",
+    kinds: str | None = None,
     seed: int | None = None,
     peers: bool = False,
     announce: Callable[[str], None] = lambda _: None,
@@ -44,15 +48,10 @@ def run(
         for note in missing():
             announce(note)
     seed = secrets.randbelow(2**31) if seed is None else seed
-    chosen = campaign.campaign(seed)
-    if cases is not None:
-        chosen = campaign.matching(chosen, cases)
-    if quick:
-        chosen = campaign.quick(chosen)
-    command = " ".join(
-        ["lugre-steering prove --out DIR", f"--seed {seed}", *(["--quick"] if quick else []), *(["--peers"] if peers else [])]
-        + ([f"--cases '{cases}'"] if cases is not None else [])
-    )
+    chosen = _chosen(seed, simulator, kinds, cases, quick)
+    flags = {"--quick": quick, "--peers": peers, f"--simulator {simulator}": simulator != "all"}
+    flags |= {f"--kinds {kinds}": kinds is not None, f"--cases '{cases}'": cases is not None}
+    command = " ".join(["lugre-steering prove --out DIR", f"--seed {seed}", *(flag for flag, given in flags.items() if given)])
     announce(f"{len(chosen)} cases, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
     with output_folder(out):
         refuse_foreign([out / "scoreboard.json"])
@@ -72,6 +71,18 @@ def run(
         else:
             draw_all(result, out)
     return result
+
+
+def _chosen(seed: int, simulator: str, kinds: str | None, cases: str | None, quick: bool) -> list[campaign.Hiding]:
+    """The cases that the options leave."""
+    if simulator not in SIMULATORS:
+        raise DataError(f"--simulator {simulator!r}: expected {', '.join(SIMULATORS)}")
+    chosen = campaign.campaign(seed, SIMULATORS[simulator])
+    if kinds is not None:
+        chosen = campaign.of_kinds(chosen, kinds)
+    if cases is not None:
+        chosen = campaign.matching(chosen, cases)
+    return campaign.quick(chosen) if quick else chosen
 
 
 def _versions() -> dict[str, str]:

@@ -18,6 +18,9 @@ from scipy.signal import lfilter
 
 from lugre_steering.chain.compiled import njit
 from lugre_steering.errors import DataError
+from lugre_steering.proof.made import Hidden
+
+__all__ = ["CATALOGUE", "EFFECT_IDS", "UNLISTED_IDS", "Concealed", "Hidden", "Motion", "draw", "sensed"]
 
 Array = NDArray[np.float64]
 
@@ -178,15 +181,6 @@ ZONED: dict[str, dict[str, Range]] = {
 }
 UNLISTED_IDS: tuple[str, ...] = ("gear_ripple", "body_mode", "rate_memory", "intermittent_contact")
 EFFECT_IDS: tuple[str, ...] = tuple(name for name in CATALOGUE if name not in UNLISTED_IDS)
-
-
-class Hidden(NamedTuple):
-    """A drawn effect: parameter values (SI) and the bag or time that limits it."""
-
-    id: str
-    values: dict[str, float]
-    only_bag: int | None
-    start_s: float
 
 
 def draw(wanted: Concealed, rng: np.random.Generator) -> Hidden:

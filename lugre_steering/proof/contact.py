@@ -158,9 +158,13 @@ def _wind_up(torque: float, width: float, soft: float, compliance: float, stiffe
 
 @njit(cache=True)
 def run_track(
-    angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, hidden: HiddenContact
-) -> Any:  # Track, compiled
-    """Simulate one track (see ``Track``) for its clean angle (n,) on a grid of ``h`` seconds."""
+    angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, hidden: HiddenContact,
+    level_factor: Array | None = None, stiffness_factor: Array | None = None,
+) -> Any:  # Track, compiled  # fmt: skip
+    """Simulate one track (see ``Track``) for its clean angle (n,) on a grid of ``h`` seconds.
+
+    The factors (n,), if any, are what an unlisted law makes of friction level and stiffness.
+    """
     n, count = angle.size, patch.torque_share.size
     friction, aligning, contact, heat = np.zeros(n), np.zeros(n), np.empty(n), np.empty(n)
     z, z_next = np.zeros(count), np.zeros(count)
@@ -190,6 +194,10 @@ def run_track(
         factor *= 1.0 - hidden.wear_polishing_amount * worn
         aged = np.log(1.0 + rest / hidden.static_ageing_time)
         factor *= 1.0 + hidden.static_ageing_rate * _gate(t, hidden.static_ageing_from) * aged
+        stiffer = 1.0
+        if level_factor is not None and stiffness_factor is not None:
+            factor *= level_factor[k]
+            stiffer = stiffness_factor[k]
         rate = previous_rate + (angle[k] - angle[k - 1]) / h - sensor_rate  # exact when nothing gives way
         sensor_rate = (angle[k] - angle[k - 1]) / h
         drop = (abs(rate) / v.stribeck_speed_rad_s) ** v.stribeck_exponent
@@ -205,7 +213,7 @@ def run_track(
             i = min(max(int(place), 0), rubber.storage.size - 2)
             soft = rubber.storage[i] + (place - i) * (rubber.storage[i + 1] - rubber.storage[i])
             deviation = 1.0 + NATURAL_SPREAD * patch.natural[p] + spread * patch.graded[p]
-            stiffness[p] = patch.torque_share[p] * v.stiffness_Nm_rad * soft * max(deviation, 0.05)
+            stiffness[p] = patch.torque_share[p] * v.stiffness_Nm_rad * soft * stiffer * max(deviation, 0.05)
         stretch = 0.0
         for p in range(count):
             stretch += patch.torque_share[p] * abs(z[p])

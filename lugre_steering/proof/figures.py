@@ -18,12 +18,13 @@ VERDICTS = [name for name in OUTCOMES if name not in ("right name", "wrong name"
 
 
 def draw_all(board: Board, folder: Path) -> list[Path]:
-    """Write the pictures for which the board has cases; returns their files."""
+    """Write the pictures of every simulator for which the board has cases; returns their files."""
+    return [file for number, part in board["simulators"].items() for file in _draw_part(board["made"], number, part, folder)]
+
+
+def _draw_part(how: Mapping[str, Any], number: str, board: Board, folder: Path) -> list[Path]:
     cases = sum(board["cases"].values())
-    made = (
-        f"Synthetic recordings of the second simulator, {cases} cases, diagnosed blind. "
-        f"Seed {board['made']['seed']}, {board['made']['date']}."
-    )
+    made = f"Synthetic recordings of simulator {number}, {cases} cases, diagnosed blind. Seed {how['seed']}, {how['date']}."
     wanted = {
         "power": (draw_power, any(power["detected"]["of"] for power in board["power"])),
         "confusion": (draw_confusion, bool(board["naming"]["confusion"])),
@@ -35,7 +36,7 @@ def draw_all(board: Board, folder: Path) -> list[Path]:
     files = []
     for name, (draw, there) in wanted.items():
         if there:
-            files.append(folder / f"proof_{name}.png")
+            files.append(folder / f"proof{'' if number == '2' else number}_{name}.png")
             draw(board, files[-1], made)
     return files
 
@@ -62,7 +63,8 @@ def draw_power(board: Board, file: Path, made: str) -> None:
                 x, shares = [r for r, _ in shown], np.array([s["share"] for _, s in shown])
                 ends = np.array([s["ci95"] for _, s in shown]).T
                 axis.errorbar(x, shares, np.abs(ends - shares), marker="o", capsize=3, color=SERIES[k], label=label)
-        axis.plot([0.1, 0.3], [TARGETS["named_at_0.1"], TARGETS["named_from_0.3"]], "k_", markersize=16, label="target for names")
+        wanted = [TARGETS["named_at_0.1"].value, TARGETS["named_from_0.3"].value]
+        axis.plot([0.1, 0.3], wanted, "k_", markersize=16, label="target for names")
         axis.set(xscale="log", ylim=(-0.02, 1.04), title="Detection power")
         axis.set_xticks(ratios)
         axis.set(xlabel="effect-to-noise variance ratio (1)", ylabel="share of cases (1)")
@@ -101,7 +103,7 @@ def draw_location(board: Board, file: Path, made: str) -> None:
     )
     with figure(1, 1, caption, file, row_inches=3.2, width=7.0) as axes:
         axes[0, 0].hist(board["location"]["values"], np.linspace(0.0, 1.0, 21), color=SERIES[0])
-        axes[0, 0].axvline(TARGETS["location_iou"], color="k", linestyle="--", label="target")
+        axes[0, 0].axvline(TARGETS["location_iou"].value, color="k", linestyle="--", label="target")
         axes[0, 0].set(xlabel="intersection over union (1)", ylabel="cases", title="Place in time")
         axes[0, 0].legend()
 
@@ -115,7 +117,7 @@ def draw_parameters(board: Board, file: Path, made: str) -> None:
             axes[0, 0].plot(np.maximum(entry["quartiles"], 1e-3), [i, i], color=SERIES[0])
             axes[0, 0].plot(max(entry["median"], 1e-3), i, "o", color=SERIES[0])
             axes[0, 0].annotate(str(entry["of"]), (1.01, i), xycoords=("axes fraction", "data"), fontsize=7.5, va="center")
-        axes[0, 0].axvline(TARGETS["parameter_error"], color="k", linestyle="--")
+        axes[0, 0].axvline(TARGETS["parameter_error"].value, color="k", linestyle="--")
         axes[0, 0].set_yticks(range(len(errors)), list(errors), fontsize=7.5)
         axes[0, 0].set(xscale="log", ylim=(len(errors) - 0.5, -0.5), xlabel="relative error (1)")
         axes[0, 0].set_title("Parameters against the truth (dashed: 10 %)")

@@ -1,269 +1,68 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Scoring diagnoses against what was hidden: pure functions of finished cases (``blind.Row``)."""
+"""The scoreboard: every score with its count and interval, for each simulator on its own, and the targets."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-from scipy.stats import binomtest
-
-from lugre_steering.proof.campaign import RATIOS
-
-Row = dict[str, Any]
-Span = Sequence[float]
-Outcome = Literal["right name", "right tie", "extra name", "wrong name", "silent", "unlisted", "insufficient data", "failed"]
-
-OUTCOMES: tuple[Outcome, ...] = (
-    "right name", "right tie", "extra name", "wrong name", "silent", "unlisted", "insufficient data", "failed",
+from lugre_steering.proof.campaign import DISGUISES, RATIOS
+from lugre_steering.proof.scores import (
+    CLEAR_RATIO,
+    DETECTED,
+    OUTCOMES,
+    RIGHT,
+    Row,
+    all_answered,
+    answered,
+    called_unlisted,
+    foretold,
+    has_wrong_extra,
+    heldout,
+    location,
+    measured_errors,
+    measured_width,
+    names_named,
+    outcome,
+    parameter_errors,
+    proportion,
+    ratio_of,
+    removed,
+    sheet_told,
+    summary,
+    wrong_sheet,
 )  # fmt: skip
-RIGHT = ("right name", "right tie")
-DETECTED = ("right name", "right tie", "extra name", "wrong name", "unlisted")
-SCHEMA = "lugre_steering/scoreboard/1"
-CLEAR_RATIO = 0.3 / np.sqrt(3.0)
-"""Effects from here on belong to the ratio 0.3 or a higher one (nearest in the logarithm)."""
-LOCAL_SHARE = 0.6
-"""An effect that acts for a smaller share of the time has a place that can be scored."""
+from lugre_steering.proof.targets import TARGETS, judged
+
+__all__ = ["OUTCOMES", "TARGETS", "board"]
+
+SCHEMA = "lugre_steering/scoreboard/2"
+TOGETHER = ("pair", "triple")
+WORSE = 1.02
+"""A diagnosed file does harm on an unseen manoeuvre where its error is by more than this factor above the baseline's."""
 
 
-class Meaning(NamedTuple):
-    """A true parameter and the catalogue parameter of the same meaning, which is ``factor`` times the true one."""
-
-    true: str
-    reported: str
-    factor: float = 1.0
-
-
-SAME_MEANING: dict[str, tuple[Meaning, ...]] = {
-    "end_stop": (Meaning("threshold", "engage_angle"), Meaning("secant", "secant")),
-    "backlash": (Meaning("width", "width"),),
-    "linkage_compliance": (Meaning("compliance", "compliance"),),
-    "viscous_friction": (Meaning("sigma2", "sigma_2"),),
-    "static_ageing": (Meaning("rate", "rate"), Meaning("slip_scale", "slip_scale")),
-    "stress_relaxation": (Meaning("share_per_decade", "per_decade"),),
-    "payne_softening": (Meaning("amount", "amplitude"), Meaning("angle", "angle")),
-    "surface_patch": (
-        Meaning("amount", "change"), Meaning("low", "angle_low"), Meaning("high", "angle_high"),
-        Meaning("low", "time_start"), Meaning("high", "time_end"),
-    ),
-    "direction_asymmetry": (Meaning("a", "asymmetry"),),
-    "distributed_contact": (Meaning("spread", "spread"),),
-    "carcass_heat_sink": (Meaning("conductance", "conductance"), Meaning("capacity", "capacity")),
-    "heat_partition": (Meaning("lost_share", "ground_share"),),
-    "angle_offset": (Meaning("offset", "offset"),),
-    "angle_scale": (Meaning("scale", "scale"),),
-    "yaw_inertia": (Meaning("inertia", "inertia"),),
-    "kingpin_jacking": (Meaning("slope", "slope"),),
-    "slope_bias": (Meaning("torque", "torque"),),
-    "cylinder_friction": (Meaning("coulomb", "coulomb"), Meaning("load_share", "load_share")),
-    # Hidden losses follow the mean rate of both tracks, the catalogue's are of one track: half of the hidden one.
-    "line_loss_linear": (Meaning("b", "b", 0.5),),
-    "line_loss_quadratic": (Meaning("c", "c", 0.5),),
-    "trapped_pressure": (Meaning("share", "share"), Meaning("time", "time_constant")),
-    "time_delay": (Meaning("delay", "delay"),),
-    "pressure_lag": (Meaning("tau", "tau"),),
-    "pressure_offset": (Meaning("offset", "line"),),  # reported under the line's own name
-    "pressure_drift": (Meaning("drift", "line", 0.83),),  # the mean rate of a drift that levels off, over some 110 s
-    "moment_arm_error": (Meaning("a", "linear"), Meaning("b", "quadratic")),
-}  # fmt: skip
-"""Left out: parameters whose law differs so much that equal numbers would not mean equal physics."""
-
-STOP_DEPTH_RAD = 0.05
-
-
-def derived(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters, true or reported, with what their trade-offs leave alone, where the parameters for it are there.
-
-    ``secant``: stiffness k1 + k3 x^2 of an end stop at x = STOP_DEPTH_RAD. ``slope``: of a jacking torque about the middle [N m/rad].
-    """
-    out, get = dict(parameters), parameters.get
-    for linear, cubic in (("k1", "k3"), ("stiffness", "cubic_stiffness")):
-        if linear in parameters:
-            out["secant"] = parameters[linear] + get(cubic, 0.0) * STOP_DEPTH_RAD**2
-    if "amplitude" in parameters:
-        out["slope"] = parameters["amplitude"] + 2.0 * get("second_harmonic", 0.0)
-    return out
-
-
-TARGETS: dict[str, float] = {
-    "nulls_silent": 0.95, "named_from_0.3": 0.9, "named_at_0.1": 0.5, "location_iou": 0.7, "parameter_error": 0.1,
-    "removed": 0.9, "both_of_two": 0.8, "unlisted": 0.9,
-}  # fmt: skip
-
-
-def interval(successes: int, trials: int, level: float = 0.95) -> tuple[float, float]:
-    """Wilson (1927) score interval of a proportion; (0, 1) without trials."""
-    if trials == 0:
-        return 0.0, 1.0
-    found = binomtest(successes, trials).proportion_ci(level, method="wilson")
-    return float(found.low), float(found.high)
-
-
-def proportion(flags: Iterable[bool]) -> Row:
-    """Share of true flags with its count and 95 % Wilson interval; the share is None without any."""
-    values = list(flags)
-    hits = sum(values)
-    return {"share": hits / len(values) if values else None, "hits": hits, "of": len(values), "ci95": list(interval(hits, len(values)))}
-
-
-def answers(effect: Mapping[str, Any]) -> set[str]:
-    """The names that a reported effect stands for: its own and those it says it cannot be told from."""
-    return {effect["id"], *effect["indistinguishable_from"]}
-
-
-def outcome(row: Row) -> Outcome:
-    """What became of a case with at most one hidden effect. A name beside the right one spoils it ('extra name')."""
-    diagnosis = row["diagnosis"]
-    if diagnosis is None:
-        return "failed"
-    verdicts: dict[str, Outcome] = {"consistent": "silent", "unlisted_physics": "unlisted", "insufficient_data": "insufficient data"}
-    if diagnosis["verdict"] in verdicts:
-        return verdicts[diagnosis["verdict"]]
-    hidden = {effect["id"] for effect in row["truth"]["effects"]}
-    reported = diagnosis["effects"]
-    if not any(hidden & answers(effect) for effect in reported):
-        return "wrong name"
-    if len(reported) > 1:
-        return "extra name"
-    return "right name" if reported[0]["id"] in hidden else "right tie"
-
-
-def both(row: Row) -> int:
-    """How many of the hidden effects are answered for, each by a reported effect of its own."""
-    if row["diagnosis"] is None:
-        return 0
-    hidden = [effect["id"] for effect in row["truth"]["effects"]]
-    options = [[i for i, effect in enumerate(row["diagnosis"]["effects"]) if name in answers(effect)] for name in hidden]
-    if len(hidden) == 2 and options[0] and options[1]:
-        return 2 if len({*options[0], *options[1]}) > 1 else 1
-    return sum(bool(option) for option in options)
-
-
-def overlap(one: Sequence[Span], other: Sequence[Span]) -> tuple[float, float]:
-    """Lengths of the intersection and of the union of two sets of intervals; intervals within a set may overlap."""
-    cuts = np.unique([edge for span in (*one, *other) for edge in span])
-    middles, lengths = 0.5 * (cuts[1:] + cuts[:-1]), np.diff(cuts)
-    inside = [np.any([(a < middles) & (middles < b) for a, b in spans] or [np.zeros(middles.size, bool)], axis=0) for spans in (one, other)]
-    return float(lengths[inside[0] & inside[1]].sum()), float(lengths[inside[0] | inside[1]].sum())
-
-
-def location(row: Row) -> float | None:
-    """Intersection over union of the time in which the hidden effect acts and the reported one does, all bags together.
-
-    None where there is no place to score: an effect that acts nearly always, several effects, or nothing found.
-    """
-    bags = row["truth"]["bags"]
-    if len(row["truth"]["effects"]) != 1 or row["diagnosis"] is None:
-        return None
-    hidden = row["truth"]["effects"][0]["id"]
-    true = {name: bag["intervals_s"].get(hidden, []) for name, bag in bags.items()}
-    active = sum(b - a for spans in true.values() for a, b in spans)
-    if not 0.0 < active < LOCAL_SHARE * sum(bag["duration_s"] for bag in bags.values()):
-        return None
-    if row["kind"] == "unlisted":
-        places = row["diagnosis"]["unexplained"]["where"] if outcome(row) == "unlisted" else None
-    else:
-        places = next((effect["where"] for effect in row["diagnosis"]["effects"] if hidden in answers(effect)), None)
-    if places is None:
-        return None
-    reported = {name: [span for place in places if place["bag"] == name for span in place["intervals_s"]] for name in bags}
-    shared, either = np.sum([overlap(true[name], reported[name]) for name in bags], axis=0)
-    return float(shared / either)
-
-
-def parameter_errors(row: Row) -> dict[str, tuple[float, bool | None]]:
-    """Relative error of each reported parameter that means the same as a true one, and whether its interval (if any) covers it.
-
-    Keys are 'effect.parameter'. Only effects that bear the right name count: another law's parameters mean something else.
-    """
-    found: dict[str, tuple[float, bool | None]] = {}
-    reported = {effect["id"]: effect["parameters"] for effect in row["diagnosis"]["effects"]} if row["diagnosis"] is not None else {}
-    for hidden in row["truth"]["effects"]:
-        name, true = hidden["id"], derived(hidden["parameters"])
-        if name not in reported:
-            continue
-        values = derived({key: entry["value"] for key, entry in reported[name].items()})
-        for meaning in SAME_MEANING.get(name, ()):
-            key = true["line"] if meaning.reported == "line" else meaning.reported
-            in_time = bool(true.get("in_time", 0.0))
-            other_window = (key.startswith("angle_") and in_time) or (key.startswith("time_") and not in_time)
-            if key not in values or (name == "surface_patch" and other_window):
-                continue
-            expected = meaning.factor * true[meaning.true]
-            low, high = reported[name][key]["ci95"] if key in reported[name] else (np.nan, np.nan)
-            covers = None if np.isnan(low) else bool(low <= expected <= high)
-            found[f"{name}.{meaning.reported}"] = (abs(values[key] / expected - 1.0), covers)
-    return found
-
-
-def heldout(row: Row) -> tuple[float, float, float] | None:
-    """Held-out mean squares [N2 m2]: after recalibration, with the named physics, and of the noise."""
-    diagnosis = row["diagnosis"]
-    if diagnosis is None or diagnosis["baseline"]["heldout_rmse_Nm"] is None:
-        return None
-    bags = row["truth"]["bags"].values()
-    noise = np.average([bag["seen_noise_variance"] for bag in bags], weights=[bag["duration_s"] for bag in bags])
-    return diagnosis["baseline"]["heldout_rmse_Nm"] ** 2, diagnosis["augmented"]["heldout_rmse_Nm"] ** 2, float(noise)
-
-
-def removed(row: Row) -> float | None:
-    """Share of the removable held-out error that the named physics removed; None where recalibration left none to remove."""
-    squares = heldout(row)
-    if squares is None:
-        return None
-    before, after, noise = squares
-    return (before - after) / (before - noise) if before > 1.1 * noise else None
-
-
-def ratio_of(row: Row) -> float | None:
-    """The wanted ratio that the achieved one is nearest to (logarithm), None when it is more than a factor of 3.2 off all."""
-    if row["ratio"] <= 0.0:
-        return None
-    off = np.abs(np.log10(row["ratio"] / np.array(RATIOS)))
-    return RATIOS[int(np.argmin(off))] if off.min() < 0.5 else None
-
-
-def summary(values: Iterable[float | None]) -> Row:
-    """Median and quartiles of what is there."""
-    present = np.array([value for value in values if value is not None])
-    if present.size == 0:
-        return {"median": None, "quartiles": [None, None], "of": 0}
-    low, median, high = np.percentile(present, [25, 50, 75])
-    return {"median": float(median), "quartiles": [float(low), float(high)], "of": int(present.size)}
-
-
-def board(rows: Sequence[Row], made: Mapping[str, Any]) -> Row:
-    """The scoreboard: every score with its count and interval, and ``made``: command, versions, seed, date."""
-    nulls, pairs, unlisted = (_of(rows, kind) for kind in ("null", "pair", "unlisted"))
-    singles = _of(rows, "single")
-    clear = [row for row in singles if row["ratio"] >= CLEAR_RATIO]
-    unlisted_clear = [row for row in unlisted if row["ratio"] >= CLEAR_RATIO]
-    places = {row["name"]: location(row) for row in rows if row["kind"] != "pair"}
-    errors = [(key, *value) for row in clear for key, value in parameter_errors(row).items()]
-    result: Row = {
+def board(rows: Sequence[Row], made: Mapping[str, object]) -> Row:
+    """``made``: command, versions, seed, date. Simulators are never pooled: each has its own part and its own targets."""
+    numbers = sorted({row.get("simulator", 2) for row in rows})
+    return {
         "schema": SCHEMA, "made": dict(made), "cases": dict(Counter(row["kind"] for row in rows)),
         "failed": [{"name": row["name"], "seed": row["seed"], "error": row["error"]} for row in rows if row["error"]],
-        "nulls": {
-            "silent": proportion(outcome(row) == "silent" for row in nulls),
-            "by_noise": _grouped(nulls, lambda row: str(row["noise"]), lambda group: proportion(outcome(r) == "silent" for r in group)),
-            "heldout_over_noise": summary(s[0] / s[2] for row in nulls if (s := heldout(row)) is not None),
-            "named": dict(Counter(e["id"] for row in nulls if row["diagnosis"] for e in row["diagnosis"]["effects"])),
-        },
-        "naming": {
-            "from_0.3": proportion(outcome(row) in RIGHT for row in clear),
-            "outcomes_from_0.3": dict(Counter(outcome(row) for row in clear)),
-            "tie_size": summary(
-                float(len(row["diagnosis"]["effects"][0]["indistinguishable_from"])) for row in clear if outcome(row) in RIGHT
-            ),
-            "confusion": _confusion(clear + unlisted_clear),
-        },
+        "simulators": {str(number): part([row for row in rows if row.get("simulator", 2) == number]) for number in numbers},
+    }  # fmt: skip
+
+
+def part(rows: Sequence[Row]) -> Row:
+    """The scores of one simulator."""
+    singles, unlisted = [row for row in rows if row["kind"] in ("single", "beside")], _of(rows, "unlisted")
+    clear = [row for row in singles if row["ratio"] >= CLEAR_RATIO]
+    result: Row = {
+        "cases": dict(Counter(row["kind"] for row in rows)),
+        "nulls": _nulls(rows), "naming": _naming(clear, [row for row in unlisted if row["ratio"] >= CLEAR_RATIO]),
         "power": [_power(ratio, [row for row in singles if ratio_of(row) == ratio]) for ratio in RATIOS],
         "disguises": {
-            kind: proportion(outcome(row) in RIGHT for row in _of(rows, kind) if row["ratio"] >= CLEAR_RATIO)
-            for kind in ("one-bag", "late", "barely")
+            kind: proportion(outcome(row) in RIGHT for row in _of(rows, kind) if row["ratio"] >= CLEAR_RATIO) for kind in DISGUISES
         },
         "masked": [
             {"masked": f"{low:g} to {high:g}", **proportion(outcome(row) in RIGHT for row in clear if low <= row["masked"] < high)}
@@ -273,36 +72,152 @@ def board(rows: Sequence[Row], made: Mapping[str, Any]) -> Row:
             effect: _effect(effect, [row for row in rows if row["truth"]["effects"] and row["truth"]["effects"][0]["id"] == effect])
             for effect in sorted({row["truth"]["effects"][0]["id"] for row in singles + unlisted})
         },
-        "location": {
-            "listed": summary(places[row["name"]] for row in rows if row["name"] in places and row["kind"] != "unlisted"),
-            "unlisted": summary(places[row["name"]] for row in unlisted),
-            "above_0.7": proportion(p > TARGETS["location_iou"] for p in places.values() if p is not None),
-            "values": [round(p, 3) for p in places.values() if p is not None],
-        },
-        "parameters": {
-            "all": summary(error for _, error, _ in errors),
-            "within_10_percent": proportion(error <= TARGETS["parameter_error"] for _, error, _ in errors),
-            "interval_covers": proportion(covered for _, _, covered in errors if covered is not None),
-            "error": {key: summary(e for k, e, _ in errors if k == key) for key in sorted({key for key, _, _ in errors})},
-        },
+        "location": _location(rows), "parameters": _parameters(clear), "measurable": _measurable(clear),
         "removed": {
             "from_0.3": summary(removed(row) for row in clear),
             "by_ratio": {f"{ratio:g}": summary(removed(row) for row in singles if ratio_of(row) == ratio) for ratio in RATIOS},
         },
-        "pairs": {
-            "both": proportion(both(row) == 2 for row in pairs), "one_or_more": proportion(both(row) > 0 for row in pairs),
-            "both_from_0.3": proportion(both(row) == 2 for row in pairs if min(row["ratio_beside"].values()) >= CLEAR_RATIO),
-        },
-        "unlisted": {
-            "called_unlisted": proportion(outcome(row) == "unlisted" for row in unlisted_clear),
-            "by_ratio": [
-                {"ratio": ratio, **proportion(outcome(row) == "unlisted" for row in unlisted if ratio_of(row) == ratio)} for ratio in RATIOS
-            ],
-        },
-        "seconds_per_case": summary(row["seconds"]["diagnosis"] for row in rows),
-        "peers": _peers(rows),
+        "pairs": _together(_of(rows, "pair")), "triples": _together(_of(rows, "triple")),
+        "unlisted": _unlisted(unlisted), "laws": _laws(_of(rows, "law")), "dirty": _dirty(_of(rows, "dirty")),
+        "sheets": _sheets(_of(rows, "sheet")), "beside": _beside(_of(rows, "beside")),
+        "seconds_per_case": summary(row["seconds"]["diagnosis"] for row in rows), "peers": _peers(rows),
     }  # fmt: skip
-    return {**result, "targets": _targets(result)}
+    return {**result, "targets": judged(result)}
+
+
+def _nulls(rows: Sequence[Row]) -> Row:
+    nulls = _of(rows, "null")
+    return {
+        "silent": proportion(outcome(row) == "silent" for row in nulls),
+        "by_noise": _grouped(nulls, lambda row: str(row["noise"]), lambda group: proportion(outcome(r) == "silent" for r in group)),
+        "heldout_over_noise": summary(s[0] / s[2] for row in nulls if (s := heldout(row)) is not None),
+        "named": _named(nulls),
+    }  # fmt: skip
+
+
+def _named(rows: Sequence[Row]) -> dict[str, int]:
+    return dict(Counter(e["id"] for row in rows if row["diagnosis"] for e in row["diagnosis"]["effects"]))
+
+
+def _naming(clear: Sequence[Row], unlisted_clear: Sequence[Row]) -> Row:
+    right = [row for row in clear if outcome(row) in RIGHT]
+    return {
+        "from_0.3": proportion(outcome(row) in RIGHT for row in clear),
+        "extra_names": proportion(outcome(row) == "extra name" for row in clear if outcome(row) in (*RIGHT, "extra name")),
+        "outcomes_from_0.3": dict(Counter(outcome(row) for row in clear)),
+        "tie_size": summary(float(len(row["diagnosis"]["effects"][0]["indistinguishable_from"])) for row in right),
+        "confusion": _confusion([*clear, *unlisted_clear]),
+    }  # fmt: skip
+
+
+def _location(rows: Sequence[Row]) -> Row:
+    places = [(row["kind"], location(row)) for row in rows if row["kind"] not in TOGETHER]
+    there = [place for _, place in places if place is not None]
+    return {
+        "listed": summary(place for kind, place in places if kind != "unlisted"),
+        "unlisted": summary(place for kind, place in places if kind == "unlisted"),
+        "above_0.7": proportion(place > TARGETS["location_iou"].value for place in there), "values": [round(place, 3) for place in there],
+    }  # fmt: skip
+
+
+def _parameters(clear: Sequence[Row]) -> Row:
+    """Coefficients of the catalogue's own laws."""
+    errors = [(key, *value) for row in clear for key, value in parameter_errors(row).items()]
+    return {
+        "all": summary(error for _, error, _ in errors),
+        "within_10_percent": proportion(error <= TARGETS["parameter_error"].value for _, error, _ in errors),
+        "interval_covers": proportion(covered for _, _, covered in errors if covered is not None),
+        "error": {key: summary(e for k, e, _ in errors if k == key) for key in sorted({key for key, _, _ in errors})},
+    }  # fmt: skip
+
+
+def _measurable(clear: Sequence[Row]) -> Row:
+    """What an engineer would measure (``probe.MEASURES``)."""
+    errors = [(key, *value) for row in clear for key, value in measured_errors(row).items()]
+    widths = [(key, width) for row in clear for key, width in measured_width(row).items()]
+    return {
+        "all": summary(error for _, error, _ in errors),
+        "within_10_percent": proportion(error <= TARGETS["measured_error"].value for _, error, _ in errors),
+        "interval_covers": proportion(covered for _, _, covered in errors),
+        "half_width": summary(width for _, width in widths),
+        "error": {key: summary(e for k, e, _ in errors if k == key) for key in sorted({key for key, _, _ in errors})},
+        "covers": {
+            key: proportion(c for k, _, c in errors if k == key) for key in sorted({key for key, _, _ in errors})
+        },
+    }  # fmt: skip
+
+
+def _together(rows: Sequence[Row]) -> Row:
+    """Several effects at once."""
+    clear = [row for row in rows if row["ratio_beside"] and min(row["ratio_beside"].values()) >= CLEAR_RATIO]
+    return {
+        "all": proportion(all_answered(row) for row in rows), "one_or_more": proportion(answered(row) > 0 for row in rows),
+        "all_from_0.3": proportion(all_answered(row) for row in clear),
+        "extra_names": proportion(has_wrong_extra(row) for row in rows if all_answered(row)),
+    }  # fmt: skip
+
+
+def _unlisted(rows: Sequence[Row]) -> Row:
+    """The fixed kinds of unlisted physics, for three of which the engine has a pattern of its own."""
+    return {
+        "called_unlisted": proportion(called_unlisted(row) for row in rows if row["ratio"] >= CLEAR_RATIO),
+        "by_ratio": [{"ratio": ratio, **proportion(called_unlisted(row) for row in rows if ratio_of(row) == ratio)} for ratio in RATIOS],
+    }
+
+
+def _laws(rows: Sequence[Row]) -> Row:
+    """Unlisted laws from the generator, which nobody wrote a pattern for."""
+    clear = [row for row in rows if row["ratio"] >= CLEAR_RATIO]
+
+    def kept(key: str, empty: bool) -> Row:
+        return proportion(called_unlisted(row) for row in clear if (row["truth"]["effects"][0]["parameters"][key] in ("", "none")) == empty)
+
+    gains = [gain for row in clear if (gain := foretold(row)) is not None]
+    return {
+        "called_unlisted": proportion(called_unlisted(row) for row in clear), "inside_grammar": kept("outside", empty=True),
+        "outside_grammar": kept("outside", empty=False), "with_memory": kept("memory", empty=False),
+        "by_channel": _grouped(clear, _channel, lambda group: proportion(called_unlisted(row) for row in group)),
+        "named": _named(clear), "outcomes": dict(Counter(outcome(row) for row in clear)),
+        "foretold": summary(gains), "harmed": proportion(gain < 1.0 - WORSE**2 for gain in gains),
+    }  # fmt: skip
+
+
+def _channel(row: Row) -> str:
+    return str(row["truth"]["effects"][0]["parameters"]["channel"])
+
+
+def _dirty(rows: Sequence[Row]) -> Row:
+    """Nothing is hidden, but the recording is as the field's are. Too little to say anything is right as well as silence."""
+    quiet = ("silent", "insufficient data")
+    return {
+        "silent": proportion(outcome(row) in quiet for row in rows), "outcomes": dict(Counter(outcome(row) for row in rows)),
+        "named": _named(rows), "blamed_on_the_sheet": proportion(wrong_sheet(row) is not None for row in rows),
+    }  # fmt: skip
+
+
+def _sheets(rows: Sequence[Row]) -> Row:
+    """Wrong sheets: told with a right entry among the first suspects and no name; told at all; by what is wrong."""
+
+    def mistake(row: Row) -> str:
+        return str(row["mistake"]["what"]).split(" x ")[0]
+
+    return {
+        "told": proportion(sheet_told(row) for row in rows), "finding": proportion(wrong_sheet(row) is not None for row in rows),
+        "by_mistake": _grouped(rows, mistake, lambda group: proportion(sheet_told(row) for row in group)),
+        "named_nothing": proportion(not names_named(row) for row in rows), "named": _named(rows),
+        "other_findings": dict(Counter(
+            finding["finding"] for row in rows if row["diagnosis"] and wrong_sheet(row) is None for finding in row["diagnosis"]["findings"]
+        )),
+    }  # fmt: skip
+
+
+def _beside(rows: Sequence[Row]) -> Row:
+    """Effects beside a friction law of another form."""
+    clear = [row for row in rows if row["ratio"] >= CLEAR_RATIO]
+    return {
+        "named": proportion(answered(row) == 1 for row in clear), "extra_names": proportion(has_wrong_extra(row) for row in clear),
+        "outcomes": dict(Counter(outcome(row) for row in clear)),
+    }  # fmt: skip
 
 
 def _of(rows: Sequence[Row], kind: str) -> list[Row]:
@@ -321,14 +236,14 @@ def _power(ratio: float, rows: Sequence[Row]) -> Row:
 def _effect(effect: str, rows: Sequence[Row]) -> Row:
     """One row of the table of effects: outcomes by ratio and by disguise, and what it was taken for where it was clear enough."""
     right = ("unlisted",) if any(row["kind"] == "unlisted" for row in rows) else RIGHT
-    plain = [row for row in rows if row["kind"] in ("single", "unlisted")]
-    missed = [row for row in rows if row["kind"] != "pair" and row["ratio"] >= CLEAR_RATIO and outcome(row) not in right]
+    plain = [row for row in rows if row["kind"] in ("single", "beside", "unlisted")]
+    missed = [row for row in rows if row["kind"] not in TOGETHER and row["ratio"] >= CLEAR_RATIO and outcome(row) not in right]
     taken: Counter[str] = Counter()
     for row in missed:
         names = {e["id"] for e in row["diagnosis"]["effects"]} - {effect} if row["diagnosis"] else set()
         taken.update(names or {outcome(row)})
     cells = {f"{ratio:g}": [row for row in plain if ratio_of(row) == ratio] for ratio in RATIOS}
-    cells |= {kind: _of(rows, kind) for kind in ("one-bag", "late", "barely")}
+    cells |= {kind: _of(rows, kind) for kind in DISGUISES}
     return {
         "right": {name: [sum(outcome(row) in right for row in cell), len(cell)] for name, cell in cells.items()},
         "outcomes": dict(Counter(outcome(row) for row in plain)),
@@ -380,26 +295,3 @@ def _removed_by(row: Row, peer: str) -> float | None:
     if squares is None or entry["before"] <= 1.1 * squares[2]:
         return None
     return float((entry["before"] - entry["after"]) / (entry["before"] - squares[2]))
-
-
-def _targets(result: Row) -> list[Row]:
-    """Every target with what was reached; ``met`` is None where nothing was measured."""
-    weakest = next(power for power in result["power"] if power["ratio"] == RATIOS[0])
-    reached: dict[str, tuple[str, float | None]] = {
-        "nulls_silent": ("nulls left alone", result["nulls"]["silent"]["share"]),
-        "named_from_0.3": ("right name or tie, effect-to-noise 0.3 and above", result["naming"]["from_0.3"]["share"]),
-        "named_at_0.1": ("right name or tie, effect-to-noise 0.1", weakest["right"]["share"]),
-        "location_iou": ("location IoU of local effects (median)", result["location"]["listed"]["median"]),
-        "parameter_error": ("relative error of parameters (median)", result["parameters"]["all"]["median"]),
-        "removed": ("removable held-out error removed (median)", result["removed"]["from_0.3"]["median"]),
-        "both_of_two": ("both of two effects", result["pairs"]["both"]["share"]),
-        "unlisted": ("unlisted effects called unlisted, 0.3 and above", result["unlisted"]["called_unlisted"]["share"]),
-    }
-
-    def met(key: str, value: float) -> bool:
-        return value <= TARGETS[key] if key == "parameter_error" else value >= TARGETS[key]
-
-    return [
-        {"id": key, "what": what, "reached": value, "target": TARGETS[key], "met": None if value is None else met(key, value)}
-        for key, (what, value) in reached.items()
-    ]

@@ -17,37 +17,44 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.rosbag2 import StoragePlugin
 
 from lugre_steering.proof import conceal, hydraulics, manoeuvres
-from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, Concealed, Hidden, Motion
+from lugre_steering.proof.bagfile import Topic, write_bag
+from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, Concealed, Motion
 from lugre_steering.proof.contact import HiddenContact, Patches, Track, patches, run_track
+from lugre_steering.proof.generator import Law, Modulation, Scene, draw_law, modulate
+from lugre_steering.proof.made import Hidden, Probe, active_intervals, left_over, removable_of, unit
 from lugre_steering.proof.rubber import rubber_table
 from lugre_steering.proof.sensors import PERIOD_S, Habits, NoiseKind, Samples, draw_habits, sense_angle, sense_pressures
 from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle, draw_vehicle, load_sheet
 
 __all__ = [
     "EFFECT_IDS", "UNLISTED_IDS", "BagData", "Case", "CaseData", "Concealed", "load_sheet", "noise_variance",
-    "recalibrated_variance", "removable_variance", "simulate_case", "write_case",
+    "recalibrated_variance", "removable_variance", "simulate_case", "tangents", "write_case",
 ]
 
 Array = NDArray[np.float64]
 
 EPOCH_S = 1_790_000_000
-ACTIVE_SHARE = 0.05  # an effect acts where its torque exceeds this share of its largest
+LAW = "law"
+FASTER, FURTHER = 1.5, 1.1  # the manoeuvre that nobody recorded
 _FINE = round(PERIOD_S / manoeuvres.STEP_S)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A recipe: everything is drawn from ``seed``; ``parameter_spread`` is how far true values leave the sheet."""
+    """A recipe: everything is drawn from ``seed``; ``parameter_spread`` is how far true values leave the sheet.
+
+    ``law``: strength of a generated law (``generator``) to hide as well.
+    """
 
     seed: int
     effects: tuple[Concealed, ...] = ()
     noise: NoiseKind = "white"
     manoeuvres: tuple[str, str] | None = None
     parameter_spread: float = 0.15
+    law: float | None = None
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,10 @@ class CaseData:
     patches: tuple[Patches, Patches]
     hidden: tuple[Hidden, ...]
     bags: tuple[BagData, ...]
+    law: Law
+    line_share: Array
+    return_flow_Pas: float
+    habits: Habits
 
 
 @dataclass(frozen=True)
@@ -92,6 +103,7 @@ class _Bench:
     line_share: Array
     return_flow_Pas: float
     seed: tuple[int, int]
+    law: Law
 
 
 def simulate_case(case: Case, sheet: Sheet) -> CaseData:
@@ -102,21 +114,51 @@ def simulate_case(case: Case, sheet: Sheet) -> CaseData:
     share = np.array([vehicle_rng.uniform(0.9, 1.0) if line.startswith("aux") else 1.0 for line in sheet.lines])
     flow = vehicle_rng.uniform(0.0, 8e5)
     hidden = tuple(_place_patch(conceal.draw(wanted, effect_rng), effect_rng) for wanted in case.effects)
-    habits = draw_habits(logger_rng)
+    if case.law is not None:
+        hidden = (*hidden, Hidden(LAW, {"strength": case.law}, None, -1e9))
+    law, habits = draw_law(np.random.default_rng((case.seed, 5))), draw_habits(logger_rng)
     kinds = case.manoeuvres or tuple(str(kind) for kind in logger_rng.choice(list(manoeuvres.KINDS), 2, replace=False))
     benches: list[_Bench] = []
     for index, kind in enumerate(kinds):
         mean = manoeuvres.mean_angle(kind, np.random.default_rng((case.seed, 10 + index)))
-        angles = manoeuvres.ackermann(mean, sheet.wheelbase_m, sheet.kingpin_distance_m)
-        time = np.arange(mean.size, dtype=np.float64) * np.float64(manoeuvres.STEP_S)
-        benches.append(_Bench(sheet, both, time, angles, share, flow, (case.seed, 20 + index)))
+        benches.append(_bench(sheet, both, mean, share, flow, (case.seed, 20 + index), law))
     hidden = tuple(_set_ceiling(effect, vehicle, benches) for effect in hidden)
     bags = []
     for index, (kind, bench) in enumerate(zip(kinds, benches, strict=True)):
         rng = np.random.default_rng((case.seed, 30 + index))
         here = [effect for effect in hidden if effect.only_bag in (None, index)]
         bags.append(_bag(kind, bench, vehicle, here, case.noise, habits, rng))
-    return CaseData(case, sheet, vehicle, both, hidden, tuple(bags))
+    return CaseData(case, sheet, vehicle, both, hidden, tuple(bags), law, share, flow, habits)
+
+
+def _bench(
+    sheet: Sheet, both: tuple[Patches, Patches], mean: Array, share: Array, flow: float, seed: tuple[int, int], law: Law
+) -> _Bench:
+    angles = manoeuvres.ackermann(mean, sheet.wheelbase_m, sheet.kingpin_distance_m)
+    time = np.arange(mean.size, dtype=np.float64) * np.float64(manoeuvres.STEP_S)
+    return _Bench(sheet, both, time, angles, share, flow, seed, law)
+
+
+def unseen_bag(data: CaseData) -> BagData:
+    """The motion of the first bag quicker and wider, with all that is hidden: what nobody recorded."""
+    rng = np.random.default_rng((data.case.seed, 10))
+    mean = manoeuvres.mean_angle(data.bags[0].manoeuvre, rng)
+    mean = FURTHER * np.interp(np.arange(0.0, mean.size - 1.0, FASTER), np.arange(mean.size), mean)
+    bench = _bench(data.sheet, data.patches, mean, data.line_share, data.return_flow_Pas, (data.case.seed, 40), data.law)
+    return _bag("unseen", bench, data.vehicle, list(data.hidden), data.case.noise, data.habits, np.random.default_rng((data.case.seed, 50)))
+
+
+def probe(data: CaseData, angles: Array) -> Probe:
+    """The case's vehicle with everything hidden, from the start and in every bag, on other angles (2, n) [rad] at STEP_S."""
+    time = np.arange(angles.shape[1], dtype=np.float64) * np.float64(manoeuvres.STEP_S)
+    bench = _Bench(data.sheet, data.patches, time, angles, data.line_share, data.return_flow_Pas, (data.case.seed, 41), data.law)
+    always, tracks = [effect._replace(start_s=-1e9) for effect in data.hidden], dict[tuple[str, ...], tuple[Track, ...]]()
+    gain = hydraulics.line_gain(data.sheet, angles)
+
+    def torque(hidden: list[Hidden]) -> Array:
+        return hydraulics.torque_of(_pressures(bench, data.vehicle, hidden, tracks), gain)
+
+    return Probe(torque(always), {effect.id: torque([h for h in always if h is not effect]) for effect in always})
 
 
 def _place_patch(effect: Hidden, rng: np.random.Generator) -> Hidden:
@@ -183,27 +225,18 @@ def _pressures(
             angle = angle / (1.0 + on * effect.values["scale"])
         elif effect.id == "moment_arm_error":
             arm_factor = 1.0 + on * (effect.values["a"] * bench.measured + effect.values["b"] * bench.measured**2)
-    before = [h for h in hidden if h.id in conceal.ANGLE or h.id in conceal.CONTACT]
-    key = tuple(h.id for h in before)
-    if key not in tracks:
-        fields: dict[str, float] = {}
-        for effect in before:
-            if effect.id in conceal.CONTACT:
-                fields |= {f"{effect.id}_{name}": value for name, value in effect.values.items()}
-                fields[f"{effect.id}_from"] = effect.start_s
-        inside, rubber = HiddenContact(**fields), rubber_table(vehicle.reference_degC)
-        tracks[key] = tuple(
-            run_track(np.ascontiguousarray(side), step, vehicle, rubber, cells, inside)
-            for side, cells in zip(angle, bench.patches, strict=True)
-        )
     rate = np.gradient(angle, step, axis=1)
     motion = Motion(time, angle, rate, np.gradient(rate, step, axis=1))
-    sides = np.stack([track.friction + track.aligning for track in tracks[key]])
+    law = next((effect for effect in hidden if effect.id == LAW), None)
+    change = None if law is None else _modulation(bench, vehicle, motion, law, tracks)
+    sides = np.stack([track.friction + track.aligning for track in _contact(bench, vehicle, angle, hidden, change, tracks)])
+    if change is not None:
+        sides = sides + change.torque
     for effect in hidden:
         if effect.id in conceal.PARALLEL_LAWS:
             chance = np.random.default_rng(bench.seed)
-            law = conceal.PARALLEL_LAWS[effect.id]
-            sides = sides + conceal.gate(time, effect.start_s) * law(motion, effect.values, chance)
+            part = conceal.PARALLEL_LAWS[effect.id](motion, effect.values, chance)
+            sides = sides + conceal.gate(time, effect.start_s) * part
     torque = sides.sum(axis=0)
     for effect in hidden:
         if effect.id in conceal.LOSS_LAWS:
@@ -221,15 +254,39 @@ def _pressures(
     return pressures
 
 
-def active_intervals(time: Array, part: Array) -> list[tuple[float, float]]:
-    """Stretches [s] in which ``|part|`` exceeds ACTIVE_SHARE of its maximum; gaps below half a second are bridged."""
-    size = np.abs(part)
-    if not size.any():
-        return []
-    at = np.flatnonzero(size > ACTIVE_SHARE * size.max())
-    ends = np.flatnonzero(np.diff(at) > 0.5 / PERIOD_S)
-    starts, stops = at[np.concatenate([[0], ends + 1])], at[np.concatenate([ends, [at.size - 1]])]
-    return [(float(time[a]), float(time[b])) for a, b in zip(starts, stops, strict=True) if b - a > 0.1 / PERIOD_S]
+def _contact(
+    bench: _Bench, vehicle: TrueVehicle, angle: Array, hidden: list[Hidden], change: Modulation | None,
+    tracks: dict[tuple[str, ...], tuple[Track, ...]],
+) -> tuple[Track, ...]:  # fmt: skip
+    """Both contacts with what is hidden before and in them; each combination is run once."""
+    before = [h for h in hidden if h.id in conceal.ANGLE or h.id in conceal.CONTACT]
+    key = (*(h.id for h in before), *([LAW] if change is not None else []))
+    if key not in tracks:
+        fields: dict[str, float] = {}
+        for effect in before:
+            if effect.id in conceal.CONTACT:
+                fields |= {f"{effect.id}_{name}": value for name, value in effect.values.items()}
+                fields[f"{effect.id}_from"] = effect.start_s
+        inside, rubber, step = HiddenContact(**fields), rubber_table(vehicle.reference_degC), manoeuvres.STEP_S
+        factors = [()] * 2 if change is None else list(zip(change.level, change.stiffness, strict=True))
+        tracks[key] = tuple(
+            run_track(np.ascontiguousarray(side), step, vehicle, rubber, cells, inside, *map(np.ascontiguousarray, factor))
+            for side, cells, factor in zip(angle, bench.patches, factors, strict=True)
+        )
+    return tracks[key]
+
+
+def _modulation(
+    bench: _Bench, vehicle: TrueVehicle, motion: Motion, law: Hidden, tracks: dict[tuple[str, ...], tuple[Track, ...]]
+) -> Modulation:
+    """What the generated law does to both tracks, from their torque without it."""
+    plain = _contact(bench, vehicle, motion.angle, [], None, tracks)
+    torque = np.stack([track.friction + track.aligning for track in plain])
+    scene = Scene(
+        motion.time, motion.angle, motion.rate, motion.acceleration, torque, np.stack([track.temperature for track in plain]),
+        manoeuvres.LIMIT_RAD, 2.0 * vehicle.coulomb_torque_Nm,
+    )  # fmt: skip
+    return modulate(bench.law, law.values["strength"], scene)
 
 
 def removable_variance(bag: BagData) -> float:
@@ -237,7 +294,7 @@ def removable_variance(bag: BagData) -> float:
 
     Not taken about its mean: the baseline has no free constant, so a constant torque is error that can be removed.
     """
-    return float(np.mean((bag.torque - bag.torque_without) ** 2))
+    return removable_of(bag)
 
 
 def noise_variance(data: CaseData, bag: BagData) -> float:
@@ -258,35 +315,17 @@ def recalibrated_variance(data: CaseData) -> float:
 
     Linear: the added torque is projected off the tangents of this simulator's own baseline (finite differences of 1 %).
     """
-    return _off(np.concatenate([bag.torque - bag.torque_without for bag in data.bags]), _tangents(data))
+    return left_over(np.concatenate([bag.torque - bag.torque_without for bag in data.bags]), tangents(data))
 
 
-def variances_beside(data: CaseData) -> dict[str, float]:
-    """Of each hidden effect, what neither recalibration nor the other effects at any size can imitate of its torque [N2 m2]."""
-    torque = {effect.id: np.concatenate([bag.effect_torque[effect.id] for bag in data.bags]) for effect in data.hidden}
-    tangents = _tangents(data)
-    return {
-        own: _off(row, np.column_stack([tangents, *(other / np.linalg.norm(other) for name, other in torque.items() if name != own)]))
-        for own, row in torque.items()
-    }
-
-
-def _off(torque: Array, columns: Array) -> float:
-    """Mean square of what least squares on the columns leaves."""
-    left = torque - columns @ np.linalg.lstsq(columns, torque, rcond=1e-9)[0]
-    return float(np.mean(left**2))
-
-
-def _tangents(data: CaseData) -> Array:
+def tangents(data: CaseData) -> Array:
     """Changes of the baseline's torque with each of its calibrated parameters, as unit columns (n, parameters)."""
     nothing_moved = _baseline(data, data.vehicle)
     columns = []
     for name in _CALIBRATED:
         moved = data.vehicle._replace(**{name: 1.01 * getattr(data.vehicle, name)})
         columns.append(_baseline(data, moved) - nothing_moved)
-    tangents = np.stack(columns, axis=1)
-    tangents /= np.linalg.norm(tangents, axis=0)
-    return tangents
+    return np.stack([unit(column) for column in columns], axis=1)
 
 
 def _baseline(data: CaseData, vehicle: TrueVehicle) -> Array:
@@ -325,6 +364,10 @@ def write_case(data: CaseData, folder: Path, truth_folder: Path, name: str = "ru
         truth[f"{letter}_torque"] = bag.torque
         truth[f"{letter}_torque_without"] = bag.torque_without
         truth |= {f"{letter}_{effect}": part for effect, part in bag.effect_torque.items()}
+    if data.case.law is not None:
+        bag = unseen_bag(data)
+        _write_bag(truth_folder / f"{name}_unseen", data.sheet, bag, epoch_s + 900, plugin)
+        truth |= {"unseen_time": bag.time, "unseen_torque": bag.torque, "unseen_torque_without": bag.torque_without}
     np.savez_compressed(truth_folder / "truth.npz", **truth)
     (truth_folder / "truth.json").write_text(json.dumps(_truth(data, name), indent=1), encoding="utf-8")
     return paths
@@ -339,6 +382,7 @@ def _truth(data: CaseData, name: str) -> dict[str, object]:
             {
                 "id": effect.id,
                 "parameters": {key: _quantity(data, effect, key) for key in effect.values},
+                **({"law": asdict(data.law)} if effect.id == LAW else {}),
                 "only_bag": effect.only_bag,
                 "start_s": max(effect.start_s, 0.0),
             }
@@ -360,30 +404,18 @@ def _truth(data: CaseData, name: str) -> dict[str, object]:
 def _quantity(data: CaseData, effect: Hidden, key: str) -> dict[str, object]:
     if key == "line":
         return {"value": data.sheet.lines[int(effect.values[key])], "unit": "name"}
-    unit = "Pa" if key == "ceiling" else conceal.CATALOGUE[effect.id][key].unit
-    return {"value": effect.values[key], "unit": unit}
+    if effect.id == LAW:
+        return {"value": effect.values[key], "unit": "1"}
+    measure = "Pa" if key == "ceiling" else conceal.CATALOGUE[effect.id][key].unit
+    return {"value": effect.values[key], "unit": measure}
 
 
 def _write_bag(path: Path, sheet: Sheet, bag: BagData, epoch_s: int, plugin: StoragePlugin) -> None:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    stamp, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
-    joint, fluid = store.types["sensor_msgs/msg/JointState"], store.types["sensor_msgs/msg/FluidPressure"]
-    none = np.zeros(0)
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
-        queue = []
-        for side, samples in zip(("left", "right"), bag.angles, strict=True):
-            topic = writer.add_connection(f"/steering/{side}/joint_state", joint.__msgtype__, typestore=store)
-            queue.append((topic, f"{side}_track_steer_joint", samples))
-        for line, samples in zip(sheet.lines, bag.pressures, strict=True):
-            topic = writer.add_connection(f"/steering/pressure/{line}", fluid.__msgtype__, typestore=store)
-            queue.append((topic, "", samples))
-        nanoseconds = [epoch_s * 10**9 + np.round(samples.time * 1e9).astype(np.int64) for _, _, samples in queue]
-        which = np.repeat(np.arange(len(queue)), [ns.size for ns in nanoseconds])
-        within = np.concatenate([np.arange(ns.size) for ns in nanoseconds])
-        for k in np.argsort(np.concatenate(nanoseconds), kind="stable"):
-            source, i = which[k], within[k]
-            topic, name, samples = queue[source]
-            ns, value = int(nanoseconds[source][i]), float(samples.value[i])
-            head = header(stamp(ns // 10**9, ns % 10**9), "steering_axle")
-            message = joint(head, [name], np.array([value]), none, none) if name else fluid(head, value, 0.0)
-            writer.write(topic, ns + 600_000, store.serialize_cdr(message, topic.msgtype))
+    topics = [
+        Topic(f"/steering/{side}/joint_state", "angle", f"{side}_track_steer_joint", samples)
+        for side, samples in zip(("left", "right"), bag.angles, strict=True)
+    ]
+    topics += [
+        Topic(f"/steering/pressure/{line}", "pressure", "", samples) for line, samples in zip(sheet.lines, bag.pressures, strict=True)
+    ]
+    write_bag(path, topics, epoch_s, plugin)

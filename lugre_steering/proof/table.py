@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from lugre_steering.proof.campaign import RATIOS
+from lugre_steering.proof.campaign import DISGUISES, RATIOS
 
 Row = Mapping[str, Any]
 
@@ -33,49 +33,71 @@ def median(score: Row) -> str:
 
 
 def show_board(console: Console, board: Row) -> None:
-    """Targets first, then what they are made of."""
+    """For each simulator: targets first, then what they are made of."""
     done, planned = sum(board["cases"].values()), board["made"]["planned_cases"]
-    targets = Table(title=f"{done} of {planned} cases, seed {board['made']['seed']}")
-    for name in ("score", "reached", "target", ""):
-        targets.add_column(name, justify="left" if name == "score" else "right")
-    for target in board["targets"]:
-        reached = "-" if target["reached"] is None else f"{target['reached']:.2f}"
-        met = {None: Text(), True: Text("met", "green"), False: Text("not met", "red")}[target["met"]]
-        targets.add_row(target["what"], reached, f"{target['target']:.2f}", met)
-    console.print(targets)
-    scores = Table("score", "share (count, 95 % interval) or median (quartiles, count)")
-    scores.add_row("nulls silent", share(board["nulls"]["silent"]))
-    for noise, score in board["nulls"]["by_noise"].items():
-        scores.add_row(f"  {noise} noise", share(score))
-    scores.add_row("  held-out error over noise (mean square)", median(board["nulls"]["heldout_over_noise"]))
-    for power in board["power"]:
-        scores.add_row(f"detected at effect-to-noise {power['ratio']:g}", share(power["detected"]))
-        scores.add_row("  right name or tie", share(power["right"]))
-    for kind, score in board["disguises"].items():
-        scores.add_row(f"right name or tie, {kind}", share(score))
-    for band in board["masked"]:
-        scores.add_row(f"right name or tie, masked share {band['masked']}", share(band))
-    scores.add_row("both of two effects", share(board["pairs"]["both"]))
-    scores.add_row("  each 0.3 and above beside the other", share(board["pairs"]["both_from_0.3"]))
-    scores.add_row("unlisted called unlisted", share(board["unlisted"]["called_unlisted"]))
-    scores.add_row("location IoU", median(board["location"]["listed"]))
-    scores.add_row("location IoU, unlisted", median(board["location"]["unlisted"]))
-    scores.add_row("parameters within 10 %", share(board["parameters"]["within_10_percent"]))
-    scores.add_row("95 % interval covers the true parameter", share(board["parameters"]["interval_covers"]))
-    scores.add_row("removable held-out error removed", median(board["removed"]["from_0.3"]))
-    scores.add_row("seconds per diagnosis", median(board["seconds_per_case"]))
-    console.print(scores)
-    _show_effects(console, board)
-    if board["peers"]:
-        _show_peers(console, board["peers"])
+    console.print(f"{done} of {planned} cases, seed {board['made']['seed']}")
+    for number, part in board["simulators"].items():
+        _show_targets(console, number, part)
+        _show_scores(console, part)
+        _show_effects(console, part)
+        if part["peers"]:
+            _show_peers(console, part["peers"])
     for failure in board["failed"]:
         console.print(f"failed: {failure['name']} (seed {failure['seed']}): {failure['error']}")
 
 
-def _show_effects(console: Console, board: Row) -> None:
-    cells = list(next(iter(board["effects"].values()))["right"]) if board["effects"] else []
+def told(score: Row) -> str:
+    """A share or a median with its count and interval."""
+    return share(score) if "share" in score else median(score)
+
+
+def _show_targets(console: Console, number: str, part: Row) -> None:
+    table = Table(title=f"simulator {number}: {sum(part['cases'].values())} cases")
+    for name in ("score", "reached", "target", ""):
+        table.add_column(name, justify="left" if name == "score" else "right")
+    colour = {"met": "green", "not met": "red", "too few cases": "yellow", None: ""}
+    for target in part["targets"]:
+        limit = f"{'at most' if target['most'] else 'at least'} {target['target']:g}"
+        table.add_row(target["what"], told(target["score"]), limit, Text(target["status"] or "", colour[target["status"]]))
+    console.print(table)
+
+
+def details(part: Row) -> dict[str, Row]:
+    """Scores beside the targets, by what they say."""
+    rows: dict[str, Row] = {f"nulls silent, {noise} noise": score for noise, score in part["nulls"]["by_noise"].items()}
+    rows["held-out error over noise in nulls (mean square)"] = part["nulls"]["heldout_over_noise"]
+    for power in part["power"]:
+        rows[f"detected at effect-to-noise {power['ratio']:g}"] = power["detected"]
+        rows[f"right name or tie at {power['ratio']:g}"] = power["right"]
+    rows |= {f"right name or tie, masked share {band['masked']}": band for band in part["masked"]}
+    rows["both of two effects, each 0.3 and above beside the other"] = part["pairs"]["all_from_0.3"]
+    rows["all of three effects, each 0.3 and above beside the others"] = part["triples"]["all_from_0.3"]
+    rows["generated laws inside the grammar called unlisted"] = part["laws"]["inside_grammar"]
+    rows["generated laws outside the grammar called unlisted"] = part["laws"]["outside_grammar"]
+    rows["generated laws with a memory called unlisted"] = part["laws"]["with_memory"]
+    rows["dirty nulls blamed on the sheet"] = part["dirty"]["blamed_on_the_sheet"]
+    rows["wrong sheets: a finding"] = part["sheets"]["finding"]
+    rows["wrong sheets: nothing named"] = part["sheets"]["named_nothing"]
+    rows |= {f"wrong sheets: {what}": score for what, score in part["sheets"]["by_mistake"].items()}
+    rows["coefficients within 10 %"] = part["parameters"]["within_10_percent"]
+    rows["measurable quantities within 10 %"] = part["measurable"]["within_10_percent"]
+    rows["half width of their intervals (relative, median)"] = part["measurable"]["half_width"]
+    rows["places of local effects with an IoU above 0.7"] = part["location"]["above_0.7"]
+    rows["location IoU, unlisted"] = part["location"]["unlisted"]
+    return {what: score for what, score in rows.items() if score["of"]}
+
+
+def _show_scores(console: Console, part: Row) -> None:
+    scores = Table("score", "share (count, 95 % interval) or median (quartiles, count)")
+    for what, score in details(part).items():
+        scores.add_row(what, told(score))
+    console.print(scores)
+
+
+def _show_effects(console: Console, part: Row) -> None:
+    cells = list(next(iter(part["effects"].values()))["right"]) if part["effects"] else []
     table = Table("effect", *cells, "taken for", title="right of all, by effect-to-noise ratio and disguise")
-    for effect, entry in board["effects"].items():
+    for effect, entry in part["effects"].items():
         counts = [f"{right}/{of}" if of else "" for right, of in (entry["right"][cell] for cell in cells)]
         table.add_row(effect, *counts, ", ".join(f"{name} {n}" for name, n in entry["taken_for"].items()))
     console.print(table)
@@ -89,42 +111,35 @@ def _show_peers(console: Console, peers: Row) -> None:
 
 
 def readme_lines(board: Row) -> list[str]:
-    """What README shows, so that its numbers come from the kept scoreboard: targets, peers, and the cells that fall short."""
-    sign = {"parameter_error": "at most"}
-    behind: dict[str, str] = {
-        "nulls_silent": share(board["nulls"]["silent"]),
-        "named_from_0.3": share(board["naming"]["from_0.3"]),
-        "named_at_0.1": share(next(power["right"] for power in board["power"] if power["ratio"] == RATIOS[0])),
-        "location_iou": median(board["location"]["listed"]),
-        "parameter_error": median(board["parameters"]["all"]),
-        "removed": median(board["removed"]["from_0.3"]),
-        "both_of_two": share(board["pairs"]["both"]),
-        "unlisted": share(board["unlisted"]["called_unlisted"]),
-    }
-    lines = ["| score | reached | target |", "|---|---|---|"]
-    lines += [f"| {t['what']} | {behind[t['id']]} | {sign.get(t['id'], 'at least')} {t['target']:.2f} |" for t in board["targets"]]
-    beside = {
-        "parameters within 10 %": share(board["parameters"]["within_10_percent"]),
-        "95 % interval covers the true parameter": share(board["parameters"]["interval_covers"]),
-        "places of local effects with an IoU above 0.7": share(board["location"]["above_0.7"]),
-        "both of two effects, each 0.3 and above beside the other": share(board["pairs"]["both_from_0.3"]),
-        **{f"right name or tie, {kind}": share(score) for kind, score in board["disguises"].items()},
-        "seconds per diagnosis on one thread": median(board["seconds_per_case"]),
-    }
-    lines += [f"| {what} | {value} | |" for what, value in beside.items()]
-    if board["peers"]:
-        lines += ["", "| method | held-out error removed | false alarms on nulls | right name | seconds |", "|---|---|---|---|---|"]
-        lines += [
-            f"| {name} | {median(peer['removed'])} | {share(peer['false_alarms'])} | {share(peer['named'])} | {median(peer['seconds'])} |"
-            for name, peer in board["peers"].items()
-        ]
-    cells = [f"{ratio:g}" for ratio in RATIOS] + ["one-bag", "late", "barely"]
+    """What README shows, so that its numbers come from the kept scoreboard, simulator by simulator."""
+    lines: list[str] = []
+    for number, part in board["simulators"].items():
+        lines += [f"| simulator {number} | reached | target |", "|---|---|---|"]
+        for target in part["targets"]:
+            limit = f"{'at most' if target['most'] else 'at least'} {target['target']:g}"
+            lines.append(f"| {target['what']} | {told(target['score'])} | {limit}: {target['status']} |")
+        lines += [f"| {what} | {told(score)} | |" for what, score in details(part).items()]
+        lines += [*_readme_peers(part["peers"]), *_readme_effects(part["effects"])]
+    return lines
+
+
+def _readme_peers(peers: Row) -> list[str]:
+    rows = [
+        f"| {name} | {median(peer['removed'])} | {share(peer['false_alarms'])} | {share(peer['named'])} | {median(peer['seconds'])} |"
+        for name, peer in peers.items()
+    ]
+    head = ["", "| method | held-out error removed | false alarms on nulls | right name | seconds |", "|---|---|---|---|---|"]
+    return head + rows if rows else []
+
+
+def _readme_effects(effects: Row) -> list[str]:
+    """Effects that fell short anywhere but at the lowest ratio."""
+    cells = [*(f"{ratio:g}" for ratio in RATIOS), *DISGUISES]
     short = {
-        effect: entry for effect, entry in board["effects"].items()
+        effect: entry for effect, entry in effects.items()
         if any(right < of for cell, (right, of) in entry["right"].items() if cell != cells[0])
     }  # fmt: skip
-    if short:
-        lines += ["", f"| right of all | {' | '.join(cells)} | taken for |", "|---" * (len(cells) + 2) + "|"]
+    lines = ["", f"| right of all | {' | '.join(cells)} | taken for |", "|---" * (len(cells) + 2) + "|"] if short else []
     for effect, entry in short.items():
         counts = [f"{right}/{of}" if of else "" for right, of in (entry["right"][cell] for cell in cells)]
         taken = ", ".join(f"{name} {count}" for name, count in entry["taken_for"].items())

@@ -1,7 +1,7 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The `replay` command: recorded bags through the estimator, results beside the inputs."""
+"""Recordings through the estimator, results beside the inputs. Called itself, it is ``replay.library.replay``."""
 
-from lugre_steering.replay.run import describe, replay
+from lugre_steering.callable_room import make_callable
 
-__all__ = ["describe", "replay"]
+make_callable(__name__)

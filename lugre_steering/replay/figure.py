@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,63 +11,33 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.online import Curves, r2_words
+from lugre_steering.online import Agreement, Curves, r2_words
 from lugre_steering.recording import Array
 from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, SHOWN, figure
 from lugre_steering.vehicle import Vehicle
 
-GAP_S = 0.5
+BROKEN_S = 0.5
 """A curve is broken where nothing came for longer than this."""
 
 
 def draw_replay(
-    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Mapping[str, Any] | None, file: Path
+    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Agreement | None, file: Path
 ) -> None:
     """Write the picture as PNG.
 
     ``motion``: angle of each side, temperature of each side, estimated torque; ``check``: cylinder torque, residual.
     """
-    sides, coordinate = vehicle.sides, vehicle.coordinate
-    scale, unit = SHOWN.get(coordinate.unit, (1.0, coordinate.unit))
-    time, lines = _lines(motion)
-    check_time, checked = _lines(check)
-    measured = "sensor torque" if vehicle.torque_sensor is not None else "cylinder torque"
     with figure(
-        4 if vehicle.rubber else 3,
-        1,
-        _caption(name, vehicle, fit),
-        file,
-        row_inches=1.9,
-        words=partial(units.words, vehicle),
+        4 if vehicle.rubber else 3, 1, _caption(name, vehicle, fit), file, row_inches=1.9, words=partial(units.words, vehicle)
     ) as axes:
-        rows = iter(axes[:, 0])
-        ax = next(rows)
-        for i, side in enumerate(sides):
-            ax.plot(time, scale * lines[i], label=side, color=SERIES[i])
-        ax.set_title(coordinate.name)
-        ax.set_ylabel(unit)
-
-        ax = next(rows)
-        if check_time.size:
-            ax.plot(check_time, checked[0] * 1e-3, **MEASURED, label=measured)
-        ax.plot(time, lines[-1] * 1e-3, **IMPROVED, label="estimate")
-        ax.set_title("torque that the actuators deliver")
-        ax.set_ylabel(f"k{coordinate.force_unit}")
-
-        ax = next(rows)
-        if check_time.size:
-            ax.plot(check_time, checked[1] * 1e-3, color=SERIES[2], label=f"{measured} minus estimate")
-        else:
-            ax.text(0.5, 0.5, "not available", transform=ax.transAxes, ha="center", color="#777777")
-        ax.set_title("residual")
-        ax.set_ylabel(f"k{coordinate.force_unit}")
-
+        (time, lines), (check_time, checked) = _lines(motion), _lines(check)
+        measured = "sensor torque" if vehicle.torque_sensor is not None else "cylinder torque"
+        sides, force = len(vehicle.sides), vehicle.coordinate.force_unit
+        _angles(axes[0, 0], vehicle, time, lines[:sides])
+        _torques(axes[1, 0], force, (time, lines[-1]), (check_time, checked[0]), measured)
+        _residual(axes[2, 0], force, check_time, checked[1], f"{measured} minus estimate")
         if vehicle.rubber:
-            ax = next(rows)
-            for i, side in enumerate(sides):
-                ax.plot(time, lines[len(sides) + i], label=side, color=SERIES[i])
-            ax.set_title("tread rubber temperature (estimate)")
-            ax.set_ylabel("degC")
+            _temperatures(axes[3, 0], vehicle, time, lines[sides : 2 * sides])
         for ax in axes[:, 0]:
             ax.set_xlim(0.0, float(time[~np.isnan(time)][-1]) or 1.0)
             if ax.get_legend_handles_labels()[0]:
@@ -76,16 +45,48 @@ def draw_replay(
         axes[-1, 0].set_xlabel("time since the first stamp (s)")
 
 
+def _angles(ax: Any, vehicle: Vehicle, time: Array, angles: Array) -> None:
+    scale, unit = SHOWN.get(vehicle.coordinate.unit, (1.0, vehicle.coordinate.unit))
+    for side, angle, colour in zip(vehicle.sides, angles, SERIES, strict=False):
+        ax.plot(time, scale * angle, label=side, color=colour)
+    ax.set_title(vehicle.coordinate.name)
+    ax.set_ylabel(unit)
+
+
+def _torques(ax: Any, unit: str, estimate: tuple[Array, Array], checked: tuple[Array, Array], measured: str) -> None:
+    if checked[0].size:
+        ax.plot(checked[0], checked[1] * 1e-3, **MEASURED, label=measured)
+    ax.plot(estimate[0], estimate[1] * 1e-3, **IMPROVED, label="estimate")
+    ax.set_title("torque that the actuators deliver")
+    ax.set_ylabel(f"k{unit}")
+
+
+def _residual(ax: Any, unit: str, time: Array, residual: Array, label: str) -> None:
+    if time.size:
+        ax.plot(time, residual * 1e-3, color=SERIES[2], label=label)
+    else:
+        ax.text(0.5, 0.5, "not available", transform=ax.transAxes, ha="center", color="#777777")
+    ax.set_title("residual")
+    ax.set_ylabel(f"k{unit}")
+
+
+def _temperatures(ax: Any, vehicle: Vehicle, time: Array, temperatures: Array) -> None:
+    for side, temperature, colour in zip(vehicle.sides, temperatures, SERIES, strict=False):
+        ax.plot(time, temperature, label=side, color=colour)
+    ax.set_title("tread rubber temperature (estimate)")
+    ax.set_ylabel("degC")
+
+
 def _lines(curves: Curves) -> tuple[Array, Array]:
     """Time (m,) and curves (k, m) that go through the smallest and largest value of every bin; NaN breaks them."""
     middle, low, high = curves.bins()
     both = np.stack([low, high], axis=-1).reshape(len(low), -1)
     time = np.repeat(middle, 2)
-    breaks = 2 * (np.flatnonzero(np.diff(middle) > max(GAP_S, 2.0 * curves.bin_s)) + 1)
+    breaks = 2 * (np.flatnonzero(np.diff(middle) > max(BROKEN_S, 2.0 * curves.bin_s)) + 1)
     return np.insert(time, breaks, np.nan), np.insert(both, breaks, np.nan, axis=1)
 
 
-def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
+def _caption(name: str, vehicle: Vehicle, fit: Agreement | None) -> str:
     text = f"Bag {name}. Vehicle: {vehicle.name}. "
     if vehicle.effects:
         text += f"Effects added to the baseline: {', '.join(effect.id for effect in vehicle.effects)}. "
@@ -93,6 +94,6 @@ def _caption(name: str, vehicle: Vehicle, fit: Mapping[str, Any] | None) -> str:
         return text + "No residual: the torque was not measured."
     unit = vehicle.coordinate.force_unit
     return text + (
-        f"Residual over {fit['samples']} samples: RMSE {fit['rmse_Nm']:.1f} {unit}{r2_words(fit['r2'], 'R²')}, bias {fit['bias_Nm']:+.1f} "
+        f"Residual over {fit.samples} samples: RMSE {fit.rmse_Nm:.1f} {unit}{r2_words(fit.r2, 'R²')}, bias {fit.bias_Nm:+.1f} "
         f"{unit}."
     )

@@ -11,7 +11,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from rosbags.typesys.store import Typestore
 
 from lugre_steering import yaml_text
 from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
+from lugre_steering.bag.given import in_stamp_order
 from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.bag.writer import copied
@@ -31,19 +32,21 @@ from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.online import Curves, Fit, Timeline, is_large, r2_words
-from lugre_steering.recording import NODE, Channel, Finding, IntArray, Kind, unused_name
+from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, r2_words, sheet_words
+from lugre_steering.recording import AIR_LIMIT_DEGC, NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
+from lugre_steering.replay.result import RECORD, SCHEMA, InputCounts, Replay, ReplayedBag, Series
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
 
-SCHEMA = "lugre_steering/replay/1"
 PREFIX = f"/{NODE}"
 FRAME = "base_link"
 COMMAND = "steering/command"
+AIR = "air"
+"""In place of an initial temperature: that of the first recorded air."""
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 MARK = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag written here: only such a bag is ever replaced."""
-NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate")
+NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate", "angle_jump")
 """Counters of the estimator about samples that it did use."""
 
 Progress = Callable[[str, int, "int | None"], None]
@@ -56,30 +59,30 @@ def replay(
     out: Path,
     options: Options | None = None,
     progress: Progress | None = None,
+    initial_temperature: str | None = None,
 ) -> dict[str, Any]:
     """Run the estimator over each bag anew; write bags, pictures and summary.json into ``out``.
 
+    ``initial_temperature``: of the rubber at the start of each bag, a number [degC] or ``air`` for the first recorded air; without it that
+    of the vehicle file.
     Returns the summary. Raises ``BagError`` or ``VehicleFileError`` for input that is of no use.
     """
     vehicle = load(vehicle_file)
     names = _names(bags, out)  # before anything is made
     options = options or Options()
-    summary: dict[str, Any] = {
-        "schema": SCHEMA, "vehicle": str(vehicle_file), "torque_unit": vehicle.coordinate.force_unit,
-        "options": asdict(options), "bags": [],
-    }  # fmt: skip
-    overall = Fit()
+    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None)
+    overall = Comparison()
     try:
         with output_folder(out):
             for path, name in zip(bags, names, strict=True):
-                run = _Run(path, name, vehicle, options)
-                summary["bags"].append(run.write(out, progress))
+                run = Passage(path, name, vehicle, options, initial_temperature)
+                written = run.write(out, progress)
                 overall.merge(run.fit)
-                summary["overall"] = overall.result()
-                write_record(summary, out / "summary.json")
+                summary = replace(summary, bags=(*summary.bags, written), overall=overall.result())
+                write_record(summary.json, out / RECORD)
     except OSError as error:
         raise BagError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
-    return summary
+    return summary.json
 
 
 def describe(summary: Mapping[str, Any]) -> Iterator[str]:
@@ -121,8 +124,8 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
         picture = out / f"{name}.png"
         if picture.exists() and not is_ours(picture):
             raise _not_ours(picture)
-    if (out / "summary.json").exists() and read_record(out / "summary.json", SCHEMA) is None:
-        raise _not_ours(out / "summary.json")
+    if (out / RECORD).exists() and read_record(out / RECORD, SCHEMA) is None:
+        raise _not_ours(out / RECORD)
     return names
 
 
@@ -151,13 +154,16 @@ def _refuse_foreign(folder: Path) -> None:
 # -------------------------------------------------------------- one bag
 
 
-class _Run:
+class Passage:
     """One bag through a new estimator."""
 
-    def __init__(self, path: Path, name: str, vehicle: Vehicle, options: Options) -> None:
+    def __init__(self, path: Path, name: str, vehicle: Vehicle, options: Options, initial_temperature: str | None = None) -> None:
         self.path, self.name, self.vehicle = path, name, vehicle
         self.estimator = Estimator(vehicle, options)
-        self.fit = Fit()
+        self._as_warm_as_air = initial_temperature == AIR
+        if initial_temperature not in (None, AIR):
+            self.estimator.begin_at(_degrees(initial_temperature))
+        self.fit = Comparison()
         self.motion = Curves(2 * len(vehicle.sides) + 1)  # angles, temperatures, torque
         self.check = Curves(2)  # cylinder torque, residual
         self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
@@ -168,36 +174,95 @@ class _Run:
         self._log_ns: tuple[int, int] | None = None
         self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
-    def write(self, out: Path, progress: Progress | None) -> dict[str, Any]:
+    def write(self, out: Path, progress: Progress | None) -> ReplayedBag:
         """Write the bag and the picture; returns the summary of this bag."""
         with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
-            topics = bag.match(channels)
-            for channel in self.vehicle.channels:
-                if channel.kind is Kind.ANGLE and channel not in topics:
-                    found = ", ".join(sorted(bag.topics)) or "none"
-                    raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
+            topics = self._topics(bag, channels)
             with BagWriter(result, custom_data=MARK) as writer:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
-            if not self._counts["estimates"]:
-                raise BagError(f"{self.path}: no torque could be estimated ({self._counted(samples, Kind.ANGLE)})")
+            self._check_estimates(samples)
             _refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
             findings = [*bag.findings, *self._found, *self._last_findings()]
-        fit = self.fit.result()
-        summary: dict[str, Any] = {
-            "bag": str(self.path),
-            "name": self.name,
-            "duration_s": (self._log_ns[1] - self._log_ns[0]) * 1e-9 if self._log_ns else 0.0,
-            "messages": self._counts["messages"],
-            "estimates": self._counts["estimates"],
-            "fit": fit,
-            "fit_note": None if fit else f"residual not available ({self._why_no_fit(samples)})",
-            "samples": samples,
-            "saturated_rubber_table_steps": self.estimator.saturated_steps,
-            "findings": [asdict(finding) for finding in findings],
+        summary = self._summary(samples, findings)
+        picture, note = self._picture(out / f"{self.name}.png", summary.fit)
+        return replace(summary, picture=picture, picture_note=note)
+
+    def remember(self) -> ReplayedBag:
+        """Write nothing, keep the torques in memory; returns the summary of this bag with them."""
+        with Bag(self.path) as bag:
+            channels = self._wanted(bag)
+            topics = self._topics(bag, channels)
+            command = self._optional(bag, COMMAND)
+            kept = [self._take(block, bag, command) for block in bag.blocks(channels, all_messages=True) if len(block.messages)]
+            samples = self._samples(bag, topics)
+            self._check_estimates(samples)
+            findings = [*bag.findings, *self._found, *self._last_findings()]
+        return replace(self._summary(samples, findings), series=self._series(kept))
+
+    def remember_recording(self, recording: Recording) -> ReplayedBag:
+        """The same for samples in memory, which come in the order of their stamps."""
+        channel, stamp_ns, value, rate = in_stamp_order(recording, self.vehicle.channels)
+        kept = self._records(self.estimator.push_block(channel, stamp_ns, value, rate))
+        estimates, residuals = kept
+        self._counts.update(rows=stamp_ns.size, messages=stamp_ns.size, estimates=len(estimates))
+        if stamp_ns.size:
+            self._log_ns = int(stamp_ns[0]), int(stamp_ns[-1])
+            self._clocks = Timeline(int(stamp_ns[0])), Timeline(int(stamp_ns[0]))
+            for i in np.unique(channel):
+                stamps = stamp_ns[channel == i]
+                self._spans[int(i)] = int(stamps[0]), int(stamps[-1])
+            self._compare(estimates, residuals)
+        samples = {
+            label: replace(counts, topic=label if counts.used else None) for label, counts in self._samples(None, {}).items()
         }
-        return summary | self._picture(out / f"{self.name}.png", fit)
+        self._check_estimates(samples)
+        findings = [*recording.findings, *self._last_findings()]
+        return replace(self._summary(samples, findings), series=self._series([kept]))
+
+    def _topics(self, bag: Bag, channels: Sequence[Channel]) -> Mapping[Channel, str]:
+        """The recorded topic of each channel; refuses a bag without one of the angles."""
+        topics = bag.match(channels)
+        for channel in self.vehicle.channels:
+            if channel.kind is Kind.ANGLE and channel not in topics:
+                found = ", ".join(sorted(bag.topics)) or "none"
+                raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
+        return topics
+
+    def _check_estimates(self, samples: Mapping[str, InputCounts]) -> None:
+        if not self._counts["estimates"]:
+            raise BagError(f"{self.path}: no torque could be estimated ({self._counted(samples, Kind.ANGLE)})")
+
+    def _summary(self, samples: Mapping[str, InputCounts], findings: Sequence[Finding]) -> ReplayedBag:
+        fit = self.fit.result()
+        return ReplayedBag(
+            bag=str(self.path),
+            name=self.name,
+            duration_s=(self._log_ns[1] - self._log_ns[0]) * 1e-9 if self._log_ns else 0.0,
+            messages=self._counts["messages"],
+            estimates=self._counts["estimates"],
+            fit=fit,
+            fit_note=None if fit else f"residual not available ({self._why_no_fit(samples)})",
+            samples=samples,
+            saturated_rubber_table_steps=self.estimator.saturated_steps,
+            findings=tuple(findings),
+        )
+
+    def _series(self, kept: Sequence[tuple[Records, Records]]) -> Series:
+        """All estimates and residuals as columns."""
+        estimates, residuals = (np.concatenate(tables) for tables in zip(*kept, strict=True))
+        start_ns = int(estimates["stamp_ns"].min())
+        of_side = {name: dict(zip(self.vehicle.sides, estimates[name].T, strict=False)) for name in ("theta", "temperature")}
+        return Series(
+            time_s=(estimates["stamp_ns"] - start_ns) * 1e-9,
+            angle=of_side["theta"],
+            torque=estimates["total"],
+            rubber_temperature=of_side["temperature"] if self.vehicle.rubber is not None else {},
+            residual_time_s=(residuals["stamp_ns"] - start_ns) * 1e-9,
+            measured=residuals["measured_torque"],
+            residual=residuals["residual"],
+        )
 
     def _wanted(self, bag: Bag) -> Sequence[Channel]:
         """The vehicle's channels, without the optional one where the bag leaves open which topic it is."""
@@ -224,9 +289,8 @@ class _Run:
                 continue
             # Connections may still be added while a damaged file is read.
             number = [-1 if c.topic in outputs.topics else writer.add_connection(c) for c in bag.connections]
-            estimates, residuals = self._push(block, bag, command)
-            self._learn(block, estimates, residuals)
             first = self._counts["rows"]
+            estimates, residuals = self._take(block, bag, command)
             writer.write(
                 [
                     *copied(block.messages, np.array(number, np.int32)),
@@ -234,17 +298,25 @@ class _Run:
                     *outputs.of_residuals(residuals, block.log_ns[residuals["message"] - first]),
                 ]
             )
-            self._counts.update(rows=block.channel.size, messages=len(block.messages), estimates=len(estimates))
-            first_ns, last_ns = int(block.messages.log_ns[0]), int(block.messages.log_ns[-1])
-            self._log_ns = (self._log_ns[0] if self._log_ns else first_ns, last_ns)
             if progress is not None:
                 progress(self.name, self._counts["messages"], bag.message_count)
+
+    def _take(self, block: Block, bag: Bag, command: str | None) -> tuple[Records, Records]:
+        """One block through the estimator, counted and compared."""
+        estimates, residuals = self._push(block, bag, command)
+        self._learn(block, estimates, residuals)
+        self._counts.update(rows=block.channel.size, messages=len(block.messages), estimates=len(estimates))
+        first_ns, last_ns = int(block.messages.log_ns[0]), int(block.messages.log_ns[-1])
+        self._log_ns = (self._log_ns[0] if self._log_ns else first_ns, last_ns)
+        return estimates, residuals
 
     def _push(self, block: Block, bag: Bag, command: str | None) -> tuple[Records, Records]:
         """One block through the estimator; each plan takes effect at its place among the samples, as in the node."""
         commands = [k for k, c in enumerate(bag.connections) if c.topic == command]
         plans = np.flatnonzero(np.isin(block.messages.connection, commands))
         channel, begin, parts = block.channel.astype(np.int64), 0, []
+        if self._as_warm_as_air:
+            self._begin_with_air(block)
         for plan, end in zip([*plans, None], [*np.searchsorted(block.message, plans), channel.size], strict=True):
             rows = slice(begin, end)
             parts.append(
@@ -254,7 +326,22 @@ class _Run:
                 self._plan(block.messages.bytes_of(int(plan)))
             begin = end
         estimates, residuals = (np.concatenate(tables) for tables in zip(*parts, strict=True))
-        return self._finite(estimates, "total"), self._finite(residuals, "residual")
+        return self._records((estimates, residuals))
+
+    def _records(self, pushed: tuple[Records, Records]) -> tuple[Records, Records]:
+        """Estimates and residuals that are finite numbers."""
+        return self._finite(pushed[0], "total"), self._finite(pushed[1], "residual")
+
+    def _begin_with_air(self, block: Block) -> None:
+        """Rubber as warm as the first air of the first block; the vehicle file's where none is recorded there."""
+        self._as_warm_as_air = False
+        number = next((i for i, c in enumerate(self.vehicle.channels) if c.kind is Kind.AIR_TEMPERATURE), -1)
+        recorded = block.value[(block.channel == number) & (np.abs(block.value) < AIR_LIMIT_DEGC)]
+        if recorded.size:
+            self.estimator.begin_at(float(recorded[0]))
+        else:
+            statement = "no air temperature at the start; the rubber begins as the vehicle file says"
+            self._found.append(Finding("no_air_temperature", "", statement))
 
     def _finite(self, rows: Records, field: str) -> Records:
         """Rows whose torque is a finite number; the node publishes no other either."""
@@ -287,6 +374,11 @@ class _Run:
             if start_ns is None:
                 return
             self._clocks = Timeline(start_ns), Timeline(start_ns)
+        self._compare(estimates, residuals)
+
+    def _compare(self, estimates: Records, residuals: Records) -> None:
+        """Curves, and the agreement with the measured torque."""
+        assert self._clocks is not None
         sides = len(self.vehicle.sides)
         time_s = self._clocks[0](estimates["stamp_ns"])
         columns = estimates["theta"][:, :sides], estimates["temperature"][:, :sides], estimates["total"][:, None]
@@ -295,27 +387,21 @@ class _Run:
         self.check.add(time_s, np.stack([residuals["measured_torque"], residuals["residual"]]))
         self.fit.add(time_s, residuals["measured_torque"], residuals["residual"])
 
-    def _samples(self, bag: Bag, topics: Mapping[Channel, str]) -> dict[str, dict[str, Any]]:
+    def _samples(self, bag: Bag | None, topics: Mapping[Channel, str]) -> dict[str, InputCounts]:
         """Per input: the recorded topic, samples used, rejected by reason, and what is worth a note about used ones."""
-        table: dict[str, dict[str, Any]] = {}
+        table: dict[str, InputCounts] = {}
         for channel, (label, counts) in zip(self.vehicle.channels, self.estimator.counters.items(), strict=True):
             rejected = {reason: n for reason, n in counts.items() if reason not in NOT_REJECTED}
-            if channel in topics and bag.malformed[topics[channel]]:
+            if bag is not None and channel in topics and bag.malformed[topics[channel]]:
                 rejected["malformed"] = bag.malformed[topics[channel]]
-            table[label] = {
-                "topic": topics.get(channel),
-                "used": counts["accepted"],
-                "rejected": rejected,
-                "noted": {reason: counts[reason] for reason in NOT_REJECTED[1:] if reason in counts},
-            }
-        if self._commands:
+            noted = {reason: counts[reason] for reason in NOT_REJECTED[1:] if reason in counts}
+            table[label] = InputCounts(topics.get(channel), counts["accepted"], rejected, noted)
+        if self._commands and bag is not None:
             used = self._commands.pop("accepted", 0)
-            table["command"] = {
-                "topic": bag.find_topic(COMMAND), "used": used, "rejected": dict(self._commands), "noted": {}
-            }  # fmt: skip
+            table["command"] = InputCounts(bag.find_topic(COMMAND), used, dict(self._commands), {})
         return table
 
-    def _why_no_fit(self, samples: Mapping[str, Mapping[str, Any]]) -> str:
+    def _why_no_fit(self, samples: Mapping[str, InputCounts]) -> str:
         """What came of pressures or measured torque, and how far their stamps are from the angles' where they miss them."""
         angle, words = self._spans[0], [self._counted(samples, Kind.PRESSURE, Kind.TORQUE)]
         for i, (channel, label) in enumerate(zip(self.vehicle.channels, samples, strict=False)):
@@ -332,7 +418,9 @@ class _Run:
         fit = self.fit
         sums = fit.squares, fit.estimates, fit.spread + fit.count * fit.mean**2
         residual, estimate, measured = (math.sqrt(squares / max(fit.count, 1)) for squares in sums)
-        if is_large(residual, estimate, measured, self.vehicle):
+        if said := sheet_words(*sums, self.vehicle):
+            yield Finding("wrong_sheet", "", said)
+        elif is_large(residual, estimate, measured, self.vehicle):
             statement = "the residual is as large as the torque: units, signs, plugs or clocks may be wrong; 'diagnose' tells which"
             yield Finding("large_residual", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0
@@ -348,29 +436,37 @@ class _Run:
             statement = "steps with a temperature outside the rubber table, whose edge was used"
             yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
 
-    def _counted(self, samples: Mapping[str, Mapping[str, Any]], *kinds: Kind) -> str:
+    def _counted(self, samples: Mapping[str, InputCounts], *kinds: Kind) -> str:
         """What came on the inputs of some kinds, in words."""
         words = []
         for channel, (label, counts) in zip(self.vehicle.channels, samples.items(), strict=False):
             if channel.kind not in kinds:
                 continue
-            if counts["topic"] is None:
+            if counts.topic is None:
                 words.append(f"{label}: topic '{channel.topic}' missing")
                 continue
-            reasons = [f"{n} {reason}" for part in ("rejected", "noted") for reason, n in counts[part].items()]
-            if not reasons and not counts["used"] and channel.joint:
-                reasons = [f"'{counts['topic']}' has no message with the joint '{channel.joint}'"]
-            words.append(", ".join([f"{label}: {counts['used']} samples used", *reasons]))
+            reasons = [f"{n} {reason}" for part in (counts.rejected, counts.noted) for reason, n in part.items()]
+            if not reasons and not counts.used and channel.joint:
+                reasons = [f"'{counts.topic}' has no message with the joint '{channel.joint}'"]
+            words.append(", ".join([f"{label}: {counts.used} samples used", *reasons]))
         return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
-    def _picture(self, file: Path, fit: Mapping[str, Any] | None) -> dict[str, str | None]:
+    def _picture(self, file: Path, fit: Agreement | None) -> tuple[str | None, str | None]:
         if note := no_pictures():
             file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
-            return {"picture": None, "picture_note": note}
+            return None, note
         from lugre_steering.replay.figure import draw_replay
 
         draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
-        return {"picture": file.name, "picture_note": None}
+        return file.name, None
+
+
+def _degrees(text: str | None) -> float:
+    """A temperature as it is typed."""
+    try:
+        return float(text or "")
+    except ValueError:
+        raise DataError(f"--initial-temperature {text}: expected a number of degC, or 'air'") from None
 
 
 def _first_stamp(block: Block, sides: int) -> int | None:

@@ -16,10 +16,8 @@ from lugre_steering.files import MAKER, refuse_foreign, replacing
 
 try:
     import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
     from cycler import cycler
+    from matplotlib.figure import Figure
     from matplotlib.text import Text
 except ImportError as error:
     raise LugreSteeringError("pictures need matplotlib: install 'lugre_steering[report]'") from error
@@ -83,19 +81,14 @@ def figure(
     below = _LINE_INCHES * len(lines) + 0.15
     height = rows * row_inches + below
     with mpl.rc_context(RC):
-        fig, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False)
-        try:
-            yield axes
-            for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_scale() == "log"):
-                axis.set_major_formatter("{x:g}")  # the usual one writes mathematics, which is not parsed here
-                axis.set_minor_formatter("")
-            for text in fig.findobj(Text):
-                text.set_text(words(text.get_text()))
-            fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
-            fig.text(
-                0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333"
-            )
-            with replacing(file) as stream:
-                fig.savefig(stream, format="png", metadata={"Software": MAKER, "Description": words(caption)})
-        finally:
-            plt.close(fig)
+        fig = Figure(figsize=(width, height))  # without pyplot, whose windows and backend are the user's
+        yield fig.subplots(rows, columns, squeeze=False)
+        for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_scale() == "log"):
+            axis.set_major_formatter("{x:g}")  # the usual one writes mathematics, which is not parsed here
+            axis.set_minor_formatter("")
+        for text in fig.findobj(Text):
+            text.set_text(words(text.get_text()))
+        fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
+        fig.text(0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333")
+        with replacing(file) as stream:
+            fig.savefig(stream, format="png", metadata={"Software": MAKER, "Description": words(caption)})

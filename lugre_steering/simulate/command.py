@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -27,6 +26,7 @@ from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
 from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench
 from lugre_steering.simulate.paper.figure import checks_table, draw_outcome, outcome_table, write_table
 from lugre_steering.simulate.paper.outcome import Outcome
+from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import STORAGES, write_bag
 from lugre_steering.vehicle import Vehicle
@@ -85,26 +85,22 @@ def run_manoeuvre(
     picture, note = out / f"{folder.name}.png", no_pictures()
     with output_folder(out):
         refuse_foreign([picture])
-        run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **given))  # type: ignore[arg-type]
+        done = simulation(what, vehicle, given)
         label = f"{what}, vehicle '{vehicle.name}'"
-        write_bag(folder, run, label, storage)
+        write_bag(folder, done.run, label, storage)
         if note is None:
             from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
 
-            draw_simulation(run, label, picture)
-    truth = run.truth
-    return {
-        "synthetic": True,
-        "bag": str(folder),
-        "picture": str(picture) if note is None else None,
-        "picture_note": note,
-        "duration_s": float(truth.motion.time[-1]),
-        "largest_torque_Nm": float(np.abs(truth.torque).max()),
-        "largest_angle_deg": float(np.degrees(np.abs(truth.motion.theta).max())),
-        "largest_pressure_Pa": float(run.pressures.max()) if run.pressures.size else None,
-        "rubber_at_end_degC": [float(t) for t in truth.tracks["temperature"][:, -1]],
-        "effects": {effect.id: dict(effect.parameters) for effect in vehicle.effects},
-    }
+            draw_simulation(done.run, label, picture)
+    done = dataclasses.replace(done, bag=str(folder), picture=str(picture) if note is None else None, picture_note=note)
+    return done.json
+
+
+def simulation(what: str, vehicle: Vehicle, sensing: Mapping[str, float | int]) -> Simulation:
+    """One manoeuvre in memory; ``sensing`` overrides fields of ``Sensing``."""
+    name = bag_name(Path(what)).replace("-", "_")
+    run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **sensing))  # type: ignore[arg-type]
+    return Simulation.of(name, run)
 
 
 def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:

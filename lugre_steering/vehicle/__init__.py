@@ -7,7 +7,7 @@
 """
 
 from lugre_steering.vehicle.effects import add_effect, each_once
-from lugre_steering.vehicle.file import SCHEMA, from_mapping, load, save, to_mapping
+from lugre_steering.vehicle.file import SCHEMA, from_mapping, load, save, to_mapping, vehicle_of
 from lugre_steering.vehicle.sections import (
     Axle,
     Contact,
@@ -33,5 +33,5 @@ from lugre_steering.vehicle.tables import pavements
 __all__ = [
     "SCHEMA", "Axle", "Contact", "Cylinder", "DmaTable", "EffectEntry", "Friction", "Hydraulics", "Initial", "Levers",
     "MasterCurve", "Rollers", "Rubber", "Sensors", "Topics", "TorqueSensor", "Track", "Vehicle", "Wlf", "add_effect",
-    "each_once", "from_mapping", "load", "pavements", "save", "to_mapping",
+    "each_once", "from_mapping", "load", "pavements", "save", "to_mapping", "vehicle_of",
 ]  # fmt: skip

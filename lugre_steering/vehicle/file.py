@@ -43,6 +43,11 @@ def load(path: str | Path) -> Vehicle:
     return vehicle
 
 
+def vehicle_of(vehicle: Vehicle | str | Path) -> Vehicle:
+    """The vehicle itself, or the one of that file."""
+    return vehicle if isinstance(vehicle, Vehicle) else load(vehicle)
+
+
 def from_mapping(data: object, file: Path) -> Vehicle:
     """Build a vehicle from plain data as read from ``file`` (named in errors, base of relative paths)."""
     reader = Reader(file, VehicleFileError)

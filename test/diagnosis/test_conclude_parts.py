@@ -14,6 +14,7 @@ from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.statement import at_end
 from lugre_steering.diagnosis.conclude.verify import rmse
+from lugre_steering.diagnosis.result import FittedValue, NamedEffect
 from lugre_steering.diagnosis.search import fingerprint, locate
 from lugre_steering.diagnosis.search.build_up import Search
 from lugre_steering.diagnosis.search.fingerprint import Score
@@ -48,22 +49,27 @@ def test_the_line_that_is_named_stands_alone_in_the_evidence(problem: Problem) -
     baseline = fit(hidden, weight(hidden))
     draws = SIGMA * np.random.default_rng(4).standard_normal((8, hidden.measured.size))
     scores = fingerprint.screen(hidden, baseline, weight(hidden), draws)
-    entry = {"id": "pressure_offset", "indistinguishable_from": [], "parameters": {"main_a": {"value": 3e5}}}
+    entry = named("pressure_offset", "main_a", 3e5, "Pa")
     rows = {row.label: row.verdict for row in evidence(finished(hidden, baseline, tuple(scores)), [entry])}
     assert {label for label, verdict in rows.items() if verdict == "named"} == {"pressure_offset[main_a]"}
     assert {f"pressure_offset[{line}]" for line in ("main_a", "main_b", "aux_a", "aux_b")} <= set(rows)
 
 
+def named(effect: str, parameter: str, value: float, unit: str) -> NamedEffect:
+    """An effect with one fitted value; nothing else is known about it."""
+    return NamedEffect(effect, "motion", "", 0.0, {parameter: FittedValue(value, (value, value), unit)}, (), 0.0, 0.0, ())
+
+
 @pytest.mark.parametrize(("value", "ends"), [(0.15, 1), (-0.15, 1), (0.149, 0), (0.0, 0)])
 def test_a_parameter_at_the_end_of_its_range_is_told(value: float, ends: int) -> None:
-    assert len(at_end({"id": "angle_offset", "parameters": {"offset": {"value": value, "unit": "rad"}}})) == ends
+    assert len(at_end(named("angle_offset", "offset", value, "rad"))) == ends
 
 
 def test_an_end_of_a_line_is_told_and_that_of_a_shape_is_not() -> None:
-    (end,) = at_end({"id": "pressure_offset", "parameters": {"main_a": {"value": 5e6, "unit": "Pa"}}})
+    (end,) = at_end(named("pressure_offset", "main_a", 5e6, "Pa"))
     assert end == ("main_a", 5e6, "Pa")
     (shape,) = (p for p in CATALOGUE["end_stop"].parameters if p.name == "engage_angle")
-    assert not at_end({"id": "end_stop", "parameters": {"engage_angle": {"value": shape.low, "unit": "rad"}}})
+    assert not at_end(named("end_stop", "engage_angle", shape.low, "rad"))
 
 
 def test_the_next_experiment_compares_what_the_sensors_would_show(problem: Problem) -> None:
@@ -95,8 +101,8 @@ def test_structure_is_located_in_a_recording_shorter_than_the_window(problem: Pr
     residual = np.where(both.bag == 1, 10.0 * SIGMA, 0.0)
     done = finished(both, fit(both, weight(both)))
     (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual, None)
-    assert entry["bag"] == "short"
-    assert entry["intervals_s"][0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
+    assert entry.bag == "short"
+    assert entry.intervals_s[0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
 
 
 def test_held_out_errors_of_a_bag_are_those_of_the_fit_that_was_judged(problem: Problem) -> None:

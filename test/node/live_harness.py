@@ -21,6 +21,8 @@ import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
@@ -39,6 +41,7 @@ START_TIMEOUT_S = 240.0  # a first start compiles
 NAME = "/steering_torque_estimator"
 SECOND = 1_000_000_000
 T0 = 1_700_000_000 * SECOND
+PERIOD_S = 0.01
 
 OUTPUTS = {
     "torque": WrenchStamped,
@@ -261,3 +264,50 @@ def direct(estimator: Estimator, samples: Sequence[Sample]) -> tuple[list[Any], 
         estimates += [row.copy() for row in new_estimates]
         residuals += [row.copy() for row in new_residuals]
     return estimates, residuals
+
+
+class Driver:
+    """Steers by the clock; ``fault`` turns (side, angle) into what is sent."""
+
+    def __init__(self, world: World) -> None:
+        self.world, self.time = world, 0.0
+
+    def angle(self) -> float:
+        return 0.3 * math.sin(0.9 * self.time)
+
+    def steer(self, seconds: float, fault: Callable[[int, float], float] = lambda _, angle: angle) -> None:
+        last = time.monotonic()
+        for _ in range(round(seconds / PERIOD_S)):
+            stamp_ns = time.time_ns()
+            for side, share in enumerate((1.0, 0.95)):
+                jitter = 2e-4 * math.sin(1e3 * self.time + side)  # as a sensor of this noise has it
+                self.world.send(Sample(side, stamp_ns, fault(side, share * self.angle() + jitter)))
+            time.sleep(PERIOD_S)
+            now = time.monotonic()
+            self.time += now - last  # a busy machine makes gaps, no haste afterwards
+            last = now
+
+
+def call(world: World, kind: Any, name: str, request: Any, timeout_s: float = 20.0) -> Any:
+    client = world.node.create_client(kind, name)
+    assert client.wait_for_service(timeout_sec=10.0)
+    future = client.call_async(request)
+    world.wait(future.done, timeout_s)
+    world.node.destroy_client(client)
+    return future.result()
+
+
+def set_parameters(world: World, **values: float | str) -> Any:
+    parameters = []
+    for name, value in values.items():
+        if isinstance(value, str):
+            content = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+        else:
+            content = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+        parameters.append(Parameter(name=name, value=content))
+    request = SetParametersAtomically.Request(parameters=parameters)
+    return call(world, SetParametersAtomically, f"{NAME}/set_parameters_atomically", request).result
+
+
+def commands(world: World) -> list[float]:
+    return [message.data[0] for message in world.heard["feed_forward/commands"]]

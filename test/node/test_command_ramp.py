@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from lugre_steering.live.commands import CommandRamp
+from lugre_steering.live.commands import CommandRamp, Fade
 
 MS = 1_000_000
 
@@ -43,6 +43,15 @@ def test_a_restart_ramps_without_any_silence() -> None:
     assert ramp(200 * MS, [90.0]) == [10.0]
     assert ramp(250 * MS, [90.0]) == pytest.approx([50.0])
     assert ramp(300 * MS, [90.0]) == [90.0]
+
+
+def test_a_fade_reaches_zero_and_makes_no_large_step_after_a_pause() -> None:
+    fade = Fade(0, [100.0, -50.0], 0.2)
+    assert fade(20 * MS) == pytest.approx([90.0, -45.0])
+    assert fade(10 * MS) == pytest.approx([90.0, -45.0])
+    assert fade(5000 * MS) == pytest.approx([65.0, -32.5])
+    assert [fade(5000 * MS + i * 50 * MS)[0] for i in range(1, 4)] == pytest.approx([40.0, 15.0, 0.0])
+    assert Fade(0, [7.0], 0.0)(1) == [0.0]
 
 
 def test_no_ramp_wanted() -> None:

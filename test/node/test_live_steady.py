@@ -30,7 +30,7 @@ from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
 from lugre_steering.estimator import Estimator
-from lugre_steering.live import estimator_node, run
+from lugre_steering.live import run, session
 
 SETTLED = 1000  # messages until the middleware and its buffers have settled
 WARM_UP = True
@@ -56,7 +56,7 @@ def resident_kB(field):
 
 
 compiled, memory = Compiled(), {}
-push, spin, warm_up = Estimator.push, run.spin, estimator_node.warm_up
+push, spin, warm_up = Estimator.push, run.spin, session.warm_up
 pushes = 0
 
 
@@ -89,7 +89,7 @@ def watched_spin(*arguments):
 
 
 if not WARM_UP:
-    estimator_node.warm_up = lambda *_: None
+    session.warm_up = lambda *_: None
 run.spin = watched_spin
 sys.exit(run.run(sys.argv))
 """

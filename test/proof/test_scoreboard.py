@@ -17,11 +17,9 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError
-from lugre_steering.proof import blind, campaign, manoeuvres, scoreboard
+from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, sizing
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
-from lugre_steering.proof.simulator import load_sheet
 from lugre_steering.proof.table import readme_lines
-from lugre_steering.proof.vehicle_draw import Sheet
 
 Row = dict[str, Any]
 
@@ -47,8 +45,10 @@ def row(
     parameters = {"torque": 400.0, "b": 100.0, "line": "aux_a", "offset": 5e4}
     bag = {"manoeuvre": "sweeps", "duration_s": 100.0, "removable_variance": 500.0, "noise_variance": 40.0, "seen_noise_variance": 36.0}
     return {
-        "name": f"{kind}/{'+'.join(hidden)}/{verdict}/{len(reported)}", "kind": kind, "noise": "white", "seed": 3, "version": "v",
-        "wanted_ratio": ratio, "ratio": ratio if hidden else 0.0, "masked": 0.2, "strengths": [1.0] * len(hidden), "error": None,
+        "name": f"{kind}/{'+'.join(hidden)}/{verdict}/{len(reported)}", "kind": kind,
+        "simulator": 2, "mistake": {}, "noise": "white", "seed": 3, "version": "v",
+        "wanted_ratio": ratio, "ratio": ratio if hidden else 0.0, "masked": 0.2, "removable_variance": 400.0,
+        "strengths": [1.0] * len(hidden), "error": None,
         "ratio_beside": dict.fromkeys(hidden, ratio) if len(hidden) > 1 else {},
         "seconds": {"making": 1.0, "diagnosis": 5.0},
         "truth": {
@@ -58,12 +58,13 @@ def row(
         "diagnosis": {
             "verdict": verdict, "noise_floor_Nm": 6.0, "effects": list(reported),
             "baseline": {"rmse_Nm": rmse[0], "heldout_rmse_Nm": rmse[0]}, "augmented": {"rmse_Nm": rmse[1], "heldout_rmse_Nm": rmse[1]},
-            "unexplained": {"structured": False, "where": None},
+            "unexplained": {"structured": False, "where": None}, "findings": [], "laws": [],
         },
     }  # fmt: skip
 
 
 FOUND = "missing_physics"
+RUBBER = {2: "rubber_dma_10hz.csv", 3: "rubber.csv"}
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ FOUND = "missing_physics"
     [(9, 10, 0.5958, 0.9821), (0, 10, 0.0, 0.2775), (95, 100, 0.8882, 0.9785), (0, 0, 0.0, 1.0)],
 )
 def test_wilson_interval_has_the_tabulated_values(hits: int, of: int, low: float, high: float) -> None:
-    assert scoreboard.interval(hits, of) == pytest.approx((low, high), abs=1e-4)
+    assert scores.interval(hits, of) == pytest.approx((low, high), abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +91,7 @@ def test_wilson_interval_has_the_tabulated_values(hits: int, of: int, low: float
     ],
 )
 def test_outcome(case: Row, expected: str) -> None:
-    assert scoreboard.outcome(case) == expected
+    assert scores.outcome(case) == expected
 
 
 @pytest.mark.parametrize(
@@ -104,18 +105,18 @@ def test_outcome(case: Row, expected: str) -> None:
         ([effect("slope_bias")], 0),
     ],
 )
-def test_both_of_two_need_an_answer_each(reported: list[Row], expected: int) -> None:
-    assert scoreboard.both(row(["end_stop", "backlash"], FOUND, *reported, kind="pair")) == expected
+def test_several_need_an_answer_each(reported: list[Row], expected: int) -> None:
+    assert scores.answered(row(["end_stop", "backlash"], FOUND, *reported, kind="pair")) == expected
 
 
 def test_location_is_intersection_over_union_of_all_bags() -> None:
     case = row(["end_stop"], FOUND, effect("end_stop", spans=[(20.0, 40.0)]))
-    assert scoreboard.location(case) == pytest.approx(10.0 / 30.0)
+    assert scores.location(case) == pytest.approx(10.0 / 30.0)
     case["truth"]["bags"]["run_b"]["intervals_s"] = {"end_stop": [[0.0, 30.0]]}  # missed altogether
-    assert scoreboard.location(case) == pytest.approx(10.0 / 60.0)
+    assert scores.location(case) == pytest.approx(10.0 / 60.0)
     case["truth"]["bags"]["run_b"]["intervals_s"] = {"end_stop": [[0.0, 100.0]]}  # acts in 120 of 200 s: not local
-    assert scoreboard.location(case) is None
-    assert scoreboard.location(row(["end_stop"], "consistent")) is None
+    assert scores.location(case) is None
+    assert scores.location(row(["end_stop"], "consistent")) is None
 
 
 SPANS = st.lists(st.tuples(st.integers(0, 40), st.integers(1, 10)).map(lambda t: (t[0], t[0] + t[1])), min_size=1, max_size=4)
@@ -124,29 +125,29 @@ SPANS = st.lists(st.tuples(st.integers(0, 40), st.integers(1, 10)).map(lambda t:
 @given(SPANS, SPANS)
 def test_overlap_counts_seconds_like_a_raster(one: list[tuple[int, int]], other: list[tuple[int, int]]) -> None:
     seconds = [{s for a, b in spans for s in range(a, b)} for spans in (one, other)]
-    assert scoreboard.overlap(one, other) == (len(seconds[0] & seconds[1]), len(seconds[0] | seconds[1]))
+    assert scores.overlap(one, other) == (len(seconds[0] & seconds[1]), len(seconds[0] | seconds[1]))
 
 
 def test_parameter_errors_use_the_meaning_not_the_number() -> None:
     case = row(["line_loss_linear"], FOUND, effect("line_loss_linear", b=(55.0, 6.0)))
-    assert scoreboard.parameter_errors(case) == {"line_loss_linear.b": (pytest.approx(0.1), True)}  # 100 of two tracks, 55 of one
+    assert scores.parameter_errors(case) == {"line_loss_linear.b": (pytest.approx(0.1), True)}  # 100 of two tracks, 55 of one
     line = row(["pressure_offset"], FOUND, effect("pressure_offset", aux_a=(4e4, 1e3)))
-    assert scoreboard.parameter_errors(line) == {"pressure_offset.line": (pytest.approx(0.2), False)}
+    assert scores.parameter_errors(line) == {"pressure_offset.line": (pytest.approx(0.2), False)}
     elsewhere = row(["pressure_offset"], FOUND, effect("pressure_offset", main_b=(5e4, 1e3)))
-    assert scoreboard.parameter_errors(elsewhere) == {}
-    assert scoreboard.parameter_errors(row(["slope_bias"], FOUND, effect("pressure_offset", ties=["slope_bias"]))) == {}
+    assert scores.parameter_errors(elsewhere) == {}
+    assert scores.parameter_errors(row(["slope_bias"], FOUND, effect("pressure_offset", ties=["slope_bias"]))) == {}
     stop = row(["end_stop"], FOUND, effect("end_stop", engage_angle=(0.5, 0.01), stiffness=(1e4, 10.0), cubic_stiffness=(4e6, 10.0)))
     stop["truth"]["effects"][0]["parameters"] = {"threshold": 0.5, "k1": 2e4, "k3": 0.0}  # both reach 1000 N m after 0.05 rad
-    errors = scoreboard.parameter_errors(stop)
+    errors = scores.parameter_errors(stop)
     assert errors == {"end_stop.engage_angle": (0.0, True), "end_stop.secant": (pytest.approx(0.0), None)}
     jacking = row(["kingpin_jacking"], FOUND, effect("kingpin_jacking", amplitude=(100.0, 1.0), second_harmonic=(70.0, 1.0)))
     jacking["truth"]["effects"][0]["parameters"] = {"amplitude": 200.0, "caster_share": 0.4}  # slopes 240 and 200 N m/rad
-    assert scoreboard.parameter_errors(jacking) == {"kingpin_jacking.slope": (pytest.approx(0.2), None)}
+    assert scores.parameter_errors(jacking) == {"kingpin_jacking.slope": (pytest.approx(0.2), None)}
 
 
 def test_removed_is_the_share_of_what_noise_does_not_explain() -> None:
-    assert scoreboard.removed(row(["slope_bias"], FOUND, effect("slope_bias"))) == pytest.approx((400 - 100) / (400 - 36))
-    assert scoreboard.removed(row(["slope_bias"], "consistent", rmse=(6.1, 6.1))) is None
+    assert scores.removed(row(["slope_bias"], FOUND, effect("slope_bias"))) == pytest.approx((400 - 100) / (400 - 36))
+    assert scores.removed(row(["slope_bias"], "consistent", rmse=(6.1, 6.1))) is None
 
 
 def test_board_counts_and_serialises() -> None:
@@ -158,26 +159,78 @@ def test_board_counts_and_serialises() -> None:
         row(["end_stop", "slope_bias"], FOUND, effect("end_stop"), kind="pair") | {"ratio_beside": {"end_stop": 1.0, "slope_bias": 0.02}},
         row(["body_mode"], "unlisted_physics", kind="unlisted"), row(["body_mode"], FOUND, effect("backlash"), kind="unlisted"),
     ]  # fmt: skip
-    board = scoreboard.board(rows, {"seed": 3})
-    assert json.loads(json.dumps(board, allow_nan=False)) == board
+    whole = scoreboard.board(rows, {"seed": 3})
+    assert json.loads(json.dumps(whole, allow_nan=False)) == whole
+    board = whole["simulators"]["2"]
     assert board["nulls"]["silent"]["share"] == 0.75
     assert board["nulls"]["named"] == {"backlash": 1}
-    assert board["naming"]["from_0.3"] == {"share": 0.5, "hits": 1, "of": 2, "ci95": list(scoreboard.interval(1, 2))}
+    assert board["naming"]["from_0.3"] == {"share": 0.5, "hits": 1, "of": 2, "ci95": list(scores.interval(1, 2))}
     assert board["power"][0]["detected"]["share"] == 0.0
     assert board["naming"]["confusion"] == {
         "slope_bias": {"slope_bias": 1}, "backlash": {"end_stop": 1}, "body_mode": {"unlisted": 1, "backlash": 1},
     }  # fmt: skip
-    assert board["pairs"]["both"]["share"] == 0.5
-    assert board["pairs"]["both_from_0.3"] == {"share": 1.0, "hits": 1, "of": 1, "ci95": list(scoreboard.interval(1, 1))}
+    assert board["pairs"]["all"]["share"] == 0.5
+    assert board["pairs"]["all_from_0.3"] == {"share": 1.0, "hits": 1, "of": 1, "ci95": list(scores.interval(1, 1))}
     assert board["unlisted"]["called_unlisted"]["share"] == 0.5
     assert board["effects"]["backlash"]["taken_for"] == {"end_stop": 1}
-    met = {target["id"]: target["met"] for target in board["targets"]}
-    assert met["nulls_silent"] is False
-    assert met["parameter_error"] is True  # 410 for 400: lower is better
+    status = {target["id"]: target["status"] for target in board["targets"]}
+    assert {key for key, value in status.items() if value == "met"} == {"seconds"}  # eleven cases prove nothing else
+    assert status["nulls_silent"] == "not met"  # but 3 of 4 is out of reach of 0.98
+    assert "dirty_silent" not in status
+
+
+def test_simulators_are_never_pooled() -> None:
+    rows = [row([], "consistent", kind="null"), row([], FOUND, effect("backlash"), kind="null") | {"simulator": 3}]
+    board = scoreboard.board(rows, {"seed": 3})
+    assert board["simulators"]["2"]["nulls"]["silent"]["share"] == 1.0
+    assert board["simulators"]["3"]["nulls"]["silent"]["share"] == 0.0
+    assert "nulls" not in board
+
+
+def test_wrong_sheet_counts_with_a_right_suspect_among_three_and_no_name() -> None:
+    case = row([], "insufficient_data", kind="sheet") | {"mistake": {"what": "load x 0.1", "suspects": ["load_N"]}}
+
+    def told(suspects: list[str], *reported: Row) -> bool:
+        found = {**case["diagnosis"], "findings": [{"finding": "wrong_sheet", "suspects": suspects}], "effects": list(reported)}
+        return scores.sheet_told({**case, "diagnosis": found})
+
+    assert told(["friction.coulomb", "axle.load_N"])
+    assert told([{"key": "axle.load_N", "factor": 0.1}])  # type: ignore[list-item]
+    assert not told(["friction.coulomb", "friction.static", "hydraulics.cylinders.left_a.bore_m", "axle.load_N"])
+    assert not told(["axle.load_N"], effect("surface_patch"))
+    assert not scores.sheet_told(case)
+
+
+def test_generated_laws_and_dirt_have_scores_of_their_own() -> None:
+    law = {"strength": 1.0, "channel": "gain", "coordinate": "time", "memory": "lag", "shape": "wave", "outside": ""}
+    cases = [row(["law"], "unlisted_physics", kind="law"), row(["law"], FOUND, effect("backlash"), kind="law")]
+    for case in cases:
+        case["truth"]["effects"][0]["parameters"] = law
+    cases[0]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 50.0}
+    cases[1]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 130.0}
+    dirty = [row([], "insufficient_data", kind="dirty"), row([], FOUND, effect("relief_saturation"), kind="dirty")]
+    part = scoreboard.part([*cases, *dirty])
+    assert part["laws"]["called_unlisted"]["hits"] == 1
+    assert part["laws"]["inside_grammar"]["of"] == 2
+    assert part["laws"]["outside_grammar"]["of"] == 0
+    assert part["laws"]["foretold"]["median"] == pytest.approx(0.5 * (0.75 - 0.69))
+    assert part["laws"]["harmed"]["hits"] == 1
+    assert part["dirty"]["silent"]["share"] == 0.5
+    assert part["dirty"]["named"] == {"relief_saturation": 1}
+
+
+def test_measured_quantities_are_scored_beside_coefficients() -> None:
+    case = row(["end_stop"], FOUND, effect("end_stop")) | {
+        "measured": {"end_stop": {"what": "angle", "unit": "rad", "true": 0.5, "value": 0.52, "ci95": [0.51, 0.53]}}
+    }
+    assert scores.measured_errors(case) == {"end_stop": (pytest.approx(0.04), False)}
+    part = scoreboard.part([case])
+    assert part["measurable"]["interval_covers"]["share"] == 0.0
+    assert part["measurable"]["half_width"]["median"] == pytest.approx(0.02)
 
 
 def test_empty_board_meets_and_misses_nothing() -> None:
-    assert {target["met"] for target in scoreboard.board([], {"seed": 1})["targets"]} == {None}
+    assert scoreboard.part([])["targets"] == []
 
 
 def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
@@ -187,11 +240,12 @@ def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
         {**row([], "consistent", kind="null"), "peers": {"SINDy ensemble": entry}},
     ]
     board = scoreboard.board(rows, {"seed": 1, "date": "2026-01-01"})
-    peer = board["peers"]["SINDy ensemble"]
+    part = board["simulators"]["2"]
+    peer = part["peers"]["SINDy ensemble"]
     assert peer["removed"]["median"] == pytest.approx(0.5)
     assert peer["false_alarms"]["share"] == 1.0
     assert peer["named"]["share"] == 1.0
-    assert board["peers"]["lugre_steering"]["false_alarms"]["share"] == 0.0
+    assert part["peers"]["lugre_steering"]["false_alarms"]["share"] == 0.0
     pytest.importorskip("matplotlib")
     from lugre_steering.proof.figures import draw_all
 
@@ -200,17 +254,40 @@ def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
     assert all(file.stat().st_size > 5000 for file in files)
 
 
-def test_campaign_covers_every_effect_size_and_disguise() -> None:
-    cases = campaign.campaign(7)
+@pytest.mark.parametrize("simulator", [2, 3])
+def test_campaign_covers_every_effect_size_and_disguise(simulator: int) -> None:
+    cases = campaign.campaign(7, (simulator,))
+    assert {case.simulator for case in cases} == {simulator}
     kinds = {kind: [case for case in cases if case.kind == kind] for kind in {case.kind for case in cases}}
-    assert len(kinds["null"]) >= 100
-    assert {case.noise for case in kinds["null"]} == {"white", "coloured", "ripple"}
-    wanted = {(name, ratio) for name in EFFECT_IDS for ratio in (0.1, 0.3, 1.0, 10.0)}
-    assert {(case.effects[0], case.ratio) for case in kinds["single"]} == wanted
-    assert {case.effects[0] for case in kinds["one-bag"]} == set(EFFECT_IDS)
-    assert {case.effects[0] for case in kinds["unlisted"]} == set(UNLISTED_IDS)
+    effects = EFFECT_IDS if simulator == 2 else campaign.FIELD_IDS
+    ratios = (0.1, 0.3, 1.0, 10.0) if simulator == 2 else (0.3, 1.0, 10.0)
+    assert {(case.effects[0], case.ratio) for case in kinds["single"]} == {(name, ratio) for name in effects for ratio in ratios}
+    assert {case.effects[0] for case in kinds["one-bag"]} == set(effects)
+    assert all(len(kinds[disguise]) >= 30 for disguise in ("one-bag", "late", "barely"))
     assert len({case.effects for case in kinds["pair"]}) >= 20
+    assert all(len(set(case.effects)) == 3 for case in kinds["triple"])
+    assert len(kinds["law"]) >= 30
     assert len({case.name for case in cases}) == len(cases) == len({case.seed for case in cases})
+    if simulator == 2:
+        assert len(kinds["null"]) >= 100
+        assert {case.noise for case in kinds["null"]} == {"white", "coloured", "ripple"}
+        assert {case.effects[0] for case in kinds["unlisted"]} == set(UNLISTED_IDS)
+    else:
+        assert len(effects) >= 12
+        assert len(kinds["dirty"]) >= 100
+        assert len(kinds["sheet"]) >= 60
+        assert {case.which % 9 for case in kinds["sheet"]} == set(range(9))
+
+
+def test_kinds_and_simulator_of_the_command(tmp_path: Path) -> None:
+    cases = campaign.of_kinds(campaign.campaign(7), "dirty,sheet")
+    assert {case.kind for case in cases} == {"dirty", "sheet"}
+    for words, expected in ((["--kinds", "dirty,nulls"], "no kind"), (["--simulator", "4"], "2, 3, all")):
+        result = CliRunner().invoke(app, ["prove", "--out", str(tmp_path), *words])
+        assert result.exit_code == 2
+        assert expected in result.stderr
+    with pytest.raises(DataError, match="no such cases"):
+        campaign.of_kinds(campaign.campaign(7, (2,)), "dirty")
 
 
 def test_campaign_repeats_with_its_seed_only() -> None:
@@ -223,7 +300,7 @@ def test_campaign_repeats_with_its_seed_only() -> None:
 
 def test_quick_has_every_kind_and_different_effects() -> None:
     few = campaign.quick(campaign.campaign(7))
-    assert {case.kind for case in few[:12]} == {"null", "single", "pair", "unlisted", "one-bag", "late", "barely"}
+    assert {case.kind for case in few[: len(campaign.QUICK)]} == set(campaign.QUICK)
     singles = [case.effects for case in few if case.kind == "single"]
     assert len(set(singles)) == len(singles) == campaign.QUICK["single"]
 
@@ -237,23 +314,18 @@ def test_unknown_case_pattern_is_one_line_and_code_2(tmp_path: Path) -> None:
 
 
 def test_resume_keeps_finished_cases_of_the_same_code(tmp_path: Path) -> None:
-    journal, version = tmp_path / "cases.jsonl", blind.source_version()
+    file, version = tmp_path / "cases.jsonl", blind.source_version()
     cases = campaign.matching(campaign.campaign(7), "null/white/0*")[:2]
     done = [{**row([], "consistent", kind="null"), "name": case.name, "seed": case.seed, "version": version} for case in cases]
     lines = [json.dumps(entry) for entry in done]
-    journal.write_text("\n".join(lines) + "\n" + lines[0][:50], encoding="utf-8")  # the last one was cut off
-    assert blind.run_all(cases, SHEET_FILE, journal) == done
+    file.write_text("\n".join(lines) + "\n" + lines[0][:50], encoding="utf-8")  # the last one was cut off
+    assert journal.run_all(cases, SHEET_FILE, file) == done
     other = json.dumps({**done[0], "version": "older code"})
     failed = json.dumps({**done[1], "error": "crash", "diagnosis": None})
-    journal.write_text(f"{other}\n{failed}\n", encoding="utf-8")
-    assert blind.finished(journal, version, set()) == {}
-    journal.write_text(lines[0] + "\n", encoding="utf-8")
-    assert blind.finished(journal, version, {cases[0].name}) == {}  # peers have not run yet
-
-
-@pytest.fixture(scope="module")
-def sheet() -> Sheet:
-    return load_sheet(SHEET_FILE)
+    file.write_text(f"{other}\n{failed}\n", encoding="utf-8")
+    assert journal.finished(file, version, set()) == {}
+    file.write_text(lines[0] + "\n", encoding="utf-8")
+    assert journal.finished(file, version, {cases[0].name}) == {}  # peers have not run yet
 
 
 @pytest.fixture
@@ -268,15 +340,16 @@ def _short_manoeuvres(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_short_manoeuvres")
-def test_effects_are_scaled_to_the_wanted_ratio(sheet: Sheet) -> None:
+def test_effects_are_scaled_to_the_wanted_ratio() -> None:
     for name, ratio in (("end_stop", 0.3), ("slope_bias", 10.0), ("distributed_contact", 0.3)):
-        data = blind.make(campaign.Hiding("x", "single", (name,), ratio, "white", 11), sheet)
-        reached = blind.recalibrated_variance(data) / blind.noise_of(data)
+        made, _ = sizing.make(campaign.Hiding("x", "single", (name,), ratio, "white", 11), SHEET_FILE)
+        reached = blind.recalibrated(made) / blind.pooled_noise(made)
         assert 0.75 < reached / ratio < 1.3
 
 
 @pytest.mark.usefixtures("_short_manoeuvres")
-def test_diagnosis_sees_bags_and_sheet_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("simulator", [2, 3])
+def test_diagnosis_sees_bags_and_sheet_alone(simulator: int, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: dict[str, Any] = {}
 
     def look(command: list[str], **_options: Any) -> Any:
@@ -287,11 +360,11 @@ def test_diagnosis_sees_bags_and_sheet_alone(monkeypatch: pytest.MonkeyPatch) ->
         raise blind.subprocess.TimeoutExpired(command, 1.0)
 
     monkeypatch.setattr(blind.subprocess, "run", look)
-    case = campaign.Hiding("single/end_stop/1/0", "single", ("end_stop",), 1.0, "white", 11)
+    case = campaign.Hiding("single/end_stop/1/0", "beside", ("end_stop",), 1.0, "white", 11, simulator=simulator)
     result = blind.run(blind.Job(case, SHEET_FILE, "v", peers=False))
     assert result["error"] is not None
-    assert scoreboard.outcome(result) == "failed"
-    assert [file for file in seen["files"] if not file.startswith("bags")] == ["rubber_dma_10hz.csv", "vehicle.yaml"]
+    assert scores.outcome(result) == "failed"
+    assert [file for file in seen["files"] if not file.startswith("bags")] == [RUBBER[simulator], "vehicle.yaml"]
     assert not any("end_stop" in word or "truth" in word for word in seen["command"])
     assert b"end_stop" not in seen["text"].replace(SHEET_FILE.read_bytes(), b"")
 
@@ -301,16 +374,18 @@ def test_blind_end_to_end() -> None:
     stop = campaign.Hiding("single/end_stop/10/0", "single", ("end_stop",), 10.0, "white", 11)
     found = blind.run(blind.Job(stop, SHEET_FILE, "v", peers=False))
     assert found["error"] is None
-    assert scoreboard.outcome(found) in scoreboard.RIGHT
+    assert scores.outcome(found) in scores.RIGHT
     null = campaign.Hiding("null/white/00", "null", (), 0.0, "white", 12)
     quiet = blind.run(blind.Job(null, SHEET_FILE, "v", peers=False))
     assert quiet["error"] is None
-    assert scoreboard.outcome(quiet) == "silent"
+    assert scores.outcome(quiet) == "silent"
 
 
 @pytest.mark.skipif(not KEPT_BOARD.exists(), reason="no full run has been kept yet")
 def test_readme_shows_the_kept_scoreboard() -> None:
     board = json.loads(KEPT_BOARD.read_text(encoding="utf-8"))
+    if board["schema"] != scoreboard.SCHEMA:
+        pytest.skip("the kept run is of an earlier scoreboard; README is remade with the next full run")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     missing = [line for line in readme_lines(board) if line not in readme]
     assert not missing, "README's table differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)

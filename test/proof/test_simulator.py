@@ -21,6 +21,7 @@ from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.proof import hydraulics, manoeuvres, simulator
 from lugre_steering.proof.conceal import ZONED
 from lugre_steering.proof.contact import HiddenContact, Patches, patches, run_track
+from lugre_steering.proof.made import beside
 from lugre_steering.proof.rubber import complex_modulus, rubber_table
 from lugre_steering.proof.simulator import (
     EFFECT_IDS,
@@ -31,16 +32,18 @@ from lugre_steering.proof.simulator import (
     recalibrated_variance,
     removable_variance,
     simulate_case,
-    variances_beside,
     write_case,
 )
 from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle, draw_vehicle, load_sheet
+from lugre_steering.proof.worlds import SecondCase
 
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[2]
 SHEET_FILE = ROOT / "config" / "test_vehicle.yaml"
-MODULES = ("simulator", "contact", "conceal", "hydraulics", "manoeuvres", "rubber", "sensors", "vehicle_draw")
+MODULES = (
+    "simulator", "contact", "conceal", "hydraulics", "manoeuvres", "rubber", "sensors", "vehicle_draw", "made", "bagfile", "generator",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -304,8 +307,8 @@ def test_an_effect_beside_another_keeps_only_what_the_other_cannot_imitate(sheet
     alike = simulate_case(short_case(Concealed("slope_bias"), Concealed("pressure_offset")), sheet)
     apart = simulate_case(short_case(Concealed("slope_bias"), Concealed("end_stop")), sheet)
     alone = recalibrated_variance(simulate_case(short_case(Concealed("slope_bias")), sheet))
-    assert variances_beside(alike)["slope_bias"] < 0.3 * alone
-    assert variances_beside(apart)["slope_bias"] == pytest.approx(alone, rel=0.4)
+    assert beside(SecondCase(alike))["slope_bias"] < 0.3 * alone
+    assert beside(SecondCase(apart))["slope_bias"] == pytest.approx(alone, rel=0.4)
 
 
 @pytest.mark.parametrize(("seed", "suffix"), [(3, ".db3"), (4, ".mcap")])
@@ -389,3 +392,17 @@ def test_the_error_that_the_engine_allows_itself_covers_what_the_baseline_cannot
     assert case["cylinders and lines"] < OWN_ERROR * case["noise"]
     # The motion as the sensors show it adds more than that; the noise model counts it, so it must see it.
     assert case["measured motion"] > 1.5 * case["cylinders and lines"]
+
+
+def test_generated_law_is_hidden_in_the_second_simulator_too(sheet: Sheet, tmp_path: Path) -> None:
+    """With a law the torque differs, without strength it does not; the unseen manoeuvre is written apart."""
+    for seed in (21, 22, 24):
+        off = simulate_case(Case(seed, manoeuvres=("short", "short"), law=0.0), sheet)
+        np.testing.assert_allclose(off.bags[0].torque, off.bags[0].torque_without, atol=1e-6)
+    data = simulate_case(Case(21, manoeuvres=("short", "short"), law=1.0), sheet)
+    assert removable_variance(data.bags[0]) > 0.0
+    write_case(data, tmp_path / "seen", tmp_path / "unseen")
+    assert not list((tmp_path / "seen").rglob("*unseen*"))
+    assert (tmp_path / "unseen" / "run_unseen" / "metadata.yaml").exists()
+    truth = np.load(tmp_path / "unseen" / "truth.npz")
+    assert truth["unseen_time"][-1] == pytest.approx(data.bags[0].time[-1] / simulator.FASTER, rel=0.01)

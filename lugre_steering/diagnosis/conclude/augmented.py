@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import NamedEffect
 from lugre_steering.effects.registry import ORIGINS
-from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.apply import apply_calibration, seen_range
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
 
 
-def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, Any]], heldout_rmse: float) -> Vehicle:
+def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect], heldout_rmse: float) -> Vehicle:
     """Recalibrated vehicle with the named effects that act in the last bag; ``heldout_rmse`` [N m] was found before all
     data were fitted."""
     problem = done.problem
@@ -39,7 +39,7 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[dict[str, An
             entries.append(EffectEntry(candidate.effect.id, keep, source, sha256))
     provenance = {
         "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
-        "heldout_rmse_Nm": round(heldout_rmse, 3),
+        "heldout_rmse_Nm": round(heldout_rmse, 3), "seen": seen_range(problem),
         "recalibrated": {
             field: {"sheet": float(problem.model.parameters[0][0][field]), "now": round(value, 6)}
             for field, value in problem.fields(whole.x).items()

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
-from lugre_steering import units
 from lugre_steering.diagnosis.conclude import limits, verify
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.causal import causal_rmse
@@ -18,30 +16,34 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.conclude.statement import statement
-from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
+from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.recording import Recording
+from lugre_steering.recording import BagFinding, Recording
 
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 
 
 def conclude(
-    done: Finished, findings: list[dict[str, Any]], recordings: Sequence[Recording], *,
+    done: Finished, findings: Sequence[BagFinding], recordings: Sequence[Recording], *,
     seed: int, material: float, progress: Callable[[str], None],
 ) -> Diagnosis:
     """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     problem, found = done.problem, done.found
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
-    named = bool(found.found) and judged.gain > -CONTRADICTED
-    final = found.final if named else found.baseline
+    # and an improvement that may be none is none.
+    clock = _clocks_alone(found.final)
+    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock
+    final = found.final if named or clock else found.baseline
     whole = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
     left = left_over(done, final)
+    verdict: Verdict
     if named:
         verdict = "missing_physics"
     elif left.structured:
@@ -52,36 +54,39 @@ def conclude(
     after = judged.after if named else judged.before
     vehicle = augmented_vehicle(done, whole, effects, after)
     kept = {entry.id for entry in vehicle.effects}
-    ended = [effect["id"] for effect in effects if effect["id"] not in kept]
-    baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": judged.before}
-    augmented: dict[str, Any] = {
-        "rmse_Nm": verify.rmse(problem, final, problem.valid),
-        "heldout_rmse_Nm": after,
-        "improvement": judged.gain if named else 0.0,
-        "improvement_ci95": list(judged.interval) if named else [0.0, 0.0],
-        "causal_rmse_Nm": causal_rmse(vehicle, recordings, problem.runs),
-    }
+    ended = [effect.id for effect in effects if effect.id not in kept]
+    causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
-    json = {
-        "schema": SCHEMA,
-        "bags": [run.name for run in problem.runs],
-        "verdict": verdict,
-        "statement": statement(done, verdict, effects, baseline, augmented, left.text, judged.rotated, ended),
-        "noise_floor_Nm": done.noise.floor,
-        "baseline": baseline,
-        "augmented": augmented,
-        "effects": effects,
-        "unexplained": left.entry,
-        "detection_limits": _limits(done, [effect["id"] for effect in effects]),
-        "data_quality": findings,
-        "next_experiment": next_experiment(done, verdict, whole),
-    }
     return Diagnosis(
-        units.in_words(vehicle, finite(json)),
-        vehicle,
-        traces(done, whole, final, None if judged.rotated else found.final if named else found.baseline),
-        evidence(done, effects),
-        {effect["id"]: CATALOGUE[effect["id"]].coordinate for effect in effects},
+        schema=SCHEMA,
+        bags=tuple(run.name for run in problem.runs),
+        verdict=verdict,
+        statement=statement(done, verdict, effects, judged, causal, left.text, ended),
+        noise_floor_Nm=done.noise.floor,
+        baseline=Errors(verify.rmse(problem, found.baseline, problem.valid), judged.before),
+        augmented=Augmented(
+            rmse_Nm=verify.rmse(problem, final, problem.valid),
+            heldout_rmse_Nm=after,
+            improvement=judged.gain if named else 0.0,
+            improvement_ci95=judged.interval if named else (0.0, 0.0),
+            causal_rmse_Nm=causal,
+            vehicle=vehicle,
+        ),
+        effects=tuple(effects),
+        unexplained=left.entry,
+        detection_limits=_limits(done, [effect.id for effect in effects]),
+        data_quality=tuple(findings),
+        next_experiment=next_experiment(done, verdict, whole),
+        traces=traces(done, whole, final, None if judged.rotated else found.final if named else found.baseline),
+        evidence=evidence(done, effects),
+        coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
+    ).in_words()
+
+
+def _clocks_alone(final: Fit) -> bool:
+    """Whether all that was found is what two clocks may be apart, beyond what was measured and taken out of it."""
+    return bool(final.effects) and all(
+        candidate.effect.id == "time_delay" and abs(values["delay"]) < LONGEST_S for candidate, values in final.effects
     )
 
 
@@ -98,10 +103,10 @@ def _whole(done: Finished, final: Fit) -> Fit:
     return whole
 
 
-def _limits(done: Finished, named: Sequence[str]) -> dict[str, Any]:
+def _limits(done: Finished, named: Sequence[str]) -> dict[str, Limit]:
     """Smallest amplitude of each effect that this recording would have revealed."""
     found = limits.smallest(done.problem, done.found.baseline, done.fitted, done.found.first_scores, named)
     return {
-        effect: {"parameter": parameter.name, "smallest": value, "unit": done.unit(parameter.unit)}
+        effect: Limit(parameter.name, value, done.unit(parameter.unit))
         for effect, (parameter, value) in found.items()
     }

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import verify
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.build_up import Found
 from lugre_steering.diagnosis.search.ties import tied
@@ -24,7 +25,7 @@ BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
 
 
-def named_effects(done: Finished, whole: Fit, material: float) -> list[dict[str, Any]]:
+def named_effects(done: Finished, whole: Fit, material: float) -> list[NamedEffect]:
     """Entries of the effects in ``whole`` (fitted to all data), largest share first; ``material``: see ``_statement``."""
     problem, found = done.problem, done.found
     intervals = _intervals(done, whole)
@@ -35,33 +36,32 @@ def named_effects(done: Finished, whole: Fit, material: float) -> list[dict[str,
     for index, ((candidate, _), item) in enumerate(zip(whole.effects, found.found, strict=True)):
         part = locate.contribution(problem, whole, index)
         rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
-        entries.append({
-            "id": candidate.effect.id, "stage": candidate.effect.stage,
-            "statement": _statement(done, whole, index, item, part, rivals, material),
-            "p_value": item.score.p_value, "parameters": intervals[index], "where": _where(done, candidate, part),
-            "energy_share": float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0)),
-            "masked_share": float(np.clip(item.score.masked_share, 0.0, 1.0)), "indistinguishable_from": rivals,
-        })  # fmt: skip
-    return sorted(entries, key=lambda entry: -entry["energy_share"])
+        entries.append(NamedEffect(
+            id=candidate.effect.id, stage=cast(Stage, candidate.effect.stage),
+            statement=_statement(done, whole, index, item, part, rivals, material),
+            p_value=item.score.p_value, parameters=intervals[index], where=tuple(_where(done, candidate, part)),
+            energy_share=float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0)),
+            masked_share=float(np.clip(item.score.masked_share, 0.0, 1.0)), indistinguishable_from=tuple(rivals),
+        ))  # fmt: skip
+    return sorted(entries, key=lambda entry: -entry.energy_share)
 
 
-def _intervals(done: Finished, whole: Fit) -> list[dict[str, dict[str, Any]]]:
+def _intervals(done: Finished, whole: Fit) -> list[dict[str, FittedValue]]:
     """Value, 95 % interval and unit of each free parameter, effect by effect."""
     covariance = verify.robust_covariance(done.problem, whole, done.weight, done.roles.cluster)
     spread = verify.jackknife(done.problem, whole, done.weight)
     form = verify.form_spread(done.problem, whole, done.weight)
     position = 0
-    found: list[dict[str, dict[str, Any]]] = []
+    found: list[dict[str, FittedValue]] = []
     for candidate, values in whole.effects:
-        parameters: dict[str, dict[str, Any]] = {}
+        parameters: dict[str, FittedValue] = {}
         for key in candidate.free:
             place = done.problem.nuisances + position
             drawn = max(float(np.sqrt(max(covariance[place, place], 0.0))), float(spread[position]))
             half = float(np.hypot(verify.WIDTH * drawn, verify.NORMAL * form[place]))
-            parameters[candidate.line if candidate.effect.per_line else key] = {
-                "value": values[key], "ci95": [values[key] - half, values[key] + half],
-                "unit": done.unit(candidate.parameter(key).unit),
-            }  # fmt: skip
+            parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
+                values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
+            )
             position += 1
         found.append(parameters)
     return found
@@ -116,7 +116,7 @@ def _since(done: Finished, candidate: Candidate) -> str:
     return f", {', '.join(begun)}" if begun else ""
 
 
-def _where(done: Finished, candidate: Candidate, part: Array) -> list[dict[str, Any]]:
+def _where(done: Finished, candidate: Candidate, part: Array) -> list[Place]:
     """Bags, stretches and range of the telling coordinate in which its torque ``part`` (n,) [N m] acts."""
     entries = []
     for bag, run in enumerate(done.problem.runs):
@@ -132,8 +132,5 @@ def _where(done: Finished, candidate: Candidate, part: Array) -> list[dict[str, 
             low_size, high_size = locate.active_range(axes["|steering angle|"], piece)
             if low_size > BOTH_SIDES * high_size:
                 axis, low, high = "|steering angle|", low_size, high_size
-        entries.append({
-            "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-            "range": [low, high], "unit": done.unit(units.COORDINATES[axis]),
-        })  # fmt: skip
+        entries.append(Place(run.name, tuple(spans), axis, (low, high), done.unit(units.COORDINATES[axis])))
     return entries

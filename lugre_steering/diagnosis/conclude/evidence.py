@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.verify import rmse
-from lugre_steering.diagnosis.result import BagTrace, Evidence
+from lugre_steering.diagnosis.result import BagTrace, Evidence, NamedEffect
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.build_up import FALSE_DISCOVERY_RATE
 from lugre_steering.diagnosis.search.fingerprint import Score
@@ -20,17 +19,14 @@ from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit
 
 
-def evidence(done: Finished, effects: Sequence[dict[str, Any]]) -> tuple[Evidence, ...]:
+def evidence(done: Finished, effects: Sequence[NamedEffect]) -> tuple[Evidence, ...]:
     """One row per candidate that was screened, from its best variant; ``effects``: the entries that are named."""
     problem, found = done.problem, done.found
     before = cost(problem, found.baseline, done.held)
     named = {
-        f"{effect['id']}[{line}]"
-        for effect in effects
-        for line in effect["parameters"]
-        if CATALOGUE[effect["id"]].per_line
-    } | {effect["id"] for effect in effects if not CATALOGUE[effect["id"]].per_line}
-    ties = {rival for effect in effects for rival in effect["indistinguishable_from"]}
+        f"{effect.id}[{line}]" for effect in effects for line in effect.parameters if CATALOGUE[effect.id].per_line
+    } | {effect.id for effect in effects if not CATALOGUE[effect.id].per_line}
+    ties = {rival for effect in effects for rival in effect.indistinguishable_from}
     trials: dict[str, Trial] = {}
     alone = len(found.baseline.effects) + 1
     for trial in found.trials:

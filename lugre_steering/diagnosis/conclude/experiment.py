@@ -7,13 +7,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from lugre_steering import units
 from lugre_steering.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import Experiment
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem
@@ -79,8 +79,8 @@ def separation(
     found = {}
     # Where and when they began belongs to the recordings, not to what is driven next.
     first, second = ([(replace(candidate, since=(), bags=None), values) for candidate, values in side] for side in (first, second))
+    x = problem.one_bag(fit.x)
     for manoeuvre in manoeuvres(problem).values():
-        x = np.append(fit.x[: len(problem.calibrations)], 0.0)
         try:
             trial = Problem(problem.vehicle, [_run(problem, manoeuvre, x, sigma)], problem.calibrations)
         except DataError:  # these cylinders cannot drive it
@@ -106,7 +106,7 @@ def recommend(problem: Problem, energies: Mapping[str, float]) -> tuple[str, str
     return best, manoeuvres(problem)[best].description, energies[best]
 
 
-def next_experiment(done: Finished, verdict: str, whole: Fit) -> dict[str, Any] | None:
+def next_experiment(done: Finished, verdict: str, whole: Fit) -> Experiment | None:
     """For a tie the manoeuvre that separates the rivals best; for unlisted structure those that vary one quantity at a time."""
     for index, item in enumerate(done.found.found if verdict == "missing_physics" else ()):
         rivals = [trial for trial in item.trials if trial.candidate.effect.id in item.rivals]
@@ -117,15 +117,16 @@ def next_experiment(done: Finished, verdict: str, whole: Fit) -> dict[str, Any] 
                 continue
             best, description, energy = recommend(done.problem, energies)
             others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
-            return {
-                "manoeuvre": f"{best}: {description}", "separates": [chosen[0].effect.id, rivals[0].candidate.effect.id],
-                "why": f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
+            return Experiment(
+                f"{best}: {description}",
+                (chosen[0].effect.id, rivals[0].candidate.effect.id),
+                f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
                 f"more than in any other manoeuvre tried ({others})",
-            }  # fmt: skip
+            )
     if verdict == "unlisted_physics":
-        return {
-            "manoeuvre": "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",
-            "separates": ["dependence on rate", "on amplitude", "on dwell"],
-            "why": "the structure follows none of the catalogue's laws; runs that vary one quantity at a time show which it depends on",
-        }
+        return Experiment(
+            "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",
+            ("dependence on rate", "on amplitude", "on dwell"),
+            "the structure follows none of the catalogue's laws; runs that vary one quantity at a time show which it depends on",
+        )
     return None

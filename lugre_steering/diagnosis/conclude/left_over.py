@@ -5,18 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import unlisted
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import slow_part
+from lugre_steering.fitting.sensors import beside_sensors
 from lugre_steering.recording import Array
 
 UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
@@ -34,7 +36,7 @@ LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
 class LeftOver(NamedTuple):
     """The contract's entry, the same in one sentence, and whether it is structure worth a verdict."""
 
-    entry: dict[str, Any]
+    entry: Unexplained
     text: str
     structured: bool
 
@@ -42,7 +44,7 @@ class LeftOver(NamedTuple):
 def left_over(done: Finished, final: Fit) -> LeftOver:
     """Judge what ``final`` leaves of the measured torque."""
     residual = done.problem.measured - final.prediction
-    standardised = residual * done.weight
+    standardised = beside_sensors(done.problem, residual, done.weight, final.jacobian[:, : done.problem.nuisances])
     slow, nothing = _slow_energy(done, standardised), _slow_energy(done, done.noise.draws * done.weight)
     excess = float(np.mean(standardised[done.weight > 0.0] ** 2)) - 1.0
     pattern, gain = _pattern(done, final)
@@ -50,7 +52,7 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     loud = slow - nothing > max(UNLISTED_EXCESS, done.noise.slow_doubt) or excess > FAST_EXCESS
     if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
-        return LeftOver({"structured": False, "description": description, "formula": None, "where": None}, "", False)
+        return LeftOver(Unexplained(False, description), "", False)
     if not final.effects:
         # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
         sound = fit(done.problem, done.fitted, (), final.x, robust=True, linearisations=25)
@@ -80,7 +82,7 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
         else f"a pattern outside the catalogue foretells {100 * gain:.0f} % of the held-out residual energy"
     )
     where = _where(done, axes, axis, residual, shape)
-    return LeftOver({"structured": True, "description": text, "formula": formula, "where": where}, text, True)
+    return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
 
 
 def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
@@ -94,7 +96,7 @@ def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
 
 def _where(
     done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array, shape: Array | None
-) -> list[dict[str, Any]]:
+) -> list[Place]:
     """Stretches and range of ``axis`` that hold it: where ``shape`` (n,) acts if given, else where the residual is loud."""
     problem = done.problem
     entries = []
@@ -109,10 +111,8 @@ def _where(
         else:
             spans, piece = locate.intervals(run.time, shape[part]), shape[part]
         if spans:
-            entries.append({
-                "bag": run.name, "intervals_s": [list(span) for span in spans], "coordinate": axis,
-                "range": list(locate.active_range(values[axis], piece)), "unit": done.unit(units.COORDINATES[axis]),
-            })  # fmt: skip
+            between = locate.active_range(values[axis], piece)
+            entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATES[axis])))
     return entries
 
 

@@ -5,26 +5,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.verify import Judged
+from lugre_steering.diagnosis.result import NamedEffect, Verdict
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.problem import STATIC, resized
 from lugre_steering.vehicle.size import VEHICLE, Size
 
 
-def at_end(effect: Mapping[str, Any], size: Size = VEHICLE) -> list[tuple[str, float, str]]:
+def at_end(effect: NamedEffect, size: Size = VEHICLE) -> list[tuple[str, float, str]]:
     """Name, value and unit of the amplitudes of a named effect that were fitted to an end of their range other than zero."""
-    entry = resized(CATALOGUE[effect["id"]], size)
+    entry = resized(CATALOGUE[effect.id], size)
     amplitudes = {parameter.name: (parameter.low, parameter.high) for parameter in entry.parameters if not parameter.is_shape}
     alone = next(iter(amplitudes.values()), ())  # one that acts on a line goes by the name of the line
     return [
-        (name, found["value"], found["unit"])
-        for name, found in effect["parameters"].items()
-        if any(end and math.isclose(found["value"], end, rel_tol=1e-6) for end in (alone if entry.per_line else amplitudes.get(name, ())))
+        (name, found.value, found.unit)
+        for name, found in effect.parameters.items()
+        if found.value is not None
+        and any(end and math.isclose(found.value, end, rel_tol=1e-6) for end in (alone if entry.per_line else amplitudes.get(name, ())))
     ]
 
 
@@ -41,31 +43,32 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
 
 
 def statement(
-    done: Finished, verdict: str, effects: Sequence[Mapping[str, Any]], baseline: Mapping[str, float],
-    augmented: Mapping[str, Any], left: str, rotated: bool, ended: Sequence[str],
+    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str,
+    ended: Sequence[str],
 ) -> str:
-    """The verdict for a reader who sees nothing else; ``left``: what remains, ``rotated``: see ``verify.Verdict``,
+    """The verdict for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
+    looking ahead, ``left``: what remains,
     ``ended``: effects that do not act in the last bag."""
     floor, torque = done.torque(done.noise.floor), done.torque
     if verdict == "consistent":
         return (
             f"After recalibration the published model explains the recording: held-out error "
-            f"{torque(baseline['heldout_rmse_Nm'])} at a noise floor of {floor}. No missing physics is needed; "
+            f"{torque(judged.before)} at a noise floor of {floor}. No missing physics is needed; "
             "see detection_limits for what could have gone unseen."
         )
     if verdict == "unlisted_physics":
         return (
-            f"The recalibrated model leaves {torque(baseline['heldout_rmse_Nm'])} on held-out data at a noise floor of {floor}, and no "
+            f"The recalibrated model leaves {torque(judged.before)} on held-out data at a noise floor of {floor}, and no "
             f"entry of the catalogue explains it: {left}. The physics is unlisted; see unexplained for where it lives."
         )
-    names = " and ".join(f"{done.title(effect['id']).lower()} ({effect['id']})" for effect in effects)
+    names = " and ".join(f"{done.title(effect.id).lower()} ({effect.id})" for effect in effects)
     ties = [
-        f"{effect['id']} cannot be told from {', '.join(effect['indistinguishable_from'])}"
+        f"{effect.id} cannot be told from {', '.join(effect.indistinguishable_from)}"
         for effect in effects
-        if effect["indistinguishable_from"]
+        if effect.indistinguishable_from
     ]
     ends = [
-        f"{effect['id']} with {name} = {value:.3g} {unit}"
+        f"{effect.id} with {name} = {value:.3g} {unit}"
         for effect in effects
         for name, value, unit in at_end(effect, done.problem.size)
     ]
@@ -73,11 +76,11 @@ def statement(
     bounds = calibrations_at_bounds(done)
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
-        f"from {torque(baseline['heldout_rmse_Nm'])} to {torque(augmented['heldout_rmse_Nm'])} "
-        f"(improvement {100 * augmented['improvement']:.0f} %, 95 % interval "
-        f"{100 * augmented['improvement_ci95'][0]:.0f} to {100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}. "
-        f"Without looking ahead, as the live node must, the error on all samples is {torque(augmented['causal_rmse_Nm'])}."
-        + (" Each third of the data was held out in turn, since one alone hardly shows it." if rotated else "")
+        f"from {torque(judged.before)} to {torque(judged.after)} "
+        f"(improvement {100 * judged.gain:.0f} %, 95 % interval "
+        f"{100 * judged.interval[0]:.0f} to {100 * judged.interval[1]:.0f} %) at a noise floor of {floor}. "
+        f"Without looking ahead, as the live node must, the error on all samples is {torque(causal)}."
+        + (" Each third of the data was held out in turn, since one alone hardly shows it." if judged.rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
         + (f" At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another." if ends else "")
         + (f" Recalibrated as far as is allowed, so perhaps another machine or another law: {', '.join(bounds)}." if bounds else "")

@@ -33,7 +33,7 @@ def rmse(problem: Problem, result: Fit, mask: np.ndarray[tuple[int], np.dtype[np
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judged:
     """Held-out errors [N m] of the baseline and with the named physics, 1 - their ratio, and its 95 % interval."""
 
     before: float
@@ -44,7 +44,7 @@ class Verdict:
     """Whether every third was held out in turn, because the first alone hardly sees the effect."""
 
 
-def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles: Split, seed: int) -> Verdict:
+def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles: Split, seed: int) -> Judged:
     """Errors on the held-out third; if that does not settle the gain, on each third in turn, the rest refitted without it.
 
     ``weight`` (n,) is 1 / sigma where samples are valid. Selection has seen the other thirds, their numbers have not.
@@ -68,11 +68,11 @@ def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles
     return replace(_judge(before, after, seen, roles.cluster, seed), rotated=True)
 
 
-def _judge(before: Array, after: Array, held: Mask, clusters: IntArray, seed: int) -> Verdict:
+def _judge(before: Array, after: Array, held: Mask, clusters: IntArray, seed: int) -> Judged:
     """From squared errors (n,) of two models; the interval is a bootstrap of whole clusters."""
     if not held.any():
         nan = float("nan")
-        return Verdict(nan, nan, nan, (nan, nan))
+        return Judged(nan, nan, nan, (nan, nan))
     _, cluster = np.unique(clusters[held], return_inverse=True)
     before_sum, after_sum = np.bincount(cluster, before[held]), np.bincount(cluster, after[held])
     rng = np.random.default_rng(seed)
@@ -80,7 +80,7 @@ def _judge(before: Array, after: Array, held: Mask, clusters: IntArray, seed: in
     gains = 1.0 - np.sqrt(after_sum[drawn].sum(axis=1) / before_sum[drawn].sum(axis=1))
     low, high = np.quantile(gains, [0.025, 0.975])
     rms = [float(np.sqrt(total.sum() / held.sum())) for total in (before_sum, after_sum)]
-    return Verdict(rms[0], rms[1], 1.0 - rms[1] / rms[0], (float(low), float(high)))
+    return Judged(rms[0], rms[1], 1.0 - rms[1] / rms[0], (float(low), float(high)))
 
 
 def jackknife(problem: Problem, result: Fit, weight: Array) -> Array:

@@ -1,0 +1,66 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The ``calibrate`` command: bags in, a calibrated vehicle file, its record and a picture out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lugre_steering.bag import read_recordings
+from lugre_steering.calibration import result
+from lugre_steering.calibration.calibrate import Calibrated, calibrate_recordings, chosen
+from lugre_steering.errors import DataError
+from lugre_steering.files import earlier_result, output_folder, write_record
+from lugre_steering.report.available import no_pictures
+from lugre_steering.vehicle import load, save
+
+FILES = (result.VEHICLE, "calibration.png")
+"""What is written beside the record."""
+
+
+def calibrate(
+    bags: Sequence[Path],
+    vehicle_file: Path,
+    out: Path,
+    *,
+    free: Sequence[str] = (),
+    fix: Sequence[str] = (),
+    prior: Mapping[str, float] | None = None,
+    priors: bool = True,
+    progress: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """Fit the vehicle file to the bags; write calibrated.yaml, calibration.json and calibration.png into ``out``.
+
+    Returns the content of calibration.json. ``free`` adds ``kingpin_arm`` or ``pressure_gain`` to the fitted values,
+    ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
+    """
+    vehicle = load(vehicle_file)
+    calibrations = chosen(vehicle, free, fix, prior or {})
+    with output_folder(out):
+        earlier_result(out, result.RECORD, result.SCHEMA, FILES, vehicle_file)
+        recordings = read_recordings(bags, vehicle.channels, progress)
+        done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
+        found = replace(done.calibration, bags=tuple(str(bag) for bag in bags), vehicle=str(vehicle_file))
+        progress("writing")
+        try:
+            for name in FILES:  # of an earlier run: they would not belong to this record
+                (out / name).unlink(missing_ok=True)
+            save(found.with_provenance(), out / result.VEHICLE)
+            picture, note = _picture(done, out / "calibration.png")
+            found = replace(found, picture=picture, picture_note=note)
+            write_record(found.json, out / result.RECORD)
+        except OSError as error:
+            raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
+    return found.json
+
+
+def _picture(done: Calibrated, file: Path) -> tuple[str | None, str | None]:
+    if note := no_pictures():
+        return None, note
+    from lugre_steering.calibration.figure import draw_calibration
+
+    draw_calibration(done, file)
+    return str(file), None

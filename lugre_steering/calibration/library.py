@@ -1,0 +1,35 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``lugre_steering.calibrate``: baseline parameters fitted to recordings, from a program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from lugre_steering.bag.given import Given, given_recordings
+from lugre_steering.calibration.calibrate import calibrate_recordings, chosen
+from lugre_steering.calibration.result import Calibration
+from lugre_steering.vehicle import Vehicle, vehicle_of
+
+
+def calibrate(
+    data: Given | Sequence[Given],
+    vehicle: Vehicle | str | Path,
+    *,
+    free: Sequence[str] = (),
+    fix: Sequence[str] = (),
+    prior: Mapping[str, float] | None = None,
+    priors: bool = True,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Calibration:
+    """Fit the baseline of a vehicle to bags (paths) or recordings, all together; ``.calibrated`` is the new vehicle.
+
+    ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file;
+    ``free`` adds ``kingpin_arm`` or ``pressure_gain`` to the fitted values, ``fix`` keeps some at the sheet, ``prior`` gives
+    relative standard deviations of sheet values, ``priors=False`` lets the data alone decide.
+    """
+    model = vehicle_of(vehicle)
+    recordings = given_recordings(data, model.channels, progress)
+    wanted = chosen(model, free, fix, prior)
+    return calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration

@@ -1,0 +1,226 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Channels that measure nothing of this machine: constant, noise alone, a copy of another, a zero far off.
+
+Each is told by what the rest of the recording says that it should have shown; none of them leaves anything to diagnose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import least_squares
+
+from lugre_steering import units
+from lugre_steering.chain.step import torque_side
+from lugre_steering.data.dataset import Run, prepare
+from lugre_steering.data.sensing import white_noise
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.simulate.actuation import line_pressures, total_gains
+from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import build_model
+
+MEAN_S = 0.25
+"""Over which noise is averaged out before a channel's travel is measured."""
+MOVES = 2.0
+"""Presliding lengths that the tracks must turn before anything is expected of other channels."""
+ALIVE = 0.05
+"""Share of its expected travel that a pressure must show, or one angle of the other's."""
+ALL_NOISE = 0.5
+"""Share of a channel's variance that may be white noise."""
+ROUGH = 0.05
+"""Of a presliding length: noise of an angle sample from which a bristle cannot be followed."""
+COPIED, APART_RAD = 0.1, float(np.radians(0.3))
+"""Share of the geometry's difference between the tracks that two sensors must show, where it reaches that root mean square."""
+ZERO_RAD, RESTORED, MISSED_RAD = float(np.radians(3.0)), 0.4, float(np.radians(1.0))
+"""Zeros of the angles so far off, which restore the steering geometry to so much of its error, where that is so large."""
+IDLE = 4.0
+"""Times its white noise that the mean over MEAN_S of a channel moves by chance."""
+FAR_RAD = np.pi / 2.0
+"""No steered track turns so far: another unit, which the check of wiring tells."""
+HELD = 0.2
+"""Share of a recording in which an angle sensor may stand at an end of its range."""
+
+
+Topics = dict[tuple[Kind, str], str]
+
+
+def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Findings about channels that show nothing of the machine."""
+    topics = {(c.kind, c.name): c.topic for c in vehicle.channels}
+    farthest = max((float(np.abs(s.value).max()) for s in recording.angle.values() if s.value.size), default=0.0)
+    if vehicle.track is not None and farthest > FAR_RAD:
+        return ()
+    if noise := tuple(_noise_alone(recording, vehicle, topics)):
+        return noise
+    try:
+        run = prepare(recording, vehicle)
+    except DataError:
+        return ()
+    checks = (_frozen, _zeros, _constant)
+    return tuple(dict.fromkeys(finding for check in checks for finding in check(run, vehicle, topics)))
+
+
+def inspect_angles(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Findings about angles of sound units that are too noisy to follow a bristle, or one and the same twice."""
+    try:
+        run = prepare(recording, vehicle)
+    except DataError:
+        return ()
+    topics = {(c.kind, c.name): c.topic for c in vehicle.channels}
+    return (*_rough(run, vehicle, topics), *_copied(run, vehicle, topics))
+
+
+def _finding(name: str, topic: str, statement: str) -> Finding:
+    return Finding(name, topic, f"{topic}: {statement}")
+
+
+def _signals(recording: Recording, vehicle: Vehicle) -> Iterator[tuple[Kind, str, Signal]]:
+    for side in vehicle.sides:
+        if side in recording.angle:
+            yield Kind.ANGLE, side, recording.angle[side]
+    for line in vehicle.hydraulics.lines if vehicle.hydraulics is not None else ():
+        if line in recording.pressure:
+            yield Kind.PRESSURE, line, recording.pressure[line]
+
+
+def _noise_alone(recording: Recording, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+    """All angles, or all pressures, hold more white noise than anything else."""
+    for kind, what in ((Kind.ANGLE, "angle"), (Kind.PRESSURE, "pressure")):
+        shown = [(name, signal) for of, name, signal in _signals(recording, vehicle) if of is kind and signal.time_s.size >= 100]
+        random = [name for name, s in shown if white_noise(s) ** 2 > ALL_NOISE * float(np.var(s.value)) > 0.0]
+        if shown and len(random) == len(shown) and _moved(recording, vehicle, kind):
+            topic = ", ".join(dict.fromkeys(topics[kind, name] for name in random))
+            statement = f"noise and no {what}: nothing of it lasts from one sample to the next; check the sensor"
+            yield _finding("dead_sensor", topic, statement)
+
+
+def _moved(recording: Recording, vehicle: Vehicle, kind: Kind) -> bool:
+    """Whether channels of another kind show motion or work, or the noise is far beyond the sheet's."""
+    limits = {Kind.ANGLE: np.radians(vehicle.sensors.angle_noise_deg), Kind.PRESSURE: vehicle.sensors.pressure_noise_Pa}
+    own = [white_noise(s) > 10.0 * limits[kind] for of, _, s in _signals(recording, vehicle) if of is kind]
+    others = [
+        float(np.var(s.value)) * ALL_NOISE > white_noise(s) ** 2 for of, _, s in _signals(recording, vehicle) if of is not kind
+    ]
+    return all(own) or any(others)
+
+
+def _rough(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+    """Angles too noisy to follow a bristle."""
+    record = build_model(vehicle).parameters[0][0]
+    presliding = float(record["coulomb_torque"] / record["sigma_0"])
+    if run.angle.sigma() > ROUGH * presliding:
+        topic = ", ".join(dict.fromkeys(topics[Kind.ANGLE, side] for side in vehicle.sides))
+        yield _finding(
+            "noisy_sensor", topic,
+            f"noise of {units.distance(vehicle, run.angle.sigma(), degrees='.2g')} per sample is {run.angle.sigma() / presliding:.0%} "
+            "of what the contact turns before it slides; no friction can be told from it; check the sensor and its cable",
+        )  # fmt: skip
+
+
+def _travel(run: Run, values: Array) -> float:
+    """Span of (n,) values once noise is averaged out."""
+    smooth = uniform_filter1d(values, max(1, round(MEAN_S / float(run.time[1] - run.time[0]))))
+    return float(np.ptp(smooth))
+
+
+def _frozen(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+    """One angle that stays while the other turns."""
+    record = build_model(vehicle).parameters[0][0]
+    spans = [float(np.ptp(theta)) for theta in run.theta]
+    if max(spans) < MOVES * float(record["coulomb_torque"] / record["sigma_0"]):
+        return
+    for side, span in zip(vehicle.sides, spans, strict=True):
+        if span < ALIVE * max(spans):
+            statement = "stays where it is while the other track turns; check the sensor and its driver"
+            yield _finding("dead_sensor", topics[Kind.ANGLE, side], statement)
+
+
+def _geometry(run: Run, vehicle: Vehicle) -> tuple[Array, Array, float] | None:
+    """Left and right angle (n,) and b / L of a vehicle whose two sensors obey a steering geometry."""
+    if vehicle.axle is None or set(vehicle.sides) != {"left", "right"} or vehicle.sensors.angle_from is not None:
+        return None
+    left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
+    return left, right, vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
+
+
+def _other(left: Array, ratio: float) -> Array:
+    """Right angle (n,) by the steering geometry, cot(left) - cot(right) = -b / L."""
+    t = np.tan(left)
+    return np.asarray(np.arctan2(t, 1.0 + ratio * t))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
+def _copied(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+    """Both angles alike where the steering geometry makes them differ."""
+    both = _geometry(run, vehicle)
+    if both is None:
+        return
+    left, right, ratio = both
+    apart = _rms(_other(left, ratio) - left)
+    if apart > APART_RAD and _rms(right - left) < COPIED * apart:
+        topic = f"{topics[Kind.ANGLE, 'left']}, {topics[Kind.ANGLE, 'right']}"
+        yield _finding(
+            "copied_sensor", topic, "show one and the same angle, where the steering geometry makes the tracks differ by "
+            f"{np.degrees(apart):.1f} deg; one sensor is missing, or read twice (with one sensor alone, say so: sensors.angle_from)",
+        )  # fmt: skip
+
+
+def _zeros(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+    """Zeros of the angles so far off that the steering geometry shows it."""
+    both = _geometry(run, vehicle)
+    if both is None:
+        return
+    left, right, ratio = (both[0][::10], both[1][::10], both[2])
+    missed = _rms(right - _other(left, ratio))
+    if missed < MISSED_RAD:
+        return
+    found = least_squares(lambda off: right - off[1] - _other(left - off[0], ratio), np.zeros(2))
+    worst = int(np.abs(found.x).argmax())
+    if abs(float(found.x[worst])) < ZERO_RAD or _rms(found.fun) > RESTORED * missed:
+        return
+    for side, off in zip(("left", "right"), found.x, strict=True):
+        if abs(float(off)) > 0.5 * abs(float(found.x[worst])):
+            statement = f"its zero is about {np.degrees(off):+.0f} deg off by the steering geometry; set it anew"
+            yield _finding("angle_zero", topics[Kind.ANGLE, side], statement)
+
+
+def _constant(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+    """Circuits of which no line moves though the tracks turned against friction."""
+    if vehicle.hydraulics is None:
+        return
+    model = build_model(vehicle)
+    record = model.parameters[0][0]
+    if float(np.ptp(run.theta, axis=1).max()) < MOVES * float(record["coulomb_torque"] / record["sigma_0"]):
+        return
+    rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
+    torque = np.asarray(np.sum([torque_side(p, model.rubber, run.time, *row) for p, *row in rows], axis=0))
+    try:
+        expected = line_pressures(torque, total_gains(vehicle, run.theta))
+    except DataError:  # angles that these cylinders cannot reach: a matter of units
+        return
+    lines, cylinders = vehicle.hydraulics.lines, vehicle.hydraulics.cylinders.values()
+    still = {
+        line for line, shown, nominal in zip(lines, run.pressure, expected, strict=True)
+        if _travel(run, shown[run.valid]) < ALIVE * _travel(run, nominal[run.valid]) and _idle(run, shown)
+    }  # fmt: skip
+    dead = [
+        line for line in lines
+        if line in still and all(still.issuperset({c.cap, c.rod} & set(lines)) for c in cylinders if line in (c.cap, c.rod))
+    ]  # fmt: skip
+    if dead:
+        topic = ", ".join(topics[Kind.PRESSURE, line] for line in dead)
+        statement = "stays constant but for noise while the tracks turn against friction; check sensors, plugs and valves"
+        yield _finding("dead_sensor", topic, statement)
+
+
+def _idle(run: Run, shown: Array) -> bool:
+    """Whether a pressure shows nothing but its own noise, in whatever unit."""
+    noise = white_noise(Signal(run.time, shown))
+    return _travel(run, shown[run.valid]) < max(IDLE * noise, 1e-9 * float(np.abs(shown).max()))

@@ -1,0 +1,42 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``lugre_steering.diagnose``: which physics the model leaves out, from a program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from lugre_steering.bag.given import Given, given_recordings
+from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
+from lugre_steering.diagnosis.result import Diagnosis
+from lugre_steering.result import folder_for
+from lugre_steering.vehicle import Vehicle, vehicle_of
+
+
+def diagnose(
+    data: Given | Sequence[Given],
+    vehicle: Vehicle | str | Path,
+    *,
+    seed: int = 1,
+    material: float = MATERIAL_SHARE,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Say which physics the vehicle file leaves out of bags (paths) or recordings of one vehicle, all together.
+
+    ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file;
+    ``seed``: of noise draws and bootstraps; ``material``: share of the torque amplitude from which an effect is called material;
+    ``progress`` is called with what is being done.
+    """
+    model = vehicle_of(vehicle)
+    recordings = given_recordings(data, model.channels, progress)
+    return diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
+
+
+def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:
+    """Write report.html and its pictures into a folder (which ``Diagnosis.save`` may have filled); the page."""
+    from lugre_steering.diagnosis.report import page
+
+    folder = folder_for(out)
+    page.write_report(diagnosis, folder)
+    return folder / "report.html"

@@ -1,0 +1,230 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What speaks against the angles: jumps, an encoder that has frozen, noise beyond the sheet; and the trusted state kept meanwhile.
+
+A confirmed jump of an angle re-anchors its side: the model goes on with the bristle as it was, and nothing is slid or
+heated by the jump. The state before the first jump is kept as a shadow, to which every further jump goes back: what came
+between was not true. If the angle is now where the joint can have got to since, at the rates that it has shown before, the
+side goes there in a straight line over the time that passed. What no jump takes back within ``TRUSTED_S`` is believed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from lugre_steering.chain.step import step
+from lugre_steering.estimator.layout import ANGLE_JUMP
+from lugre_steering.estimator.preview import departs
+from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
+
+TRUSTED_S = 10.0
+SETTLED_S = 0.2
+"""For so long after a return the angle stays in doubt."""
+FASTER = 1.5
+"""How much faster than ever before a joint may be while nobody sees it."""
+FASTEST_MEMORY_S = 0.1
+STILL_NS = 100_000_000
+STILL_SAMPLES = 5
+UNSEEN_SIGMA = 20.0
+"""Motion of so many times the noise of an angle must change its reading."""
+NOISY_SIGMA = 10.0
+NOISE_MEMORY_S = 0.2
+PRESSURE_MEMORY_S = 1.0
+"""Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
+RESIDUAL_MEMORY_S = 2.0
+
+DOUBTS = ("angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
+          "outside the range of the calibration", "plan far from the angle", "plan has run out")  # fmt: skip
+JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT = (1 << bit for bit in range(len(DOUBTS)))
+
+GUARD = np.dtype(
+    [
+        ("shadow_ns", np.int64),  # stamp of the trusted state; 0: the present one is trusted
+        ("shadow_angle", np.float64),  # measured then [rad]
+        ("calm", np.float64),  # time without another jump since [s]
+        ("returned", np.bool_),  # to where the shadow can have gone
+        ("absurd", np.bool_),  # the readings since the last accepted one
+        ("fastest", np.float64),  # rate that the joint has shown while trusted [rad/s]
+        ("still_ns", np.int64),  # since when the reading has not changed at all
+        ("still", np.int64),  # samples since
+        ("still_other", np.float64),  # angle of the other side then [rad]
+        ("frozen", np.bool_),
+        ("before", np.float64),  # change of the reading before the last [rad]
+        ("bend", np.float64),  # difference of the last two changes [rad]
+        ("noise", np.float64),  # variance of the reading, as neighbours tell it [rad2]
+    ]
+)
+
+
+@njit
+def noise_of(core, side):
+    """Noise [rad] of one angle sample of a side: the sheet's, or what it is where that is far more."""
+    sigma = core.config[0].angle_noise
+    measured = core.guard[side].noise
+    return math.sqrt(measured) if measured > (NOISY_SIGMA * sigma) ** 2 and sigma > 0.0 else sigma
+
+
+@njit
+def watch(core, side, ch, dt, value):
+    """Learn from the next reading [rad] of a side, ``dt`` [s] after the last: whether it stands still, and its noise.
+
+    Neighbouring second differences of a smooth motion have one sign; of white noise their product is -4 variances.
+    """
+    g, sigma = core.guard[side], core.config[0].angle_noise
+    change = value - ch.last_value
+    if change != 0.0 or dt <= 0.0:
+        g.still_ns = ch.last_ns if dt <= 0.0 else ch.last_ns + np.int64(dt * 1e9)
+        g.still = 0
+        g.frozen = False
+        g.still_other = math.nan
+    else:
+        g.still += 1
+    bend = change - g.before
+    limit = (3.0 * NOISY_SIGMA * sigma) ** 2  # one spike is no noise
+    weight = min(1.0, dt / NOISE_MEMORY_S)
+    g.noise = max(0.0, g.noise + (max(-limit, min(limit, -0.25 * bend * g.bend)) - g.noise) * weight)
+    g.before, g.bend = change, bend
+
+
+@njit
+def still(core, side, stamp_ns):
+    """Whether the reading of a side has not changed at all for so long that motion must have changed it."""
+    g = core.guard[side]
+    return g.still >= STILL_SAMPLES and stamp_ns - g.still_ns >= STILL_NS
+
+
+@njit
+def angle_doubts(core, side, stamp_ns):
+    """Doubts about the angle of a side at its newest sample."""
+    g, c = core.guard[side], core.config[0]
+    found = 0
+    if g.shadow_ns != 0:
+        found |= JUMPED
+    if core.state.size > 1 and c.angle_noise > 0.0 and g.still > 0:
+        other = 1 - side
+        if math.isnan(g.still_other) and core.motion[other].started != 0.0:
+            g.still_other = core.motion[other].theta
+        moved = abs(core.motion[other].theta - g.still_other)
+        if moved > UNSEEN_SIGMA * c.angle_noise and core.guard[other].still < STILL_SAMPLES and still(core, side, stamp_ns):
+            g.frozen = True
+    if g.frozen:
+        found |= FROZEN
+    if noise_of(core, side) > c.angle_noise:
+        found |= NOISY
+    return found
+
+
+@njit
+def weigh_pressures(core, stamp_ns, measured):
+    """Angles that stand still while the measured torque [N m] swings by more than they can hold unseen are frozen."""
+    c = core.config[0]
+    dt = (stamp_ns - c.swing_ns) * 1e-9
+    c.swing_ns = stamp_ns
+    stiffness, standing = 0.0, c.angle_noise > 0.0
+    for side in range(core.state.size):
+        stiffness += core.parameters[side].sigma_0
+        standing = standing and still(core, side, stamp_ns)
+    if not standing or dt <= 0.0:
+        c.swing_from = measured
+        return
+    c.swing_from += (measured - c.swing_from) * min(1.0, dt / PRESSURE_MEMORY_S)
+    if abs(measured - c.swing_from) > stiffness * UNSEEN_SIGMA * c.angle_noise:
+        for side in range(core.state.size):
+            core.guard[side].frozen = True
+
+
+@njit
+def trust(core, side, dt):
+    """Time passes without a jump: in the end the present state is the trusted one."""
+    g = core.guard[side]
+    g.absurd = False
+    if g.shadow_ns != 0:
+        g.calm += dt
+        if g.calm >= (SETTLED_S if g.returned else TRUSTED_S):
+            g.shadow_ns = 0
+    elif not g.frozen:
+        g.fastest += max(0.0, abs(core.motion[side].omega) - g.fastest) * min(1.0, dt / FASTEST_MEMORY_S)
+
+
+@njit
+def _stand_at(motion, value):
+    """The motion estimate at a standstill there."""
+    motion.center, motion.lead, motion.progress = value, 0.0, 0.0
+    motion.theta, motion.omega, motion.alpha = value, 0.0, 0.0
+
+
+@njit
+def reachable(core, side, since_ns, stamp_ns, change):
+    """Whether a joint can have turned by ``change`` [rad] between two stamps, at the rates that it has shown."""
+    g, sigma = core.guard[side], core.config[0].angle_noise
+    return abs(change) <= FASTER * g.fastest * (stamp_ns - since_ns) * 1e-9 + UNSEEN_SIGMA * sigma
+
+
+@njit
+def re_anchor(core, side, ch, stamp_ns, value):
+    """The angle of a side jumps to ``value`` [rad], confirmed: no slip, no heat, unless the joint has really gone there.
+
+    That it has, after it was frozen, and where the shadow can have got to.
+    """
+    g, c, p, state, out = core.guard[side], core.config[0], core.parameters[side], core.state[side], core.output[side]
+    motion = core.motion[side]
+    ch.reasons[ANGLE_JUMP] += 1
+    if g.shadow_ns == 0:
+        core.shadow[side] = state
+        g.shadow_ns, g.shadow_angle = ch.last_ns, ch.last_value
+        begin_ns = g.still_ns
+        g.returned = g.frozen
+    else:
+        saturated = state.saturated
+        core.state[side] = core.shadow[side]
+        state.saturated = saturated
+        begin_ns = g.shadow_ns
+        g.returned = reachable(core, side, begin_ns, stamp_ns, value - g.shadow_angle)
+    g.calm = 0.0
+    passed = (stamp_ns - g.shadow_ns) * 1e-9
+    if g.returned:
+        rate = (value - g.shadow_angle) / ((stamp_ns - begin_ns) * 1e-9)
+        step(p, state, core.rubber, out, passed, value, rate, 0.0, c.effects)
+    else:
+        core.scratch_state[0] = state
+        step(p, core.scratch_state[0], core.rubber, core.scratch_output[0], 0.0, value, 0.0, 0.0, c.effects)
+        turned = core.scratch_state[0].theta - state.theta
+        state.theta += turned
+        state.contact_angle += turned
+        step(p, state, core.rubber, out, passed, value, 0.0, 0.0, c.effects)
+    g.absurd, g.frozen, g.still, g.still_ns = False, False, 0, stamp_ns
+    g.before = g.bend = 0.0
+    _stand_at(motion, value)
+
+
+@njit
+def weigh_residual(c, stamp_ns, measured, residual):
+    """Learn from the next residual [N m] how large residuals and torques have been of late."""
+    dt = (stamp_ns - c.residual_ns) * 1e-9
+    weight = min(1.0, dt / RESIDUAL_MEMORY_S) if dt > 0.0 and c.residual_ns != 0 else 0.0
+    c.residual_ns = stamp_ns
+    c.residual_square += (residual * residual - c.residual_square) * weight
+    c.measured_square += (measured * measured - c.measured_square) * weight
+    c.estimate_square += ((measured - residual) ** 2 - c.estimate_square) * weight
+
+
+@njit
+def standing_doubts(core, stamp_ns):
+    """Doubts about the whole vehicle: a residual beyond the bound of the calibration, or as large as the torque; the plan."""
+    c, found = core.config[0], 0
+    if c.residual_ns != 0 and stamp_ns - c.residual_ns < RESIDUAL_MEMORY_S * 1e9:
+        level = math.sqrt(c.residual_square)
+        smaller = math.sqrt(min(c.measured_square, c.estimate_square))
+        large = c.estimate_square > (NOTABLE_SHARE * c.friction) ** 2 and level > LARGE_SHARE * smaller
+        if large or (c.residual_bound > 0.0 and level > c.residual_bound):
+            found |= RESIDUAL
+    if c.horizon > 0.0 and c.plan_size > 0:
+        if stamp_ns >= core.plan_ns[c.plan_size - 1]:
+            found |= PLAN_OUT
+        for side in range(core.state.size):
+            if departs(core, side, stamp_ns):
+                found |= PLAN_AWAY
+    return found

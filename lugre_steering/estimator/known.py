@@ -1,0 +1,41 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the vehicle file says of its calibration: how far the model can be trusted, and how well it should fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from lugre_steering.vehicle import Vehicle
+
+SLACK = 1.1
+"""The causal estimates of a motion swing a little farther than the smoothed ones that were kept."""
+
+
+@dataclass(frozen=True)
+class KnownRange:
+    """Largest angle [rad] and rate [rad/s] that the calibration saw (inf: not told), and its held-out RMSE [N m] (0: none)."""
+
+    angle: float = math.inf
+    rate: float = math.inf
+    rmse: float = 0.0
+
+
+def known_range(vehicle: Vehicle) -> KnownRange:
+    """From ``provenance``: ``seen: {angle_deg, rate_deg_s}`` and ``heldout_rmse_Nm``, of ``calibration`` or at its top."""
+    notes = [note for note in (vehicle.provenance, vehicle.provenance.get("calibration")) if isinstance(note, Mapping)]
+    seen: object = next((note["seen"] for note in notes if "seen" in note), None)
+    seen = seen if isinstance(seen, Mapping) else {}
+    rmse: object = next((note["heldout_rmse_Nm"] for note in notes if "heldout_rmse_Nm" in note), 0.0)
+    if isinstance(rmse, Mapping):
+        rmse = rmse.get("calibrated", 0.0)
+    angle, rate = (_positive(seen.get(key)) for key in ("angle_deg", "rate_deg_s"))
+    return KnownRange(SLACK * math.radians(angle or math.inf), SLACK * math.radians(rate or math.inf), _positive(rmse))
+
+
+def _positive(value: object) -> float:
+    """The number, or 0 for anything that is no positive one."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0.0
+    return float(value) if number else 0.0  # type: ignore[arg-type]

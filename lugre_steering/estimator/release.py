@@ -1,0 +1,38 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The feed-forward that leaves: inside limits of value and rate, and led to zero while anything speaks against it."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+LONGEST_S = 0.05
+
+
+@njit
+def release(core, e):
+    """Replace the wanted feed-forward of an estimate by what may be acted upon.
+
+    Its weight falls to zero over the withdrawal ramp while there are doubts, and rises to one over the recovery ramp when
+    there are none. A stamp that is not after the last one leaves no time for a change, and silence no more than ``LONGEST_S``.
+    """
+    c = core.config[0]
+    first = c.released_ns == 0
+    dt = min(LONGEST_S, max(0.0, (e.stamp_ns - c.released_ns) * 1e-9))
+    c.released_ns = e.stamp_ns
+    if not first:
+        ramp = c.withdrawal_ramp if e.doubts != 0 else c.recovery_ramp
+        change = dt / ramp if ramp > 0.0 else 1.0
+        c.weight = max(0.0, c.weight - change) if e.doubts != 0 else min(1.0, c.weight + change)
+    elif e.doubts != 0:
+        c.weight = 0.0
+    for side in range(core.state.size):
+        wanted = max(-c.limit, min(c.limit, c.weight * e.feed_forward[side]))
+        if not first and math.isfinite(wanted):
+            reach, last = c.rate_limit * dt, core.released[side]
+            wanted = max(last - reach, min(last + reach, wanted))
+        if math.isfinite(wanted):
+            core.released[side] = wanted
+        e.feed_forward[side] = wanted

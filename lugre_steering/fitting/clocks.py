@@ -1,0 +1,136 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Two devices, two clocks: how late the torque's sensors are stamped against the angles, measured and taken out.
+
+An offset shifts the whole torque, so what is left of a recalibrated baseline goes with the torque's slope, dM/dt. It is believed
+where it is larger than what the rest of the residual makes of it by chance (scores summed over blocks; Liang and Zeger 1986)
+and where a slow sensor does not explain it better. Larger ones are left to the check of wiring and to the catalogue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lugre_steering.data.dataset import prepare
+from lugre_steering.effects.registry import effect
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Calibration, Candidate, Problem
+from lugre_steering.fitting.split import CLUSTER_S
+from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.vehicle import Vehicle
+
+LONGEST_S = 0.035
+"""Devices that stamp on receipt are 0 to 30 ms apart; more is told by name (time_delay) or as wiring (clock_skew)."""
+SHORTEST_S, SURE = 2e-4, 4.0
+"""Smallest offset worth taking out, and standard deviations from which it is believed."""
+WORTH_SAYING_S = 2e-3
+ROUNDS = 6
+SLOWER = 0.6
+"""Share of the cost with an offset below which a slow sensor explains it better."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """How late [s] the torque of one bag is stamped against its angles, and its standard deviation."""
+
+    late_s: float
+    deviation_s: float
+
+    @property
+    def believed(self) -> bool:
+        return abs(self.late_s) > max(SHORTEST_S, SURE * self.deviation_s)
+
+
+def synchronised(
+    recordings: Sequence[Recording], vehicle: Vehicle, calibrations: Sequence[Calibration] | None = None
+) -> tuple[Problem, dict[str, Finding]]:
+    """The recordings prepared with one clock, and a finding for each, by its name, whose offset is worth saying."""
+    problem = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], calibrations)
+    if any(entry.id in ("time_delay", "pressure_lag") for entry in vehicle.effects):
+        return problem, {}
+    original, start = problem, _baseline(problem, None)
+    baseline, late = start, np.zeros(len(recordings))
+    deviation = np.zeros(len(recordings))
+    for _ in range(ROUNDS):
+        offsets = clock_offsets(problem, baseline)
+        # What is believed at all is then followed to its end.
+        step = np.array([offset.late_s if offset.believed or known else 0.0 for offset, known in zip(offsets, late, strict=True)])
+        if np.abs(step).max() < SHORTEST_S:
+            break
+        late, deviation = late + step, np.array([offset.deviation_s for offset in offsets])
+        if np.abs(late).max() > LONGEST_S:
+            return original, {}
+        problem = Problem(vehicle, [
+            prepare(_earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, late, strict=True)
+        ], calibrations)  # fmt: skip
+        baseline = _baseline(problem, baseline)
+    if not late.any() or _slow_sensor(original, start, baseline, late):
+        return original, {}
+    return problem, {
+        recording.name: _finding(vehicle, float(shift), float(spread))
+        for recording, shift, spread in zip(recordings, late, deviation, strict=True) if abs(shift) > WORTH_SAYING_S
+    }  # fmt: skip
+
+
+def _baseline(problem: Problem, start: Fit | None) -> Fit:
+    weight = problem.valid / np.concatenate([run.sigma for run in problem.runs])
+    return fit(problem, weight, start=None if start is None else start.x, linearisations=20, robust=True, tolerance=1e-4)
+
+
+def clock_offsets(problem: Problem, baseline: Fit) -> list[Offset]:
+    """How late the torque of each bag is stamped, by what the baseline leaves of it beside all that was fitted."""
+    sigma = np.concatenate([run.sigma for run in problem.runs])
+    weight = problem.valid / sigma
+    residual = (problem.measured - baseline.prediction) * weight
+    # Bounded influence, as in the fit: a few large errors must not decide.
+    trust = 1.0 / np.sqrt(1.0 + (residual / max(3.0 * float(np.median(np.abs(residual))), 1e-30)) ** 2)
+    basis = np.linalg.qr(baseline.jacobian * np.sqrt(trust)[:, None])[0]
+    offsets = []
+    for bag, run in enumerate(problem.runs):
+        part = slice(problem.edges[bag], problem.edges[bag + 1])
+        slope = np.zeros(residual.size)
+        slope[part] = -np.gradient(baseline.prediction[part], run.time)
+        slope *= weight * np.sqrt(trust)
+        own = slope - basis @ (basis.T @ slope)
+        power = float(own @ own)
+        if power <= 0.0:
+            offsets.append(Offset(0.0, np.inf))
+            continue
+        score = own * residual * np.sqrt(trust)
+        late = float(score.sum()) / power
+        left = score - late * own**2
+        blocks = np.bincount(((run.time - run.time[0]) / CLUSTER_S).astype(np.int64), left[part])
+        offsets.append(Offset(late, float(np.sqrt(blocks @ blocks)) / power))
+    return offsets
+
+
+def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bool:
+    """Whether the lag of a slow sensor explains the recordings as stamped better than offsets of the clock do."""
+    if late.mean() <= 0.0:
+        return False
+    lag = Candidate(effect("pressure_lag"), free=("tau",))
+    weight = original.valid / np.concatenate([run.sigma for run in original.runs])
+    slow = fit(original, weight, [(lag, {"tau": float(late.mean())})], start.x, linearisations=10, robust=True, tolerance=1e-4)
+    used = np.count_nonzero(weight)
+    return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
+
+
+def _earlier(recording: Recording, shift: float) -> Recording:
+    """The recording with what gives the torque stamped ``shift`` [s] earlier."""
+    torque = recording.measured_torque
+    return replace(
+        recording, pressure={line: Signal(s.time_s - shift, s.value) for line, s in recording.pressure.items()},
+        measured_torque=None if torque is None else Signal(torque.time_s - shift, torque.value),
+    )  # fmt: skip
+
+
+def _finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
+    topics = ", ".join(dict.fromkeys(c.topic for c in vehicle.channels if c.kind in (Kind.PRESSURE, Kind.TORQUE)))
+    return Finding(
+        "clock_offset", topics,
+        f"{topics}: stamped {1e3 * abs(late):.1f} ms (+-{2e3 * deviation:.1f}) too {'late' if late > 0.0 else 'early'} against the angles; "
+        "taken out here; synchronise the clocks of the devices, or stamp where the sensor is read",
+    )  # fmt: skip

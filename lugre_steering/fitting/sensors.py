@@ -1,0 +1,66 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What sound pressure sensors and clocks may add to a torque though no standstill shows it: hysteresis, a zero that settles, a clock.
+
+Each has the size that data sheets allow; what they explain is no structure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.recording import Array
+
+HYSTERESIS = 5e-4
+"""Of the range of a pressure sensor: half width of its loop."""
+SETTLING, SETTLING_S = 2e-3, (10.0, 30.0, 100.0)
+"""Of the range: how far a zero may be off when a recording starts, and how long it takes."""
+CLOCK_S = 1e-3
+"""What is left of an offset between clocks after it was measured: they wander."""
+
+
+@njit(cache=True)
+def loop(pressure: Array, half_width: float) -> Array:
+    """What a play of ``half_width`` [Pa] takes off a pressure (n,) [Pa], over its half width: -1 rising ... 1 falling."""
+    out = np.empty_like(pressure)
+    center = pressure[0]
+    for i in range(pressure.size):
+        center = min(max(center, pressure[i] - half_width), pressure[i] + half_width)
+        out[i] = (center - pressure[i]) / half_width
+    return out
+
+
+def sensor_columns(problem: Problem) -> Array:
+    """Torque (n, k) [N m] of each at one standard deviation."""
+    columns = []
+    for bag, run in enumerate(problem.runs):
+        part = slice(problem.edges[bag], problem.edges[bag + 1])
+        rows = [CLOCK_S * np.gradient(run.measured, run.time)]
+        if problem.vehicle.hydraulics is not None:
+            span = problem.vehicle.sensors.pressure_range_Pa
+            elapsed = run.time - run.time[0]
+            for gain, pressure in zip(run.torque_per_line, run.pressure, strict=True):
+                rows.append(HYSTERESIS * span * gain * loop(np.ascontiguousarray(pressure), HYSTERESIS * span))
+                rows += [SETTLING * span * gain * np.exp(-elapsed / tau) for tau in SETTLING_S]
+        for row in rows:
+            columns.append(np.zeros(problem.measured.size))
+            columns[-1][part] = row
+    return np.column_stack(columns)
+
+
+def beside_sensors(problem: Problem, residual: Array, weight: Array, weighted: Array) -> Array:
+    """Standardised residual (n,) without what sensors and clocks explain of it at their sizes, the baseline moving along.
+
+    ``weight`` (n,) one over sigma where valid, ``weighted`` (n, p) the baseline's own columns times the weight of its fit.
+    """
+    own = sensor_columns(problem) * weight[:, None]
+    norms = np.linalg.norm(weighted, axis=0)
+    free = weighted[:, norms > 0.0] / norms[norms > 0.0]
+    columns = np.hstack([own, free])
+    target = residual * weight
+    # The baseline is only moved along: its own part of the residual has been fitted already.
+    penalty = np.concatenate([np.ones(own.shape[1]), np.full(free.shape[1], 1e-3)])
+    values = np.linalg.solve(columns.T @ columns + np.diag(penalty**2), columns.T @ target)
+    return np.asarray(target - columns @ values)

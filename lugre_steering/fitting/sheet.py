@@ -1,0 +1,284 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Is the vehicle file that of this vehicle? Entries that may be wrong by a lot, refitted with wide bounds and ranked.
+
+A recalibration moves values by what nominal values may be off; what it needs beyond that, or stops at its bounds, is told as a
+wrong sheet before any physics is named. A load scales friction and aligning torque, a bore all that the pressures show, friction
+only itself: each hypothesis is fitted and ranked by what it leaves, in shares of the torque as it was measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from lugre_steering.data.dataset import Run, motion, with_hydraulics
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Calibration, Candidate, Problem, Values
+from lugre_steering.recording import Array, BagFinding
+from lugre_steering.serialise import IN_MEMORY
+from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.loads import vertical_load
+from lugre_steering.vehicle.sections import Cylinder
+
+WIDE, FARTHEST = 1.0, 2.6
+"""Standard deviation and bound of the logarithm of an entry under suspicion: a factor of e, up to 13."""
+SURPRISE = 10.0
+"""Squared prior deviations, of friction level, stiffness and weather together, from which a sheet is suspect."""
+RELIEVED = 0.5
+"""Share of the surprise that a hypothesis must leave at most, unless a value stands at its bound."""
+EDGE = 0.01
+SAMPLES, RATE_HZ = 6000, 25.0
+"""Samples and rate to which the hypotheses are fitted: enough to rank them."""
+SCALES = (0.5, 2.0)
+"""Range of the factor on a bore or an arm."""
+EXPLAINED, BETTER = 0.8, 0.9
+"""Share of what the baseline leaves that a wrong entry must explain, and share of what named physics leaves that it may leave."""
+PUT_RIGHT = 0.03
+"""Error that is left, as share of the torque, with which a sheet counts as put right."""
+OFF, SEVERAL = 0.03, 1.1
+"""Relative error from which an entry is wrong, and what several wrong entries must be worth against one."""
+TIED = 1.1
+"""Cost over the lowest up to which a hypothesis is as good."""
+SHOWN = 5
+LOAD = Calibration("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
+LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
+PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
+LEVELS = ("friction_level", "stiffness")
+STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST, high=FARTHEST)
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An entry of the vehicle file: its key, by which factor it seems wrong (None: exchanged), and the error that is left with it
+    put right, as share of the measured torque."""
+
+    key: str
+    factor: float | None
+    relative_error: float
+    cost: float = field(metadata=IN_MEMORY)
+
+    @property
+    def words(self) -> str:
+        return self.key if self.factor is None else f"{self.key} (times {self.factor:.3g})"
+
+
+@dataclass(frozen=True)
+class SheetFinding(BagFinding):
+    """A finding about the vehicle file, with the entries most likely wrong."""
+
+    suspects: tuple[Suspect, ...]
+
+
+@dataclass(frozen=True)
+class WrongSheet:
+    """``times``: measured over expected torque; entries most likely wrong, worst first."""
+
+    times: float
+    suspects: tuple[Suspect, ...]
+    why: str | None = None
+
+    @property
+    def statement(self) -> str:
+        check = ", ".join(suspect.words for suspect in self.suspects[:3])
+        said = f"measured torque is {self.times:.2g} times what this sheet can give" if self.why is None else self.why
+        return f"{said}; check {check}"
+
+    def finding(self) -> SheetFinding:
+        """As an entry of ``data_quality``."""
+        return SheetFinding("wrong_sheet", "", "", (), self.statement, self.suspects)
+
+
+def torque_ratio(product: float, square: float) -> float:
+    """Factor on an expected torque that fits the measured one best: sum of products over sum of squares of the expected one."""
+    return product / square if square > 0.0 else float("nan")
+
+
+def wrong_sheet(problem: Problem, *, insist: bool = False) -> WrongSheet | None:
+    """Whether the recalibrated baseline needs more than nominal values allow; None where it does not.
+
+    ``insist``: the most likely entries even if none of them makes it fit, where values stand at bounds anyhow.
+    """
+    thin = thinned(problem)
+    baseline = _fitted(thin)
+    surprise = _surprise(thin, baseline)
+    stuck = at_bounds(thin, baseline.x, LEVELS)
+    if not insist and not stuck and surprise < SURPRISE:
+        return None
+    found = sorted(_off((*_levels(thin), *_geometries(thin, baseline))), key=lambda item: item[0].cost)
+    if not found:
+        return None
+    suspect, _ = found[0]
+    floor = float(np.count_nonzero(thin.valid))
+    fits = suspect.relative_error < PUT_RIGHT or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
+    if not insist and (not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise):
+        return None
+    return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]))
+
+
+def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = ()) -> WrongSheet | None:
+    """Whether one wrong bore, arm or pair of lines, or another vehicle, explains what the baseline leaves, and better than ``effects``."""
+    thin = thinned(problem)
+    baseline = _fitted(thin)
+    named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
+    found = sorted((suspect for suspect, _ in _off((*_levels(thin), *_geometries(thin, baseline)))), key=lambda item: item.cost)
+    if not found:
+        return None
+    floor = float(np.count_nonzero(thin.valid))
+    left = found[0].cost - floor
+    if left > (1.0 - EXPLAINED) * (baseline.cost - floor) or left > BETTER * (named.cost - floor):
+        return None
+    return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
+
+
+def _off(found: Iterable[tuple[Suspect, float]]) -> list[tuple[Suspect, float]]:
+    """Those whose entry is off by more than drawings and tapes are."""
+    return [(suspect, left) for suspect, left in found if suspect.factor is None or abs(np.log(suspect.factor)) > OFF]
+
+
+def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
+    """Calibration values of those ``names`` that stand at an end of their range."""
+    return [
+        c.name for c, value in zip(problem.calibrations, x, strict=False)
+        if c.name in names and not c.low + EDGE * (c.high - c.low) < value < c.high - EDGE * (c.high - c.low)
+    ]  # fmt: skip
+
+
+def thinned(problem: Problem) -> Problem:
+    """The same with few samples: hypotheses are far apart."""
+    total = sum(run.time.size for run in problem.runs)
+    runs = []
+    for run in problem.runs:
+        step = float(run.time[1] - run.time[0])
+        runs.append(_every(run, max(1, round(1.0 / RATE_HZ / step), -(-total // SAMPLES) if step < 0.1 else 1)))
+    return Problem(problem.vehicle, runs, problem.calibrations)
+
+
+def _every(run: Run, stride: int) -> Run:
+    if stride == 1:
+        return run
+    keep = slice(None, None, stride)
+    time, theta = run.time[keep].copy(), run.theta[:, keep].copy()
+    omega, alpha = motion(time, theta)
+    return replace(
+        run, time=time, theta=theta, omega=omega, alpha=alpha, gains=run.gains[:, :, keep], pressure=run.pressure[:, keep],
+        side_torque=run.side_torque[:, keep], side_slope=run.side_slope[:, keep], measured=run.measured[keep],
+        sigma=run.sigma[keep], valid=run.valid[keep],
+    )  # fmt: skip
+
+
+def _weight(problem: Problem) -> Array:
+    return np.asarray(problem.valid / np.concatenate([run.sigma for run in problem.runs]))
+
+
+def _fitted(problem: Problem, weight: Array | None = None, start: Array | None = None) -> Fit:
+    weight = _weight(problem) if weight is None else weight
+    return fit(problem, weight, start=start, robust=True, linearisations=15, tolerance=1e-4)
+
+
+def _surprise(problem: Problem, result: Fit, freed: Sequence[str] = ()) -> float:
+    """Squared prior deviations of friction level, stiffness and the weather of the average bag."""
+    count = len(problem.calibrations)
+    scaled = (result.x / problem.scales()) ** 2
+    own = [scaled[i] for i, c in enumerate(problem.calibrations) if c.name in ("friction_level", "stiffness") and c.name not in freed]
+    weather = scaled[count + len(problem.runs) :]
+    return float(sum(own) + weather.sum() / len(problem.runs))
+
+
+def _ratio(problem: Problem) -> float:
+    """Measured torque over that of the sheet."""
+    expected = problem.predict_all(problem.start())[problem.valid]
+    return torque_ratio(float(problem.measured[problem.valid] @ expected), float(expected @ expected))
+
+
+def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
+    """Hypotheses about whole levels, and the surprise that each leaves."""
+    vehicle = problem.vehicle
+    known = [c for c in problem.calibrations if c.name != GAIN.name]
+    others = [c for c in known if c.name != LEVEL.name]
+    level = "friction.coulomb" if vehicle.friction is not None else "contact.coulomb_torque_Nm"
+    stiff = level.split(".")[0] + ".stiffness_Nm_per_deg"
+    trials: list[tuple[str, list[Calibration], str]] = [(level, [LEVEL, *others], LEVEL.name)]
+    trials.append((stiff, [STIFF, *(c for c in known if c.name != STIFF.name)], STIFF.name))
+    if vehicle.axle is not None:
+        trials.append(("axle.load_N", [LOAD, *known], LOAD.name))
+    pressures = "bores of all cylinders, or unit of the pressures" if vehicle.hydraulics is not None else "unit of the measured torque"
+    trials.append((pressures, [PRESSURES, *known], PRESSURES.name))
+    trials.append((
+        "several entries: another vehicle", [LEVEL, STIFF, PRESSURES, *(c for c in others if c.name != STIFF.name)], "",
+    ))  # fmt: skip
+    for key, calibrations, name in trials:
+        trial = Problem(vehicle, problem.runs, calibrations)
+        result = _fitted(trial)
+        names = [c.name for c in calibrations]
+        factor = float(np.exp(result.x[names.index(name)])) if name else None
+        if key == pressures and factor is not None:  # a torque goes with the square of a bore
+            factor = factor**0.5 if vehicle.hydraulics is not None else factor
+        if vehicle.axle is not None and vehicle.track is not None and name == LOAD.name and factor is not None:
+            share = vertical_load(vehicle.axle, vehicle.track) / (0.5 * vehicle.axle.load_N)  # the tracks' own weight is no load
+            factor = max((factor - 1.0) * share + 1.0, 1e-3)
+        freed = (name,) if name else (LEVEL.name, STIFF.name)
+        suspect = _suspect(problem, trial, result, key, factor)
+        yield suspect if name else replace(suspect, cost=SEVERAL * suspect.cost), _surprise(trial, result, freed)
+
+
+def _geometries(problem: Problem, baseline: Fit) -> Iterator[tuple[Suspect, float]]:
+    """Hypotheses about single cylinders, and the surprise that each leaves."""
+    hydraulics = problem.vehicle.hydraulics
+    for name, cylinder in hydraulics.cylinders.items() if hydraulics is not None else ():
+        key = f"hydraulics.cylinders.{name}"
+        for entry, scale in (("bore_m", _bore), ("knuckle_m", _knuckle)):
+            factor = 1.0
+            trial, result = problem, baseline
+            for _ in range(2):
+                factor = _better(problem, trial, result, name, partial(scale, cylinder), factor)
+                trial = _changed(problem, name, scale(cylinder, factor))
+                result = _fitted(trial, start=baseline.x)
+            yield _suspect(problem, trial, result, f"{key}.{entry}", factor), _surprise(trial, result)
+        trial = _changed(problem, name, replace(cylinder, cap=cylinder.rod, rod=cylinder.cap))
+        result = _fitted(trial, start=baseline.x)
+        yield _suspect(problem, trial, result, f"{key}.cap and .rod exchanged", None), _surprise(trial, result)
+
+
+def _bore(cylinder: Cylinder, factor: float) -> Cylinder:
+    bore = cylinder.bore_m * factor
+    return replace(cylinder, bore_m=bore, rod_m=min(cylinder.rod_m, 0.95 * bore))
+
+
+def _knuckle(cylinder: Cylinder, factor: float) -> Cylinder:
+    return replace(cylinder, knuckle_m=tuple(factor * value for value in cylinder.knuckle_m))
+
+
+def _better(
+    problem: Problem, trial: Problem, result: Fit, name: str, change: Callable[[float], Cylinder], factor: float
+) -> float:
+    """The factor on one entry that explains most of what is left, by how it changes the measured torque."""
+    weight = _weight(trial)
+    turned = (_changed(problem, name, change(factor * 1.02)).measured - trial.measured) * weight / 0.02
+    basis = result.basis()
+    own = turned - basis @ (basis.T @ turned)
+    left = (trial.measured - result.prediction) * weight
+    power = float(own @ own)
+    step = -float(own @ left) / power if power > 0.0 else 0.0
+    return float(np.clip(factor * np.exp(np.clip(step, -0.5, 0.5)), *SCALES))
+
+
+def _changed(problem: Problem, name: str, cylinder: Cylinder) -> Problem:
+    """The problem of a vehicle with another cylinder."""
+    hydraulics = problem.vehicle.hydraulics
+    assert hydraulics is not None
+    vehicle: Vehicle = problem.vehicle.replace(
+        hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, name: cylinder})
+    )
+    return Problem(vehicle, [with_hydraulics(run, vehicle) for run in problem.runs], problem.calibrations)
+
+
+def _suspect(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None) -> Suspect:
+    """Judged in the torque as measured: a smaller bore makes all errors smaller, which explains nothing."""
+    shown = float(np.sum(trial.measured[trial.valid] ** 2))
+    seen = float(np.sum(problem.measured[problem.valid] ** 2))
+    left = float(np.sum((trial.measured - result.prediction)[trial.valid] ** 2))
+    return Suspect(key, factor, float(np.sqrt(left / max(shown, 1e-30))), result.cost * seen / max(shown, 1e-30))

@@ -1,0 +1,175 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From configure to cleanup: each input message is one sample pushed into the estimator; what comes out is published at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+
+from lugre_steering.chain.step import Records
+from lugre_steering.estimator import Estimator, Options, doubts
+from lugre_steering.live.health import Health
+from lugre_steering.live.inputs import Inputs
+from lugre_steering.live.outputs import Outputs
+from lugre_steering.live.parameters import Settings
+from lugre_steering.recording import Array, IntArray
+from lugre_steering.vehicle import Vehicle
+
+
+class Session:
+    """One vehicle, its estimator, and the topics around it. Publishes nothing unless ``active``; the state goes on."""
+
+    def __init__(
+        self,
+        node: Node,
+        settings: Settings,
+        vehicle: Vehicle,
+        guarded: Callable[[Callable[..., None]], Callable[..., None]],
+        latency_window: int,
+    ) -> None:
+        self.settings, self.vehicle, self.active = settings, vehicle, False
+        warm_up(vehicle, settings.options)
+        self.estimator = Estimator(vehicle, settings.options)
+        self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
+        self.outputs = Outputs(node, vehicle, settings)
+        self._node = node
+        self._torque_ns = 0  # stamp of the newest torque
+        self._arrived_ns = 0  # monotonic time of the sample that gave it
+        self._doubts = 0
+        self.news = False  # the doubts have changed since the last report
+        self._now_ns: Callable[[], int] = time.time_ns
+        self.choose_clock()
+        self._inputs = Inputs(node, vehicle, settings.input_depth, self.health, guarded, self._push, self._set_plan)
+
+    def close(self) -> None:
+        """Leave the topics."""
+        self._inputs.close()
+        self.outputs.close()
+
+    def activate(self) -> None:
+        self.active = True
+        if self._torque_ns:  # what has come meanwhile was for nobody: the feed-forward comes back from what was last published
+            self.estimator.set_released(self.outputs.released or [0.0] * len(self.vehicle.sides))
+        self.outputs.fading = None
+
+    def deactivate(self) -> None:
+        """Lead the feed-forward to zero; nothing else is published any more."""
+        self.active = False
+        self.outputs.begin_fade(self._now_ns(), self.settings.options.withdrawal_ramp_s)
+
+    def change(self, settings: Settings) -> None:
+        """Go on with other settings (those that are not fixed)."""
+        self.settings = settings
+        self.estimator.set_options(settings.options)
+        self.health.set_timeouts(settings.angle_timeout_s, settings.pressure_timeout_s)
+        self.outputs.set_ramp(settings)
+
+    def reload(self, vehicle: Vehicle) -> None:
+        """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
+        self.estimator = self.estimator.continued(vehicle)
+        self.vehicle = vehicle
+        self.health.set_vehicle(vehicle)
+
+    def tick(self) -> None:
+        """Called often: leads the feed-forward to zero where that is due."""
+        outputs = self.outputs
+        if outputs.fading is None:
+            silent_ns = time.monotonic_ns() - self._arrived_ns
+            if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and outputs.released:
+                self.health.withheld["feed-forward led to zero: inputs stale"] += 1
+                outputs.begin_fade(self._now_ns(), self.settings.options.withdrawal_ramp_s)
+        elif not outputs.faded:
+            outputs.fade(self._now_ns())
+            self.estimator.set_released(outputs.released)
+
+    def _stale_to_zero(self) -> bool:
+        return self.settings.when_stale == "zero"
+
+    def choose_clock(self) -> None:
+        """ROS time: simulated time where it is in use, else the system clock itself (30 times cheaper to read)."""
+        clock = self._node.get_clock()
+        self.simulated = bool(clock.ros_time_is_active)
+        self._now_ns = (lambda: int(clock.now().nanoseconds)) if self.simulated else time.time_ns
+
+    def statuses(self, monotonic_ns: int, elapsed_s: float) -> list[DiagnosticStatus]:
+        self.news = False
+        estimator = self.estimator
+        self.health.simulated, self.health.active = self.simulated, self.active
+        return self.health.statuses(self._now_ns(), monotonic_ns, elapsed_s, estimator.counters, estimator.saturated_steps)
+
+    # --------------------------------------------------------------- samples
+
+    def _set_plan(self, plan: Callable[[int], tuple[IntArray, Array]]) -> None:
+        latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
+        self.estimator.set_plan(*plan(latest_ns))
+
+    def _push(self, channel: int, stamp_ns: int, value: float, rate: float) -> None:
+        # Arrival is the begin of the callback: the time of reception that rclpy offers (MessageInfo) makes
+        # EventsExecutor of rclpy 7.1 raise SystemError.
+        begin_ns = time.monotonic_ns()
+        health = self.health
+        now_ns = self._now_ns()
+        health.arrivals[channel] += 1
+        health.arrived_ns[channel] = now_ns
+        health.behind_ns[channel] = now_ns - stamp_ns
+        estimates, residuals = self.estimator.push(channel, stamp_ns, value, rate)
+        if estimates.size:
+            self._publish(estimates[0], begin_ns)
+        if not self.active:
+            return
+        for residual in residuals:
+            if self.outputs.residual(residual):
+                health.add_residual(float(residual["residual"]), float(residual["measured_torque"]))
+            else:
+                health.withheld["residual is not a finite number"] += 1
+
+    def _publish(self, row: Records, begin_ns: int) -> None:
+        health, outputs = self.health, self.outputs
+        stamp_ns = int(row["stamp_ns"])
+        if stamp_ns <= self._torque_ns:  # the estimator began anew
+            outputs.interrupt_commands()
+        self._torque_ns = stamp_ns
+        self._arrived_ns = begin_ns
+        if row["doubts"] != self._doubts:
+            self._doubts, self.news = int(row["doubts"]), True
+        if self._doubts:
+            health.doubted.update(doubts(row))
+        if not self.active:
+            health.withheld["node not active"] += 1
+            return
+        if health.faulty(begin_ns):
+            self._withhold("after an exception")
+            return
+        if not outputs.torque(stamp_ns, float(row["total"])):
+            self._withhold("torque is not a finite number")
+            return
+        now_ns = self._now_ns()
+        health.estimates += 1
+        health.arrival_to_publish.add(time.monotonic_ns() - begin_ns)
+        health.stamp_to_publish.add(now_ns - stamp_ns)
+        if not outputs.estimate(stamp_ns, row):
+            self._withhold("estimate is not a finite number")
+        elif abs(now_ns - stamp_ns) <= self.settings.angle_timeout_s * 1e9:
+            outputs.commands(now_ns, row)
+        elif self.settings.publish_commands:
+            self._withhold("commands: stamps are not close to the clock")
+
+    def _withhold(self, reason: str) -> None:
+        self.health.withheld[reason] += 1
+        self.outputs.interrupt_commands()
+
+
+def warm_up(vehicle: Vehicle, options: Options) -> None:
+    """Compile, or load from the cache, everything that callbacks call, on an estimator that is then thrown away."""
+    estimator = Estimator(vehicle, options)
+    for step in range(1, 200):
+        stamp_ns = 1_000_000_000 + step * 10_000_000
+        if step == 100:
+            estimator.set_plan(np.array([stamp_ns, 2 * stamp_ns], np.int64), np.zeros((len(vehicle.sides), 2)))
+        for channel in range(len(vehicle.channels)):
+            estimator.push(channel, stamp_ns, 1e-3 * step)

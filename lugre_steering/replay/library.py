@@ -1,0 +1,40 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``lugre_steering.replay``: recordings through the estimator from a program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lugre_steering.bag.given import Given, each, with_both_tracks
+from lugre_steering.bag.reader import bag_name
+from lugre_steering.errors import BagError
+from lugre_steering.estimator import Options
+from lugre_steering.online import Comparison
+from lugre_steering.recording import Recording, unused_name
+from lugre_steering.replay.result import SCHEMA, Replay, ReplayedBag
+from lugre_steering.replay.run import Passage
+from lugre_steering.vehicle import Vehicle, vehicle_of
+
+
+def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, options: Options | None = None) -> Replay:
+    """Torques of bags (paths) or recordings, kept in memory: the same numbers as the command and the live node give.
+
+    ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file.
+    """
+    model, timing = vehicle_of(vehicle), options or Options()
+    overall, bags = Comparison(), list[ReplayedBag]()
+    for item in each(data):
+        path = Path(item.name if isinstance(item, Recording) else item)
+        name = item.name if isinstance(item, Recording) else bag_name(path)
+        passage = Passage(path, unused_name(name, [bag.name for bag in bags]), model, timing)
+        if isinstance(item, Recording):
+            bags.append(passage.remember_recording(with_both_tracks(item, model.channels)))
+        elif path.exists():
+            bags.append(passage.remember())
+        else:
+            raise BagError(f"{path}: no such file or folder")
+        overall.merge(passage.fit)
+    source = model.name if isinstance(vehicle, Vehicle) else str(vehicle)
+    return Replay(SCHEMA, source, model.coordinate.force_unit, timing, tuple(bags), overall.result())

@@ -1,0 +1,142 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a replay came to, with the names of ``summary.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from lugre_steering.errors import DataError
+from lugre_steering.estimator import Options
+from lugre_steering.files import earlier_result, write_record
+from lugre_steering.online import Agreement
+from lugre_steering.recording import Array, Finding
+from lugre_steering.result import Result, folder_for, frame, html, of_bag
+from lugre_steering.serialise import IN_MEMORY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+SCHEMA: Final = "lugre_steering/replay/1"
+RECORD = "summary.json"
+
+
+@dataclass(frozen=True)
+class Series:
+    """The estimates of one bag, n of them, and its m residuals; times [s] since the first stamp.
+
+    ``angle`` [rad] and ``rubber_temperature`` [degC] by side, ``torque`` (n,) of all tracks [N m]; ``measured`` (m,) [N m] from
+    pressures or a torque sensor and ``residual`` (m,) [N m], measured minus estimate.
+    """
+
+    time_s: Array
+    angle: Mapping[str, Array]
+    torque: Array
+    rubber_temperature: Mapping[str, Array]
+    residual_time_s: Array
+    measured: Array
+    residual: Array
+
+
+@dataclass(frozen=True)
+class InputCounts:
+    """What came of one input: its topic (None: not recorded), samples used, rejected and noted ones by reason."""
+
+    topic: str | None
+    used: int
+    rejected: Mapping[str, int]
+    noted: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class ReplayedBag:
+    """One bag through the estimator: ``fit`` against the measured torque, or ``fit_note`` why there is none; inputs by name.
+
+    ``series``: the torques themselves, where they were kept in memory rather than written into a bag.
+    """
+
+    bag: str
+    name: str
+    duration_s: float
+    messages: int
+    estimates: int
+    fit: Agreement | None
+    fit_note: str | None
+    samples: Mapping[str, InputCounts]
+    saturated_rubber_table_steps: int
+    findings: tuple[Finding, ...]
+    picture: str | None = None
+    picture_note: str | None = None
+    series: Series | None = field(default=None, repr=False, metadata=IN_MEMORY)
+
+    def kept(self) -> Series:
+        """The series, or an error where the results went into a bag."""
+        if self.series is None:
+            raise DataError(f"{self.name}: the torques were written into a bag and not kept; replay without 'out' to keep them")
+        return self.series
+
+    def to_frame(self) -> DataFrame:
+        """One row per estimate: time, angles, torque, temperatures, and the residual where there is one of the same instant."""
+        s = self.kept()
+        columns = {"time_s": s.time_s, **{f"angle_{side}_rad": values for side, values in s.angle.items()}, "torque_Nm": s.torque}
+        columns |= {f"rubber_{side}_degC": values for side, values in s.rubber_temperature.items()}
+        for name, values in (("measured_Nm", s.measured), ("residual_Nm", s.residual)):
+            columns[name] = np.full(s.time_s.size, np.nan)
+            columns[name][np.searchsorted(s.time_s, s.residual_time_s)] = values
+        return frame(columns)
+
+
+@dataclass(frozen=True)
+class Replay(Result):
+    """Torques that the estimator gives for recordings; ``overall``: agreement with the measured torque over all of them.
+
+    ``torque_unit``: N m, or the force unit of a linear axis; ``options``: the timing rules that were used.
+    """
+
+    schema: Literal["lugre_steering/replay/1"]
+    vehicle: str
+    torque_unit: str
+    options: Options
+    bags: tuple[ReplayedBag, ...]
+    overall: Agreement | None
+
+    def save(self, out: str | Path) -> None:
+        """Write summary.json into a folder; replaces only an earlier one there."""
+        folder = folder_for(out)
+        earlier_result(folder, RECORD, SCHEMA, ())
+        write_record(self.json, folder / RECORD)
+
+    def to_frame(self) -> DataFrame:
+        """One row per estimate of all bags, as a pandas table; the column ``bag`` tells them apart."""
+        tables = [bag.to_frame().assign(bag=bag.name) for bag in self.bags]
+        import pandas as pd
+
+        return pd.concat(tables, ignore_index=True)
+
+    def plot(self, bag: int | str = 0) -> Figure:
+        """Angles, torques and residual of one bag, by number or name."""
+        from lugre_steering.report.panels import Curve, Panel, panels
+
+        s, unit = of_bag(self.bags, bag).kept(), self.torque_unit
+        torque = Panel("torque that the actuators deliver", unit, [Curve(s.time_s, s.torque, "estimate", "improved")])
+        if s.measured.size:
+            torque.curves.insert(0, Curve(s.residual_time_s, s.measured, "measured", "measured"))
+        return panels([
+            Panel("angle", "rad", [Curve(s.time_s, angle, side) for side, angle in s.angle.items()]),
+            torque,
+            Panel("residual", unit, [Curve(s.residual_time_s, s.residual, "measured minus estimate")]),
+        ])  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        rows = [
+            {"bag": bag.name, "duration (s)": bag.duration_s, "estimates": bag.estimates}
+            | ({f"RMSE ({self.torque_unit})": bag.fit.rmse_Nm, "R2": bag.fit.r2} if bag.fit else {"note": bag.fit_note})
+            for bag in self.bags
+        ]
+        return html("Replay", f"Vehicle: {self.vehicle}", rows)

@@ -1,0 +1,87 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What every result can do: become JSON, a table of pandas, and a view in a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.serialise import as_json, plain
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Row = Mapping[str, Any]
+
+
+class Result:
+    """Base of the typed results; subclasses are frozen dataclasses whose fields carry the names of the JSON."""
+
+    @cached_property
+    def json(self) -> dict[str, Any]:
+        """The result as plain dicts, lists, numbers and text: what the command writes."""
+        tree = plain(self)
+        assert isinstance(tree, dict)
+        return tree
+
+    def to_json(self) -> str:
+        """The text of the result file that the command writes."""
+        return as_json(self.json)
+
+
+class Named(Protocol):
+    """What has the name of a bag."""
+
+    @property
+    def name(self) -> str: ...
+
+
+N = TypeVar("N", bound=Named)
+
+
+def of_bag(parts: Sequence[N], bag: int | str) -> N:
+    """The part of one bag, by number from 0 or by name."""
+    names = [part.name for part in parts]
+    if bag not in names and bag not in range(len(parts)):
+        raise DataError(f"bag: got {bag!r}, expected a number below {len(parts)} or one of {', '.join(names)}")
+    return parts[names.index(bag) if isinstance(bag, str) else bag]
+
+
+def frame(rows: Sequence[Row] | Mapping[str, Any]) -> DataFrame:
+    """A pandas table of rows, or of columns by name."""
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise LugreSteeringError("to_frame: needs pandas, which is not installed (pip install pandas)") from error
+    return pd.DataFrame(rows)
+
+
+def folder_for(out: str | Path) -> Path:
+    """A folder to write results into, made if it is not there."""
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LugreSteeringError(f"{folder}: cannot be made: {error.strerror or error}; expected a writable folder") from error
+    return folder
+
+
+def html(title: str, text: str, rows: Sequence[Row]) -> str:
+    """A heading, a paragraph and a table, for notebooks; every text is escaped."""
+    head = f"<h4>{escape(title)}</h4><p>{escape(text)}</p>"
+    if not rows:
+        return head
+    names = "".join(f"<th>{escape(str(name))}</th>" for name in rows[0])
+    body = "".join(f"<tr>{''.join(f'<td>{_cell(value)}</td>' for value in row.values())}</tr>" for row in rows)
+    return f"{head}<table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.5g}" if isinstance(value, float) else escape(str(value))

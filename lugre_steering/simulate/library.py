@@ -1,0 +1,27 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``lugre_steering.simulate``: synthetic recordings from a program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lugre_steering.simulate.command import load_vehicle, simulation
+from lugre_steering.simulate.plant import with_effects
+from lugre_steering.simulate.result import Simulation
+from lugre_steering.vehicle import Vehicle, vehicle_of
+
+
+def simulate(
+    what: str | Path, vehicle: Vehicle | str | Path | None = None, *, effects: Sequence[str] = (), **sensing: float
+) -> Simulation:
+    """Drive a manoeuvre and record it: no file is written before ``save``.
+
+    ``what``: a built-in manoeuvre ('double-cycle'; ``lugre-steering simulate --list`` shows all), a YAML or CSV file, or a bag whose
+    angles are driven; ``vehicle``: a vehicle or the path of its file, the shipped test vehicle if left out; ``effects``: physics to
+    add, each 'id:parameter=value,...' (SI); ``sensing``: ``angle_rate_Hz``, ``pressure_rate_Hz``, ``jitter_s``, ``angle_noise_deg``,
+    ``angle_resolution_deg``, ``pressure_noise_Pa``, ``pressure_resolution_Pa``, ``seed``.
+    """
+    model = load_vehicle(None) if vehicle is None else vehicle_of(vehicle)
+    return simulation(str(what), with_effects(model, list(effects)), sensing)

@@ -1,0 +1,203 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The sheet, the sensors, the clocks and the weather come before physics: each is put into a recording and must be told as itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from lugre_steering.calibration.coverage import QUICK, record
+from lugre_steering.data.dead import inspect_dead
+from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
+from lugre_steering.data.quality import inspect
+from lugre_steering.data.sensing import sensed
+from lugre_steering.data.stamps import evened
+from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.fitting.clocks import synchronised
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.sheet import wrong_entry, wrong_sheet
+from lugre_steering.fitting.weather import weather_findings
+from lugre_steering.online import sheet_words
+from lugre_steering.recording import Array, Recording, Signal
+from lugre_steering.simulate.command import load_vehicle
+from lugre_steering.vehicle import Vehicle
+
+VEHICLE = load_vehicle(None)
+Change = Callable[[Array], Array]
+
+
+@cache
+def sound() -> tuple[Recording, ...]:
+    return tuple(record(VEHICLE, QUICK, 5))
+
+
+def with_load(factor: float) -> Vehicle:
+    assert VEHICLE.axle is not None
+    return VEHICLE.replace(axle=replace(VEHICLE.axle, load_N=factor * VEHICLE.axle.load_N))
+
+
+def changed(recording: Recording, angle: Change | None = None, pressure: Change | None = None) -> Recording:
+    def of(signal: Signal, change: Change | None) -> Signal:
+        return signal if change is None else Signal(signal.time_s, change(signal.value))
+
+    return replace(
+        recording, angle={side: of(s, angle) for side, s in recording.angle.items()},
+        pressure={line: of(s, pressure) for line, s in recording.pressure.items()},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("rate_Hz", [20.0, 100.0])
+def test_late_stamps_go_back_to_their_clock(rate_Hz: float) -> None:
+    """A sine sampled evenly; messages up to 6 ms late, stamped to a millisecond, one in five lost."""
+    random = np.random.default_rng(1)
+    even = np.arange(0.0, 40.0, 1.0 / rate_Hz)
+    stamps = np.round(even + random.uniform(0.0, 0.006, even.size), 3)
+    kept = random.random(even.size) > 0.2
+    found, scatter = evened(Signal(stamps[kept], np.sin(even[kept])))
+    off = found.time_s - even[kept]
+    assert scatter == pytest.approx(0.006 / np.sqrt(12.0), rel=0.2)
+    assert np.std(off) < 2e-4
+    assert np.mean(off) == pytest.approx(0.003, abs=3e-4)
+
+
+def test_truly_uneven_sampling_keeps_its_stamps() -> None:
+    random = np.random.default_rng(2)
+    instants = np.arange(0.0, 40.0, 0.01) + random.uniform(0.0, 0.004, 4000)
+    signal = Signal(instants, np.sin(3.0 * instants))
+    assert evened(signal)[0] is signal
+
+
+@pytest.mark.parametrize(("noise", "step"), [(0.03, 0.005), (0.03, 0.02), (0.001, 0.1)])
+def test_noise_and_steps_are_measured(noise: float, step: float) -> None:
+    random, time = np.random.default_rng(3), np.arange(0.0, 60.0, 0.01)
+    truth = 20.0 * np.sin(0.4 * time)
+    value = np.round((truth + noise * random.standard_normal(time.size)) / step) * step
+    found = sensed(Signal(time, value))
+    assert found.resolution == pytest.approx(step, rel=1e-6)
+    assert 0.9 < found.sigma() / float(np.std(value - truth)) < 1.5  # steps as wide as the motion between samples look rougher
+
+
+@pytest.mark.parametrize("late_s", [0.02, -0.012])
+def test_an_offset_between_clocks_is_measured_and_taken_out(late_s: float) -> None:
+    apart = [
+        replace(r, pressure={line: Signal(s.time_s + late_s, s.value) for line, s in r.pressure.items()}) for r in sound()
+    ]
+    problem, findings = synchronised(apart, VEHICLE)
+    assert len(findings) == len(apart)
+    for recording, run in zip(apart, problem.runs, strict=True):
+        said = float(findings[recording.name].statement.split("stamped ")[1].split(" ms")[0])
+        assert said == pytest.approx(1e3 * abs(late_s), abs=1.0)
+        assert ("too late" in findings[recording.name].statement) == (late_s > 0.0)
+        assert run.time.size > 0
+    assert synchronised(sound(), VEHICLE)[1] == {}
+
+
+def test_a_hot_start_is_weather() -> None:
+    assert VEHICLE.initial is not None
+    hot = VEHICLE.replace(initial=replace(VEHICLE.initial, rubber_temperature_degC=45.0, air_temperature_degC=25.0))
+    problem, _ = synchronised(record(hot, QUICK, 6), VEHICLE)
+    assert wrong_sheet(problem) is None
+    found = fit(problem, problem.valid / np.concatenate([run.sigma for run in problem.runs]))
+    findings = weather_findings(problem, found)
+    assert len(findings) == len(problem.runs)
+    for bag in range(len(problem.runs)):
+        assert problem.temperatures(bag, found.x)[0] == pytest.approx(45.0, abs=12.0)
+
+
+@pytest.mark.parametrize(("factor", "times"), [(10.0, 0.1), (0.1, 10.0), (3.0, 0.33)])
+def test_a_wrong_load_is_told_first(factor: float, times: float) -> None:
+    result = diagnose_recordings(sound(), with_load(factor)).json
+    assert (result["verdict"], result["effects"]) == ("insufficient_data", [])
+    (entry,) = [f for f in result["data_quality"] if f["finding"] == "wrong_sheet"]
+    assert "axle.load_N" in [suspect["key"] for suspect in entry["suspects"][:3]]
+    load = next(suspect for suspect in entry["suspects"] if suspect["key"] == "axle.load_N")
+    assert load["factor"] == pytest.approx(times, rel=0.25)
+
+
+def test_the_bore_of_one_cylinder_is_found() -> None:
+    assert VEHICLE.hydraulics is not None
+    name, cylinder = next(iter(VEHICLE.hydraulics.cylinders.items()))
+    typed = replace(cylinder, bore_m=1.1 * cylinder.bore_m)
+    wrong = VEHICLE.replace(hydraulics=replace(VEHICLE.hydraulics, cylinders={**VEHICLE.hydraulics.cylinders, name: typed}))
+    found = wrong_entry(synchronised(sound(), wrong)[0])
+    assert found is not None
+    assert found.suspects[0].key == f"hydraulics.cylinders.{name}.bore_m"
+    assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
+
+
+def test_the_right_sheet_is_not_suspected() -> None:
+    problem, _ = synchronised(sound(), VEHICLE)
+    assert wrong_sheet(problem) is None
+    assert wrong_entry(problem) is None
+
+
+def noise(size: float, level: float = 0.0) -> Change:
+    return lambda value: level + size * np.random.default_rng(7).standard_normal(value.size)
+
+
+DEAD: dict[str, tuple[Callable[[Recording], Recording], str, str]] = {
+    "constant pressures": (lambda r: changed(r, pressure=lambda v: np.full(v.size, 5e6)), "dead_sensor", "pressure"),
+    "quiet pressures": (lambda r: changed(r, pressure=noise(1.5e4, 5e6)), "dead_sensor", "pressure"),
+    "pressures of noise": (lambda r: changed(r, pressure=noise(2e6, 5e6)), "dead_sensor", "pressure"),
+    "frozen angle": (
+        lambda r: replace(r, angle={**r.angle, "left": changed(r, angle=noise(2e-4, 0.1)).angle["left"]}), "dead_sensor", "left",
+    ),
+    "one angle twice": (lambda r: replace(r, angle=dict.fromkeys(r.angle, r.angle["left"])), "copied_sensor", "right"),
+    "rough angles": (lambda r: changed(r, angle=lambda v: v + noise(np.radians(0.5))(v)), "noisy_sensor", "left"),
+    "angles clipped at zero": (lambda r: changed(r, angle=lambda v: np.maximum(v, 0.0)), "dead_sensor", "left"),
+    "zeros far off": (lambda r: changed(r, angle=lambda v: v + np.radians(10.0)), "angle_zero", "left"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", DEAD)
+def test_dead_sensors_stop_the_diagnosis(fault: str) -> None:
+    break_it, finding, topic = DEAD[fault]
+    result = diagnose_recordings([break_it(r) for r in sound()], VEHICLE).json
+    assert (result["verdict"], result["effects"]) == ("insufficient_data", [])
+    assert any(f["finding"] == finding and topic in f["topic"] for f in result["data_quality"])
+
+
+def test_sound_channels_are_alive() -> None:
+    assert all(inspect_dead(recording, VEHICLE) == () for recording in sound())
+
+
+def test_a_part_of_one_sweep_is_in_no_other_unit() -> None:
+    def part(signal: Signal) -> Signal:
+        inside = (signal.time_s > start) & (signal.time_s < start + 1.2)
+        return Signal(signal.time_s[inside], signal.value[inside])
+
+    recording = sound()[0]
+    angle = recording.angle["left"]
+    moving = np.abs(np.gradient(angle.value, angle.time_s)) > np.radians(5.0)
+    start = float(angle.time_s[np.flatnonzero(moving)[0]]) + 0.8
+    cut = replace(
+        recording, angle={side: part(s) for side, s in recording.angle.items()},
+        pressure={line: part(s) for line, s in recording.pressure.items()},
+    )  # fmt: skip
+    assert inspect(cut, VEHICLE).blocking == ()
+
+
+def test_three_hours_are_cut_into_pieces() -> None:
+    time = np.arange(0.0, 3.0 * 3600.0, 0.5)
+    long = Recording("long", 0, {"left": Signal(time, np.sin(0.01 * time))}, {"main_a": Signal(time, time)})
+    pieces, findings = in_pieces([long])
+    assert sum(float(np.ptp(p.angle["left"].time_s)) for p in pieces) < LONGEST_S
+    assert all(float(np.ptp(p.angle["left"].time_s)) == pytest.approx(PIECE_S, abs=1.0) for p in pieces)
+    assert "93% of it is not" in findings["long"].statement
+    assert in_pieces([pieces[0]]) == ([pieces[0]], {})
+
+
+def test_replay_tells_a_sheet_from_sums() -> None:
+    estimate = 1e4 * np.sin(np.arange(1000.0))
+    for times, told in ((1.0, False), (1.3, False), (9.8, True), (0.2, True), (1e-5, False)):
+        measured = times * estimate
+        said = sheet_words(
+            float(np.sum((measured - estimate) ** 2)), float(np.sum(estimate**2)), float(np.sum(measured**2)), VEHICLE
+        )
+        assert (said is not None) == told
+        assert said is None or f"{times:.2g} times" in said

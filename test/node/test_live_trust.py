@@ -1,0 +1,178 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The node as a controller's neighbour, over DDS: faults flagged and answered, changes while it runs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from builtin_interfaces.msg import Duration, Time
+from live_harness import (
+    NAME,
+    SECOND,
+    VEHICLE,
+    Driver,
+    LiveNode,
+    Sample,
+    World,
+    call,
+    commands,
+    message_of,
+    set_parameters,
+)
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+COMMANDS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5")
+
+
+def told_after(world: World, text: str, since: float) -> float:
+    """Seconds from then until /diagnostics said so."""
+    for message, when in zip(world.heard["diagnostics"], world.arrived["diagnostics"], strict=False):
+        if when >= since and any(text in status.message for status in message.status):
+            return when - since
+    raise AssertionError(f"'{text}' was never told")
+
+
+FAULTS: dict[str, tuple[Callable[[], Callable[[int, float], float]], str]] = {
+    "two sides jump": (lambda: lambda _, angle: angle + 1.0, "angle jumped"),
+    "degrees": (lambda: lambda _, angle: math.degrees(angle) if abs(angle) < 0.05 else angle + 0.9, "angle jumped"),
+    "one side frozen": (lambda: (lambda held: lambda side, angle: held.setdefault(side, angle) if side else angle)({}), "angle frozen"),
+}
+
+
+@pytest.fixture(scope="module")
+def neighbour() -> Iterator[tuple[World, Driver]]:
+    with LiveNode(*COMMANDS, "-p", "max_rate_rad_s:=2.0") as _, World() as world:
+        driver = Driver(world)
+        driver.steer(2.5)
+        yield world, driver
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_told_within_a_fifth_of_a_second_and_the_commands_go_to_zero(neighbour: tuple[World, Driver], name: str) -> None:
+    world, driver = neighbour
+    fault, reason = FAULTS[name]
+    driver.steer(1.2)
+    begin, sent = time.monotonic(), len(commands(world))
+    driver.steer(0.8, fault())
+    during = len(commands(world))
+    driver.steer(1.6)
+    time.sleep(0.2)
+    found = commands(world)
+    # What the issue asks for, and the reports' own 0.1 s and a busy machine's delay.
+    assert told_after(world, f"feed-forward to zero: {reason}", begin) < 0.2 + 0.15
+    assert found[during - 1] == 0.0
+    assert max(abs(b - a) for a, b in itertools.pairwise(found[sent:])) < 5e3
+    assert found[-1] == world.heard["feed_forward"][-1].effort[0] == world.heard["estimate"][-1].effort[0]
+
+
+def long_plan(points: int) -> JointTrajectory:
+    message = JointTrajectory(joint_names=["left_track_steer_joint", "right_track_steer_joint"])
+    message.points = [
+        JointTrajectoryPoint(positions=[3.1 * (-1) ** i, 0.0], time_from_start=Duration(nanosec=1_000_000 * i % SECOND))
+        for i in range(points)
+    ]
+    return message
+
+
+def test_hostile_plans_are_refused_and_cost_nothing(neighbour: tuple[World, Driver]) -> None:
+    world, driver = neighbour
+    driver.steer(0.3)
+    flood, wild = long_plan(20_000), long_plan(300)
+    before = len(world.heard["torque"])
+    for _ in range(6):
+        world.command.publish(flood)
+        world.command.publish(wild)
+        driver.steer(0.2)
+    time.sleep(0.3)
+    _, _, values = world.status("rejected")
+    assert int(values["steering/command: more than 524288 bytes"]) > 0
+    assert int(values["steering/command: faster than 2 rad/s"]) > 0
+    assert len(world.heard["torque"]) - before == 120
+
+
+def test_nanoseconds_of_a_second_or_more_are_malformed(neighbour: tuple[World, Driver]) -> None:
+    world, driver = neighbour
+    message = message_of(world.vehicle, Sample(0, time.time_ns(), 0.0))
+    publisher = world._publishers["steering/left/joint_state"]
+    message.header.stamp = Time(sec=int(time.time()), nanosec=SECOND)
+    publisher.publish(message)
+    driver.steer(0.2)
+    _, _, values = world.status("rejected")
+    assert values["/steering/left/joint_state malformed"] == "1"
+
+
+def test_parameters_change_while_it_runs_all_or_nothing(neighbour: tuple[World, Driver]) -> None:
+    world, driver = neighbour
+    refused = set_parameters(world, feed_forward_limit_Nm=1e3, when_stale="loud")
+    assert not refused.successful
+    assert "loud" in refused.reason
+    driver.steer(1.0)
+    assert max(abs(value) for value in commands(world)[-90:]) > 2e3
+    assert not set_parameters(world, feed_forward_limit_Nm=math.nan).successful
+    assert not set_parameters(world, executor="single").successful  # read at start only
+    assert set_parameters(world, feed_forward_limit_Nm=1e3, recovery_ramp_s=0.4).successful
+    driver.steer(1.0)
+    time.sleep(0.2)
+    assert max(abs(value) for value in commands(world)[-50:]) == 1e3
+    assert set_parameters(world, feed_forward_limit_Nm=0.0).successful
+
+
+def test_when_stale_the_feed_forward_is_led_to_zero_if_so_wanted(neighbour: tuple[World, Driver]) -> None:
+    world, driver = neighbour
+    driver.steer(1.5)
+    assert set_parameters(world, when_stale="zero").successful
+    driver.steer(0.3)
+    time.sleep(0.15)
+    count = len(commands(world))
+    assert abs(commands(world)[-1]) > 1e3
+    time.sleep(0.8)
+    faded = commands(world)[count - 1 :]
+    assert len(faded) > 5
+    assert faded[-1] == 0.0 == world.heard["feed_forward"][-1].effort[0]
+    assert max(abs(b - a) for a, b in itertools.pairwise(faded)) < 0.4 * abs(faded[0])
+    count = len(faded) + count - 1
+    time.sleep(0.3)
+    assert len(commands(world)) == count  # zero has been said: silence
+    heard = len(world.heard["feed_forward"])
+    driver.steer(0.2)
+    stamped = [message.effort[0] for message in world.heard["feed_forward"][heard:]]
+    assert max(abs(b - a) for a, b in itertools.pairwise([0.0, *stamped])) < 5e3
+    assert set_parameters(world, when_stale="silent").successful
+
+
+def test_a_vehicle_file_is_reloaded_without_a_gap_all_or_nothing(neighbour: tuple[World, Driver], tmp_path: Path) -> None:
+    world, driver = neighbour
+    text = VEHICLE.read_text().replace("rubber_dma_10hz.csv", str(VEHICLE.with_name("rubber_dma_10hz.csv")))
+    stiffer, broken, other = (tmp_path / name for name in ("stiffer.yaml", "broken.yaml", "other.yaml"))
+    stiffer.write_text(text.replace("5393.7", "5900.0"))
+    broken.write_text(text.replace("5393.7", "-1.0"))
+    other.write_text(VEHICLE.with_name("single_joint_example.yaml").read_text())
+    before = len(world.heard["torque"])
+    for file in (broken, other):
+        assert set_parameters(world, vehicle_file=str(file)).successful
+        answer = call(world, Trigger, f"{NAME}/reload", Trigger.Request())
+        assert not answer.success
+        assert str(file) in answer.message
+    assert set_parameters(world, vehicle_file=str(stiffer)).successful
+    found: list[Any] = []
+    asking = threading.Timer(0.5, lambda: found.append(call(world, Trigger, f"{NAME}/reload", Trigger.Request())))
+    asking.start()
+    driver.steer(1.5)
+    asking.join()
+    time.sleep(0.3)
+    assert found[0].success, found[0].message
+    torques = [message.wrench.torque.z for message in world.heard["torque"][before:]]
+    assert len(torques) == 150
+    assert max(abs(b - a) for a, b in itertools.pairwise(torques)) < 5e3

@@ -1,0 +1,143 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a vehicle has been through survives a restart and a change of the vehicle file. All data are synthetic."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lugre_steering.errors import DataError
+from lugre_steering.estimator import Estimator, Options
+from lugre_steering.live.state_file import read_state, write_state
+from lugre_steering.vehicle import Vehicle, load
+
+VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
+T0 = 1_790_000_000_000_000_000
+SECOND = 1_000_000_000
+
+
+def steer(estimator: Estimator, begin: int, end: int, late_ns: int = 0) -> list[np.void]:
+    """The drive from one sample to another, 100 Hz."""
+    rows = []
+    for i in range(begin, end):
+        for side in (0, 1):
+            rows += [row.copy() for row in estimator.push(side, T0 + i * 10_000_000 + late_ns, 0.3 * math.sin(0.02 * i))[0]]
+    return rows
+
+
+def test_a_restart_of_a_second_is_as_if_a_second_of_samples_were_lost(tmp_path: Path) -> None:
+    with_gap = Estimator(VEHICLE)
+    steer(with_gap, 0, 1000)
+    expected = steer(with_gap, 1100, 1200)
+    first = Estimator(VEHICLE)
+    steer(first, 0, 1000)
+    write_state(tmp_path / "state.json", VEHICLE, first.memory)
+    second = Estimator(VEHICLE)
+    second.resume(read_state(tmp_path / "state.json", VEHICLE, T0 + 11 * SECOND, 3600.0))
+    rows = steer(second, 1100, 1200)
+    np.testing.assert_allclose([row["total"] for row in rows], [row["total"] for row in expected], rtol=1e-12)
+    assert list(tmp_path.iterdir()) == [tmp_path / "state.json"]
+
+
+def test_heat_is_aged_by_the_cooling_law() -> None:
+    """lambda A / (rho c A h) of the sheet: the rubber's excess over the air falls with that rate, the bristle stays."""
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 3000)
+    last = steer(estimator, 3000, 3001)[0]
+    resumed = Estimator(VEHICLE)
+    resumed.resume(estimator.memory)
+    hour = []
+    for i in range(3):  # the first stamp so far ahead is to be confirmed
+        for side in (0, 1):
+            hour += [r.copy() for r in resumed.push(side, T0 + 3600 * SECOND + i * 10_000_000, 0.3 * math.sin(0.02 * 3000))[0]]
+    assert VEHICLE.rubber is not None
+    rubber = VEHICLE.rubber
+    rate = rubber.heat_transfer_W_m2K / (rubber.density_kg_m3 * rubber.specific_heat_J_kgK * rubber.tread_thickness_m)
+    excess = float(last["temperature"][0]) - 15.0
+    assert excess > 5.0
+    assert float(hour[0]["temperature"][0]) - 15.0 == pytest.approx(excess * math.exp(-rate * (3600.0 - 30.0)), rel=1e-3)
+    assert float(hour[0]["total"]) == pytest.approx(float(last["total"]), rel=0.15)  # stiffer, as it is colder
+
+
+@pytest.mark.parametrize("spoil", ["cut", "flip", "other vehicle", "old", "ahead", "not JSON", "missing"])
+def test_a_state_that_is_of_no_use_is_refused(tmp_path: Path, spoil: str) -> None:
+    file, vehicle, now_ns = tmp_path / "state.json", VEHICLE, T0 + 2 * SECOND
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 100)
+    write_state(file, VEHICLE, estimator.memory)
+    text = file.read_text()
+    if spoil == "cut":
+        file.write_text(text[: len(text) // 2])
+    elif spoil == "flip":
+        file.write_text(text.replace('"z": ', '"z": 1'))
+    elif spoil == "other vehicle":
+        vehicle = VEHICLE.replace(name="another")
+    elif spoil == "old":
+        now_ns += 3601 * SECOND
+    elif spoil == "ahead":
+        now_ns = T0 - SECOND
+    elif spoil == "not JSON":
+        file.write_bytes(b"\xff\x00[[[")
+    elif spoil == "missing":
+        file.unlink()
+    with pytest.raises(DataError):
+        read_state(file, vehicle, now_ns, 3600.0)
+
+
+def test_a_state_of_another_model_is_refused_and_nothing_changed() -> None:
+    estimator, fresh = Estimator(VEHICLE), Estimator(VEHICLE)
+    steer(estimator, 0, 100)
+    memory = json.loads(json.dumps(estimator.memory))
+    memory["sides"]["right"]["state"].pop("z")
+    with pytest.raises(DataError, match="other quantities: z"):
+        fresh.resume(memory)
+    assert not fresh.memory["sides"]
+
+
+def test_another_file_of_the_same_vehicle_takes_over_without_a_gap() -> None:
+    stiffer = with_stiffness(VEHICLE, 1.1)
+    one, other = Estimator(VEHICLE), Estimator(stiffer)
+    steer(one, 0, 500)
+    steer(other, 0, 500)
+    one.push(0, T0 + 5 * SECOND, 0.3 * math.sin(10.0))  # its partner comes after the change
+    other.push(0, T0 + 5 * SECOND, 0.3 * math.sin(10.0))
+    new = one.continued(stiffer)
+    rows = [row.copy() for row in new.push(1, T0 + 5 * SECOND, 0.3 * math.sin(10.0))[0]]
+    expected = [row.copy() for row in other.push(1, T0 + 5 * SECOND, 0.3 * math.sin(10.0))[0]]
+    assert [row["stamp_ns"] for row in rows] == [T0 + 5 * SECOND]
+    rows += steer(new, 501, 1500)
+    expected += steer(other, 501, 1500)
+    # After a long way the past of the bristle is forgotten.
+    assert float(rows[-1]["total"]) == pytest.approx(float(expected[-1]["total"]), rel=1e-2)
+    assert new.counters["angle/left"]["accepted"] == 1500
+
+
+def with_stiffness(vehicle: Vehicle, factor: float) -> Vehicle:
+    assert vehicle.friction is not None
+    stiffness = factor * vehicle.friction.stiffness_Nm_per_deg
+    return vehicle.replace(friction=dataclasses.replace(vehicle.friction, stiffness_Nm_per_deg=stiffness))
+
+
+def test_a_file_of_another_machine_does_not_take_over() -> None:
+    with pytest.raises(DataError, match="other sides, topics or joints"):
+        Estimator(VEHICLE).continued(VEHICLE.replace(sides=("left",)))
+
+
+def test_options_change_while_it_runs() -> None:
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 300)
+    estimator.set_options(Options(feed_forward_limit_Nm=1e3, feed_forward_rate_limit_Nm_s=1e9))
+    rows = steer(estimator, 300, 400)
+    assert max(abs(float(row["feed_forward"][0])) for row in rows) == 1e3
+
+
+def test_the_memory_is_plain_data() -> None:
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 100)
+    assert json.loads(json.dumps(estimator.memory)) == estimator.memory

@@ -1,0 +1,337 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The package as a library: its page runs, results are the command's, importing it is light, JSON keeps to its schemas."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from test_packaging import environment
+from typer.testing import CliRunner
+
+import lugre_steering as ls
+from lugre_steering.bag import read_recording
+from lugre_steering.cli import app
+from lugre_steering.schemas import FILES, schema_of
+
+ROOT = Path(__file__).resolve().parents[1]
+VEHICLE = ROOT / "config" / "test_vehicle.yaml"
+STOP = ROOT / "bags" / "synthetic_hidden_stop_a"
+DOUBLE_CYCLE = ROOT / "bags" / "synthetic_double_cycle"
+PAGE = (ROOT / "config" / "library.md").read_text(encoding="utf-8")
+
+
+# ------------------------------------------------------------------- import
+
+
+def loaded_by(code: str) -> tuple[float, set[str]]:
+    """Seconds that ``import lugre_steering`` takes, and the packages that are loaded after ``code``."""
+    program = (
+        "import sys, time; before = time.perf_counter(); import lugre_steering as ls; took = time.perf_counter() - before\n"
+        f"{code}\nprint(took, *{{name.split('.')[0] for name in sys.modules}})"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True)
+    took, *names = done.stdout.split()
+    return float(took), set(names)
+
+
+def test_importing_it_is_quick_and_loads_nothing_heavy() -> None:
+    took, names = loaded_by("dir(ls)")
+    assert took < 0.3
+    assert not names & {"numpy", "scipy", "numba", "yaml", "matplotlib", "plotly", "rclpy", "rosbags", "typer", "pandas"}
+
+
+def test_every_public_name_is_there_without_ros_or_plotting() -> None:
+    _, names = loaded_by("for name in ls.__all__: assert getattr(ls, name) is not None, name")
+    assert not names & {"matplotlib", "plotly", "rclpy", "pandas"}
+
+
+def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
+    assert [name for name in dir(ls) if not name.startswith("__")] == sorted(ls.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'replays'"):
+        ls.replays  # noqa: B018
+
+
+def test_a_room_stays_callable_whatever_part_of_it_was_imported() -> None:
+    _, names = loaded_by(
+        "import lugre_steering.replay.result, lugre_steering.simulate.manoeuvres\n"
+        "assert callable(ls.replay) and callable(ls.simulate) and ls.replay.result.Replay is ls.Replay"
+    )
+    assert "matplotlib" not in names
+
+
+# --------------------------------------------------------------------- page
+
+
+def blocks() -> list[tuple[str, str]]:
+    """What each example needs ('' or a package), and its code, in the order of the page."""
+    return re.findall(r"(?:<!-- needs (\w+) -->\n)?```python\n(.*?)```", PAGE, flags=re.DOTALL)
+
+
+def test_the_examples_of_the_page_run(tmp_path: Path) -> None:
+    code = "\n".join(block for need, block in blocks() if not need or importlib.util.find_spec(need))
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, env=environment(MPLBACKEND="Agg"), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    refused = re.search(r"print\(error\)  # (.*)", PAGE)
+    assert refused is not None
+    assert refused[1] in done.stdout.splitlines()
+    assert "missing_physics" in done.stdout
+    for file in ("augmented.yaml", "diagnosed/diagnosis.json", "calibrated/calibration.json", "simulated/synthetic_double_cycle"):
+        assert (tmp_path / file).exists()
+
+
+def test_every_public_name_stands_on_the_page() -> None:
+    assert [name for name in ls.__all__ if name not in PAGE] == []
+
+
+# ---------------------------------------------------- the numbers of the commands
+
+
+def run(*arguments: object) -> dict:
+    done = CliRunner().invoke(app, [*map(str, arguments), "--json"])
+    assert done.exit_code == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def diagnosis() -> ls.Diagnosis:
+    return ls.diagnose(str(STOP), VEHICLE)
+
+
+@pytest.fixture(scope="module")
+def calibration() -> ls.Calibration:
+    return ls.calibrate([DOUBLE_CYCLE], str(VEHICLE))
+
+
+@pytest.fixture(scope="module")
+def replay() -> ls.Replay:
+    return ls.replay(STOP, VEHICLE)
+
+
+def test_a_diagnosis_is_that_of_the_command(diagnosis: ls.Diagnosis, tmp_path: Path) -> None:
+    said = run("diagnose", STOP, "--vehicle", VEHICLE, "--out", tmp_path / "command", "--no-report")
+    assert json.loads(diagnosis.to_json()) == said
+    diagnosis.save(str(tmp_path / "library"))
+    for name in ("diagnosis.json", "augmented.yaml"):
+        assert (tmp_path / "library" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
+
+
+def test_a_calibration_is_that_of_the_command(calibration: ls.Calibration, tmp_path: Path) -> None:
+    said = run("calibrate", DOUBLE_CYCLE, "--vehicle", VEHICLE, "--out", tmp_path)
+    own = json.loads(calibration.to_json())
+    assert list(own) == list(said)
+    assert {key for key in said if own[key] != said[key]} <= {"date", "bags", "vehicle", "picture", "picture_note"}
+
+
+def test_a_replay_in_memory_is_that_of_the_command(replay: ls.Replay, tmp_path: Path) -> None:
+    said = run("replay", STOP, "--vehicle", VEHICLE, "--out", tmp_path)
+    own = json.loads(replay.to_json())
+    for summary in (own, said):
+        for bag in summary["bags"]:
+            del bag["picture"], bag["picture_note"]
+    assert own == said
+    series = replay.bags[0].kept()
+    assert series.torque.size == said["bags"][0]["estimates"]
+    error = np.sqrt(np.mean(series.residual**2))
+    assert error == pytest.approx(said["overall"]["rmse_Nm"], rel=1e-9)
+
+
+def test_a_recording_in_memory_replays_as_its_bag(replay: ls.Replay) -> None:
+    recording = read_recording(STOP, ls.load_vehicle(VEHICLE).channels)
+    (own,) = ls.replay(recording, VEHICLE).bags
+    np.testing.assert_allclose(own.kept().torque, replay.bags[0].kept().torque, rtol=1e-9, atol=1e-6)
+    assert own.fit is not None
+    assert own.fit.rmse_Nm == pytest.approx(replay.overall.rmse_Nm, rel=1e-6)
+
+
+def test_arrays_of_a_bag_are_the_bag() -> None:
+    bag = read_recording(STOP, ls.load_vehicle(VEHICLE).channels)
+    start = bag.start_ns * 1e-9
+
+    def pairs(signals):
+        return {name: (start + signal.time_s, signal.value) for name, signal in signals.items()}
+
+    made = ls.Recording.from_arrays(
+        start + bag.angle["left"].time_s, angle=pairs(bag.angle), pressure=pairs(bag.pressure), name=bag.name
+    )
+    for kind in ("angle", "pressure"):
+        for name, signal in getattr(bag, kind).items():
+            np.testing.assert_array_equal(getattr(made, kind)[name].value, signal.value)
+            np.testing.assert_allclose(getattr(made, kind)[name].time_s, signal.time_s, atol=1e-6)  # doubles of today's seconds
+    with pytest.raises(ls.BagError, match="holds the same recording"):
+        ls.calibrate([made, made], VEHICLE)
+
+
+TIME = np.arange(5) * 0.1
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"time": TIME[::-1]}, "time: got 5 times"),
+        ({"angle": np.zeros(4)}, "angle/left: got 4 samples for 5 times"),
+        ({"angle": np.zeros((5, 2))}, "angle/left: got an array of shape"),
+        ({"angle": np.full(5, 30.0)}, "angle/left: got 30, expected values in rad"),
+        ({"angle": np.full(5, np.nan)}, "angle/left: got no finite sample"),
+        ({"angle": ["a"] * 5}, "angle/left: got list, expected an array of numbers"),
+        ({"torque": (TIME,)}, "measured_torque: got 1 arrays"),
+        ({"pressure": {"a": (TIME * 0.0, TIME)}}, "time of pressure/a: got 5 times"),
+        ({"air": np.full(5, 293.0)}, "air_temperature: got 293, expected values in degC"),
+    ],
+)
+def test_arrays_that_cannot_be_meant_are_refused(changes: dict, said: str) -> None:
+    with pytest.raises(ls.DataError, match=re.escape(said)):
+        ls.Recording.from_arrays(**{"time": TIME, "angle": np.zeros(5)} | changes)
+
+
+def test_samples_that_are_no_number_are_left_out_and_counted() -> None:
+    made = ls.Recording.from_arrays(TIME, angle=np.array([0.0, np.nan, 0.1, np.inf, 0.2]), torque=np.ones(5))
+    assert made.rejected == {"angle/left": {"not_finite": 2}}
+    np.testing.assert_allclose(made.angle["left"].time_s, [0.0, 0.2, 0.4])
+
+
+@pytest.mark.parametrize("call", [ls.replay, ls.calibrate, ls.diagnose])
+def test_a_bag_that_is_not_there_is_an_error_of_ours(call) -> None:
+    with pytest.raises(ls.LugreSteeringError, match="nowhere"):
+        call("nowhere/bag", VEHICLE)
+
+
+# ------------------------------------------------------------------ results
+
+
+def test_results_are_shown_and_drawn(diagnosis: ls.Diagnosis, calibration: ls.Calibration, replay: ls.Replay) -> None:
+    plt = pytest.importorskip("matplotlib.pyplot")
+    backend = plt.get_backend()
+    for result, text in ((diagnosis, "end_stop"), (calibration, "friction.coulomb"), (replay, "synthetic_hidden_stop_a")):
+        assert text in result._repr_html_()
+        assert "<script" not in result._repr_html_()
+        figure = result.plot()
+        assert all(ax.lines for ax in figure.axes)
+        plt.close(figure)
+    assert plt.get_backend() == backend
+    for result in (diagnosis, replay):
+        with pytest.raises(ls.DataError, match="expected a number below 1 or one of synthetic_hidden_stop_a"):
+            result.plot("other")
+
+
+def test_tables_need_pandas_and_say_so(diagnosis: ls.Diagnosis, replay: ls.Replay, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    for result in (diagnosis, replay):
+        with pytest.raises(ls.LugreSteeringError, match="needs pandas"):
+            result.to_frame()
+
+
+def test_tables_hold_the_results(diagnosis: ls.Diagnosis, calibration: ls.Calibration, replay: ls.Replay) -> None:
+    pytest.importorskip("pandas")
+    table = diagnosis.to_frame().set_index("parameter")
+    assert table.loc["stiffness", "value"] == diagnosis.effects[0].parameters["stiffness"].value
+    assert list(calibration.to_frame()["key"]) == [row.key for row in calibration.parameters]
+    torques = replay.to_frame()
+    assert np.nanstd(torques["residual_Nm"] - (torques["measured_Nm"] - torques["torque_Nm"])) < 1.0
+    assert len(torques) == replay.bags[0].estimates
+
+
+def test_a_result_never_replaces_files_of_others(diagnosis: ls.Diagnosis, calibration: ls.Calibration, tmp_path: Path) -> None:
+    for result, name in ((diagnosis, "diagnosis.json"), (calibration, "calibrated.yaml")):
+        (tmp_path / name).write_text("mine", encoding="utf-8")
+        with pytest.raises(ls.DataError, match=name):
+            result.save(tmp_path)
+        assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+
+
+# ------------------------------------------------------------------ schemas
+
+CONTRACT = {
+    "schema": "lugre_steering/diagnosis/1", "bags": ["run_a"], "verdict": "missing_physics",
+    "statement": "one paragraph an engineer can act on", "noise_floor_Nm": 71.0,
+    "baseline": {"rmse_Nm": 0.0, "heldout_rmse_Nm": 0.0},
+    "augmented": {"rmse_Nm": 0.0, "heldout_rmse_Nm": 0.0, "improvement": 0.0, "improvement_ci95": [0.0, 0.0]},
+    "effects": [{
+        "id": "end_stop", "stage": "parallel_torque", "statement": "…", "p_value": 0.001,
+        "parameters": {"engage_angle": {"value": 0.47, "ci95": [0.46, 0.48], "unit": "rad"}},
+        "where": [{"bag": "run_a", "intervals_s": [[12.1, 16.3]], "coordinate": "steering angle", "range": [0.47, 0.52], "unit": "rad"}],
+        "energy_share": 0.93, "masked_share": 0.41, "indistinguishable_from": [],
+    }],
+    "unexplained": {"structured": False, "description": "", "formula": None, "where": None},
+    "detection_limits": {"end_stop": {"parameter": "stiffness", "smallest": 9.0e3, "unit": "N m/rad"}},
+    "data_quality": [{"finding": "stuck_sensor", "topic": "…", "bag": "…", "intervals_s": [[0.0, 1.0]], "statement": "…"}],
+    "next_experiment": {"manoeuvre": "…", "separates": ["…", "…"], "why": "…"},
+}  # fmt: skip
+"""The example of the interface contract, key by key."""
+
+
+def refusals(schema: dict, document: object) -> list[str]:
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return [error.message for error in jsonschema.Draft202012Validator(schema).iter_errors(document)]
+
+
+def test_the_schema_of_a_diagnosis_is_the_contract() -> None:
+    schema = schema_of(ls.Diagnosis)
+    assert refusals(schema, CONTRACT) == []
+    assert schema["required"] == list(CONTRACT)
+    nothing = {
+        "verdict": "insufficient_data", "effects": [], "next_experiment": None, "detection_limits": {}, "data_quality": [],
+        "augmented": {"rmse_Nm": 0.0, "heldout_rmse_Nm": None, "improvement": None, "improvement_ci95": None},
+    }  # fmt: skip
+    assert refusals(schema, CONTRACT | nothing) == []
+    for key in CONTRACT:
+        assert refusals(schema, {name: value for name, value in CONTRACT.items() if name != key})
+    for key, value in (("verdict", "perhaps"), ("noise_floor_Nm", 0.0), ("bags", []), ("schema", "other"), ("statement", "short")):
+        assert refusals(schema, CONTRACT | {key: value})
+    (effect,) = CONTRACT["effects"]
+    for key, value in (("id", "End Stop"), ("stage", "elsewhere"), ("p_value", 1.5), ("indistinguishable_from", ["x"] * 7)):
+        assert refusals(schema, CONTRACT | {"effects": [effect | {key: value}]})
+
+
+OTHER_SCHEMA = next((file for folder in ROOT.parents if (file := folder / "shared/conformance/diagnosis.schema.json").exists()), None)
+
+
+@pytest.mark.skipif(OTHER_SCHEMA is None, reason="the contract's own schema is not here")
+def test_the_contract_s_own_schema_accepts_what_ours_does(diagnosis: ls.Diagnosis) -> None:
+    assert OTHER_SCHEMA is not None
+    other = json.loads(OTHER_SCHEMA.read_text(encoding="utf-8"))
+    ours = schema_of(ls.Diagnosis)
+    assert set(other["required"]) == set(ours["required"])
+    for document in (CONTRACT, diagnosis.json):
+        assert refusals(other, document) == refusals(ours, document) == []
+    (effect,) = CONTRACT["effects"]
+    broken = [CONTRACT | {"effects": [{k: v for k, v in effect.items() if k != key}]} for key in effect]
+    broken += [{k: v for k, v in CONTRACT.items() if k != key} for key in CONTRACT]
+    for document in broken:
+        assert bool(refusals(other, document)) == bool(refusals(ours, document)) is True
+
+
+def test_real_results_keep_to_their_schemas(diagnosis: ls.Diagnosis, calibration: ls.Calibration, replay: ls.Replay) -> None:
+    for result in (diagnosis, calibration, replay, ls.diagnose(short(), VEHICLE)):
+        assert refusals(schema_of(type(result)), json.loads(result.to_json())) == []
+
+
+def short() -> ls.Recording:
+    """A recording at rest, which determines nothing."""
+    time = np.arange(0.0, 12.0, 0.01)
+    noise = np.random.default_rng(1).standard_normal((6, time.size))
+    lines = ("main_a", "main_b", "aux_a", "aux_b")
+    return ls.Recording.from_arrays(
+        time,
+        angle={"left": 2e-4 * noise[0], "right": 2e-4 * noise[1]},
+        pressure={line: 2e6 + 1.5e4 * row for line, row in zip(lines, noise[2:], strict=True)},
+    )
+
+
+def test_the_schemas_are_written_on_request(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-m", "lugre_steering.schemas", str(tmp_path / "new")], env=environment(), check=False)
+    assert done.returncode == 0
+    for name, result in FILES.items():
+        assert json.loads((tmp_path / "new" / f"{name}.schema.json").read_text(encoding="utf-8")) == schema_of(result)
