@@ -24,6 +24,8 @@ BASELINE_FIELDS = (
     "aligning_torque",  # F_z e sin(theta_k), or gravity.sin_Nm [N m]
     "gravity_cos",  # gravity.cos_Nm [N m]
     "initial_bristle",  # z at the start of the recording [rad]
+    "torque_unit",  # size of this machine's torques, 1 for a rubber-tracked vehicle; laws write their constants in it
+    "angle_unit",  # size of its travel, likewise
     "sides",  # number of tracks that share vehicle-level torques
     "table_low",  # first temperature of the rubber table [degC]
     "table_step",  # its step [K]

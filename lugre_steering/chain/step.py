@@ -69,8 +69,10 @@ def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, previous, 
 
 
 def new_parameters(composition: Composition) -> Records:
-    """A parameter record (shape (1,)) with every effect neutral; the baseline fields are still to be set."""
-    return np.zeros(1, composition.parameters)
+    """A parameter record (shape (1,)) with every effect neutral; the other baseline fields are still to be set."""
+    record = np.zeros(1, composition.parameters)
+    record["torque_unit"] = record["angle_unit"] = 1.0
+    return record
 
 
 def new_state(p: Records) -> Records:

@@ -48,7 +48,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
         s.contact_angle = theta
     turned = theta - s.theta
     s.theta = theta
-    resting = abs(omega) < REST_RATE_RAD_S
+    resting = abs(omega) < REST_RATE_RAD_S * p.angle_unit
     s.dwell = s.dwell + dt if resting else 0.0
     sign = 0.0 if d_theta == 0.0 else math.copysign(1.0, d_theta)
 

@@ -16,6 +16,7 @@ from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
+from lugre_steering.vehicle.size import angle_unit
 
 MAX_RATE_HZ = 125.0
 GAP_S = 0.25
@@ -48,6 +49,8 @@ class Run:
     valid: np.ndarray[tuple[int], np.dtype[np.bool_]]
     air: tuple[tuple[float, float], ...] = ()
     """Instants [s] from which the recorded air has another temperature [degC]; before the first, that of the vehicle file."""
+    angle_unit: float = 1.0
+    """Size of the machine's travel, in which the rate is given below which it counts as standing."""
     first_air: float | None = None
     """Recorded air temperature [degC] at the start; None where none was recorded."""
     angle: Sensing = field(default_factory=lambda: Sensing(0.0, 0.0))
@@ -128,7 +131,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
         air=_air(recording.air_temperature, vehicle), first_air=_first_air(recording.air_temperature), angle=angle,
-        rounding=rounding,
+        rounding=rounding, angle_unit=angle_unit(vehicle),
     )  # fmt: skip
 
 

@@ -84,6 +84,8 @@ class Augmented(Errors):
 
     improvement: float | None
     improvement_ci95: Interval | None
+    causal_rmse_Nm: float | None
+    """On all valid samples, without looking ahead and with bristles relaxed at the start, as the live node must."""
     vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
     """The vehicle file of it, to replay, simulate or run live."""
 

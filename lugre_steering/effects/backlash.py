@@ -10,13 +10,13 @@ from lugre_steering.chain.compiled import law
 from lugre_steering.effects.entry import Effect, Parameter
 
 FLANK_TORQUE_NM = 100.0
-"""Torque over which a gap changes flanks; ``softness`` adds to it."""
+"""Torque over which a gap changes flanks, on machines of the size of a vehicle; ``softness`` adds to it."""
 
 
 @law
-def wind_up(torque, width, softness):
+def wind_up(torque, width, softness, torque_unit):
     """Angle lost [rad] = width / 2 tanh(M / flank torque), and its slope [rad/(N m)]: the flank changes where M changes sign."""
-    flank = FLANK_TORQUE_NM + softness
+    flank = FLANK_TORQUE_NM * torque_unit + softness
     side = math.tanh(torque / flank)
     return 0.5 * width * side, 0.5 * width / flank * (1.0 - side * side)
 
@@ -27,7 +27,7 @@ EFFECT = Effect(
     tier=1,
     title="Free play between angle sensor and track",
     equation=(
-        "contact angle = theta_m - width / 2 tanh(M / (100 N m + softness)); the gap opens where the torque "
+        "contact angle = theta_m - width / 2 tanh(M / (flank + softness)); the gap opens where the torque "
         "changes sign"
     ),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996)",
@@ -36,7 +36,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("width", "rad", "full width of the gap", 0.006, 0.0, 0.1),
         Parameter(
-            "softness", "N m", "torque over which a flank gives, beyond 100 N m", 500.0, 0.0, 2e4, optional=True,
+            "softness", "N m", "torque over which a flank gives, beyond 100 N m at a vehicle", 500.0, 0.0, 2e4, optional=True,
         ),
     ),
     hooks={"wind_up": wind_up},

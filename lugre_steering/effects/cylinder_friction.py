@@ -16,14 +16,14 @@ STRIBECK_RAD_S = 0.02
 
 
 @law
-def loss(load, omega, turned, sides, coulomb, load_share, viscous, holding, breakaway, rate_scale, seal):
+def loss(load, omega, turned, sides, coulomb, load_share, viscous, holding, breakaway, rate_scale, seal, angle_unit):
     """(coulomb + load_share |M|) times a direction function, plus viscous omega [N m].
 
     The share ``holding`` of it is kept at rest by the seals; ``breakaway`` raises it at low rate (Stribeck); the sign
     changes over ``rate_scale``.
     """
-    moving = math.tanh(omega / (SIGN_RATE_RAD_S + rate_scale))
-    seal = max(-1.0, min(1.0, seal + turned / SEAL_TRAVEL_RAD))
+    moving = math.tanh(omega / (SIGN_RATE_RAD_S * angle_unit + rate_scale))
+    seal = max(-1.0, min(1.0, seal + turned / (SEAL_TRAVEL_RAD * angle_unit)))
     level = (coulomb / sides + load_share * abs(load)) * (1.0 + breakaway * exp(-((omega / STRIBECK_RAD_S) ** 2)))
     return viscous * omega + level * (holding * seal + (1.0 - holding) * moving), seal
 

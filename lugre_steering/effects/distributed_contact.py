@@ -51,6 +51,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("spread", "1", "standard deviation of the logarithm of the stiffness", 0.4, 0.0, 2.0),
     ),
+    joint_title="Parts of the contact slip one after another",
     hooks={"contact": contact},
     rivals=("linkage_compliance", "payne_softening"),
     memory={"elements": (0.0,) * ELEMENTS, "shares": (0.0,) * ELEMENTS},  # deflections [rad], shares of the stiffness

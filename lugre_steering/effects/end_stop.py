@@ -14,7 +14,7 @@ TRAVEL_RAD = 0.002
 
 
 @law
-def torque(theta, turned, omega, stiffness, engage_angle, cubic_stiffness, loss, damping, shift, loading):
+def torque(theta, turned, omega, stiffness, engage_angle, cubic_stiffness, loss, damping, shift, loading, angle_unit):
     """sgn(theta) (k1 x + k3 x**3 + c x') [N m], x = |theta| - engage_angle > 0; less by ``loss`` on unloading.
 
     The damping c acts while the stop is driven in (x' > 0). ``shift`` moves the knee of negative angles only.
@@ -25,7 +25,7 @@ def torque(theta, turned, omega, stiffness, engage_angle, cubic_stiffness, loss,
     if x <= 0.0:
         return 0.0, 1.0
     travel = turned if theta > 0.0 else -turned
-    loading = max(0.0, min(1.0, loading + travel / TRAVEL_RAD))
+    loading = max(0.0, min(1.0, loading + travel / (TRAVEL_RAD * angle_unit)))
     push = stiffness * x + cubic_stiffness * x * x * x
     push *= 1.0 - loss * (1.0 - loading)
     push += damping * max(0.0, math.copysign(omega, omega * theta))

@@ -122,6 +122,8 @@ class Effect:
     """Its parameter that is a free play [rad], by which a torque looks as if it were stamped late."""
     one_sided: bool = False
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
+    of_angle: bool = False
+    """Its law is one of an angle and means nothing along a line."""
     joint_title: str = ""
     """Title for a single joint, which has no tracks and no kingpin."""
     variants: Callable[[Seen], Sequence[Variant]] | None = None
@@ -144,6 +146,7 @@ class Effect:
         """A law without memory over arrays: its own parameters from ``values`` (0 where absent)."""
         compiled = self.hooks[hook]
         plain = getattr(compiled, "py_func", compiled)
+        values = {"torque_unit": 1.0, "angle_unit": 1.0, **values}
         arguments = [quantities.get(name, values.get(name, 0.0)) for name in inspect.signature(plain).parameters]
         try:
             return plain(*arguments)

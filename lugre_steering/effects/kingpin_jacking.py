@@ -36,4 +36,5 @@ EFFECT = Effect(
     rivals=("moment_arm_error", "soil_shear"),
     joint_title="Gravity or another conservative torque of the angle",
     one_sided=True,
+    of_angle=True,
 )

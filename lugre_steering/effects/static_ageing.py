@@ -40,6 +40,7 @@ EFFECT = Effect(
         Parameter("dwell", "s", "time constant t_c", 1.0, 0.01, 100.0, (0.1, 1.0)),
         Parameter("slip_scale", "rad", "slip that renews the contacts", 0.1, 0.005, 2.0, (0.02, 0.06, 0.2)),
     ),
+    joint_title="Static friction grows with the time at rest",
     hooks={"ageing": ageing},
     rivals=("stress_relaxation",),
     memory={"age": 0.0},  # mean age of the contacts [s]

@@ -27,6 +27,7 @@ EFFECT = Effect(
         Parameter("amount", "1", "relative loss in the end", 0.05, -0.5, 0.8),
         Parameter("slip_scale", "rad", "slip at which 63 % is reached", 1.0, 0.05, 100.0, (0.1, 0.3, 1.0), "slip"),
     ),
+    joint_title="Friction changes with the distance run",
     hooks={"level": level},
     memory={"slip": 0.0},  # accumulated |contact angle| [rad]
     counts_from_start=True,

@@ -147,7 +147,8 @@ def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, hi
     The small normal equations keep the cost of a step independent of the number of samples.
     """
     diagonal = np.diag(normal)
-    damped = normal + np.diag(damping * diagonal + 1e-9 * max(float(diagonal.max()), 1e-30))
+    # A column that does nothing has no scale of its own.
+    damped = normal + np.diag(damping * diagonal + 1e-9 * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1e-30)))
     factor = np.linalg.cholesky(damped)
     span = np.maximum(high - low, 1e-12)
     target = solve_triangular(factor, -gradient, lower=True)

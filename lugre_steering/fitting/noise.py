@@ -68,7 +68,7 @@ class QuietNoise:
 def standstill(run: Run, minimum_s: float = 1.0) -> list[slice]:
     """Stretches in which no side moves, at least ``minimum_s`` long, without the first 0.3 s."""
     dt = run.time[1] - run.time[0]
-    still = (np.abs(run.omega).max(axis=0) < REST_RATE_RAD_S) & run.valid
+    still = (np.abs(run.omega).max(axis=0) < REST_RATE_RAD_S * run.angle_unit) & run.valid
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     skip = round(0.3 / dt)
     return [
@@ -149,7 +149,7 @@ def fast_variance(run: Run, residual: Array, known: Array) -> Array:
 
     ``residual`` (n,) of a fitted model; ``known`` (n,) is the fast energy that another source has put into it.
     """
-    moving = np.abs(run.omega).max(axis=0) > REST_RATE_RAD_S
+    moving = np.abs(run.omega).max(axis=0) > REST_RATE_RAD_S * run.angle_unit
     shape = np.array([run.sigma**2, run.measured**2, moving * run.sigma**2])
     energy = _without_motion(run, residual) ** 2 - known
     windows = np.arange(energy.size) // max(1, round(WINDOW_S / (run.time[1] - run.time[0])))
@@ -175,7 +175,8 @@ def _without_motion(run: Run, residual: Array) -> Array:
     """Fast part of a residual (n,) without what is proportional to motion and torque or their changes: that is physics."""
     dt = run.time[1] - run.time[0]
     omega, alpha, torque = run.omega.sum(axis=0), run.alpha.sum(axis=0), run.measured - residual
-    drivers = np.array([omega, alpha, torque, np.gradient(torque, dt), np.sign(omega) * (np.abs(omega) > REST_RATE_RAD_S), residual])
+    direction = np.sign(omega) * (np.abs(omega) > REST_RATE_RAD_S * run.angle_unit)
+    drivers = np.array([omega, alpha, torque, np.gradient(torque, dt), direction, residual])
     fast = drivers - slow_part(drivers, dt)
     causes = fast[:-1, run.valid].T / np.maximum(np.std(fast[:-1, run.valid], axis=1), 1e-30)
     shares = np.linalg.lstsq(causes, fast[-1, run.valid], rcond=1e-8)[0]

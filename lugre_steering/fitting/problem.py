@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TypeVar
 
@@ -22,6 +22,10 @@ from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
+
+LEAST_ARM = 0.1
+"""Share of the drawing's moment arm that a true one has at least."""
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -39,6 +43,11 @@ def _pool() -> ThreadPoolExecutor:
     """One pool for the process; the mapped functions never map themselves. LUGRE_STEERING_THREADS limits its size."""
     wanted = os.environ.get("LUGRE_STEERING_THREADS", "")
     return ThreadPoolExecutor(int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1)
+
+
+def is_rig(vehicle: Vehicle) -> bool:
+    """Whether it is a single joint or axis: its friction is given as torque, and nothing warms."""
+    return vehicle.contact is not None and vehicle.rubber is None and len(vehicle.sides) == 1
 
 
 @dataclass(frozen=True)
@@ -73,9 +82,25 @@ AIR_K, AIR_FAR_K, AIR_KNOWN_K = 15.0, 50.0, 1.0
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
 
 
+RIG = (
+    replace(FRICTION, prior=0.5, low=-2.0, high=2.0),
+    STATIC,
+    replace(STIFFNESS, prior=0.7, low=-3.0, high=3.0),
+    replace(STRIBECK, prior=0.7, low=-3.0, high=3.0),
+)
+"""Of a single joint or axis, whose sheet holds rough numbers."""
+
+
 def calibrations_for(vehicle: Vehicle) -> tuple[Calibration, ...]:
-    """The standard set; a vehicle without rubber has nothing thermal to calibrate."""
-    return STANDARD if vehicle.rubber is not None else (FRICTION, STATIC, STIFFNESS, STRIBECK)
+    """The standard set; without rubber there is nothing thermal to calibrate."""
+    if vehicle.rubber is not None:
+        return STANDARD
+    if not is_rig(vehicle):
+        return STANDARD[:4]
+    assert vehicle.contact is not None
+    static, coulomb = vehicle.contact.static_torque_Nm, vehicle.contact.coulomb_torque_Nm
+    # Beside viscous friction of unknown size, a static level below the sliding one would be another viscous friction.
+    return tuple(replace(c, low=-(static - coulomb) / coulomb) if c is STATIC else c for c in RIG)
 
 
 @dataclass(frozen=True)
@@ -122,6 +147,27 @@ def standing_effects(vehicle: Vehicle) -> tuple[tuple[Candidate, Values], ...]:
     return tuple(found)
 
 
+def size_of(vehicle: Vehicle, runs: Sequence[Run]) -> Size:
+    """The size of a machine: of its sheet if it is a vehicle, else as its recordings show."""
+    if vehicle.contact is None:
+        return VEHICLE
+    travel = max(float(np.ptp(run.theta)) for run in runs)
+    torque = max(float(np.percentile(np.abs(run.measured), 99.0)) for run in runs)
+    angle = 1.0 if vehicle.coordinate.unit == "rad" else decade(travel, TRAVEL_RAD)
+    return Size(decade(SPARE * torque / len(vehicle.sides), FRICTION_NM), angle)
+
+
+def resized(effect: Effect, size: Size) -> Effect:
+    """An entry of the catalogue with the scales and bounds of its parameters in the units of a machine."""
+
+    def of(p: Parameter) -> Parameter:
+        worth = size.of(p.unit)
+        grid = p.grid if p.relative_to else tuple(worth * value for value in p.grid)
+        return replace(p, scale=p.scale * worth, low=p.low * worth, high=p.high * worth, grid=grid)
+
+    return effect if size == VEHICLE else replace(effect, parameters=tuple(of(p) for p in effect.parameters))
+
+
 class Problem:
     """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, weather, effect parameters).
 
@@ -142,6 +188,7 @@ class Problem:
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
+        self.size = size_of(vehicle, self.runs)
         self.standing = standing_effects(vehicle)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
@@ -272,7 +319,12 @@ class Problem:
         if "angle" in known.hooks:
             torque = torque + ((run.theta - known.law("angle", values, theta=run.theta)) * run.side_slope).sum(axis=0)
         if "arm" in known.hooks:
-            torque = torque - ((known.law("arm", values, theta=run.theta) - 1.0) * run.side_torque).sum(axis=0)
+            factor = known.law("arm", values, theta=run.theta)
+            size = np.abs(run.gains).sum(axis=1)
+            mean = np.maximum((factor * size).sum(axis=0) / size.sum(axis=0), LEAST_ARM)
+            # The error counts in the torque as measured: else a smaller arm would make both smaller, and look better.
+            error = (factor * run.side_torque).sum(axis=0) - torque
+            torque = run.side_torque.sum(axis=0) - error / mean
         return np.asarray(torque)
 
     def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:

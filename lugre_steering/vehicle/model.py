@@ -16,6 +16,7 @@ from lugre_steering.recording import Array
 from lugre_steering.vehicle.loads import load_moment, vertical_load
 from lugre_steering.vehicle.rubber import ratio_table
 from lugre_steering.vehicle.sections import Vehicle
+from lugre_steering.vehicle.size import FRICTION_NM, angle_unit, decade
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,8 @@ def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:
     if vehicle.gravity is not None:
         values["gravity_cos"] = vehicle.gravity.cos_Nm
         values["aligning_torque"] = values.get("aligning_torque", 0.0) + vehicle.gravity.sin_Nm
+    values["torque_unit"] = decade(values["coulomb_torque"], FRICTION_NM)
+    values["angle_unit"] = angle_unit(vehicle)
     sensors = vehicle.sensors
     values["angle_noise"] = math.radians(
         math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0))

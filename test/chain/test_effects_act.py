@@ -99,7 +99,10 @@ def test_softening_stiffens_graded_elements_as_it_does_one_bristle(softening: st
         np.testing.assert_allclose(outputs[1][name], outputs[0][name], rtol=1e-6, atol=1e-6 * np.abs(outputs[0][name]).max())
 
 
-@pytest.mark.parametrize("field", [f for f in BASELINE_FIELDS if f != "angle_noise"])  # acts in the motion estimate
+ELSEWHERE = ("angle_noise", "torque_unit", "angle_unit")  # they act in the motion estimate, and in constants of effects
+
+
+@pytest.mark.parametrize("field", [f for f in BASELINE_FIELDS if f not in ELSEWHERE])
 def test_every_baseline_parameter_acts(field: str) -> None:
     _, rubber = baseline()
     motion = cycle()

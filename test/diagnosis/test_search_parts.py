@@ -14,6 +14,7 @@ from lugre_steering.diagnosis.conclude import experiment, limits, verify
 from lugre_steering.diagnosis.search import build_up, fingerprint, flexible, foreign, ties, trial
 from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.relief_saturation import CEILINGS
 from lugre_steering.fitting import noise, split
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem
@@ -209,6 +210,44 @@ def test_the_jackknife_widens_where_the_law_is_wrong(problem: Problem) -> None:
     assert spreads[1] > 3.0 * spreads[0]
 
 
+def test_no_length_of_recording_makes_a_law_exact(problem: Problem) -> None:
+    """The form's part of an interval follows the size of the effect, and stays when noise falls and data grow."""
+    sizes = (2e4, 4e4)
+    fits = [fit(with_torque(problem, problem.predict_all(problem.start(), [effect("line_loss_linear", b=b)])), weight(problem),
+                [effect("line_loss_linear", b=b)]) for b in sizes]  # fmt: skip
+    small, large = (verify.form_spread(problem, result, weight(problem))[-1] for result in fits)
+    assert large / small == pytest.approx(2.0, rel=0.05)
+    # Between one law that is off as a whole and places that are off by chance.
+    assert verify.BEND * sizes[0] / 7.0**0.5 * 0.5 < small < verify.BEND * sizes[0] * 2.0
+    quieter = replace(fits[0], jacobian=fits[0].jacobian * 10.0, covariance=fits[0].covariance / 100.0)
+    assert verify.form_spread(problem, quieter, 10.0 * weight(problem))[-1] == pytest.approx(small, rel=1e-6)
+
+
+def test_what_stands_is_named_though_as_much_again_is_unlisted(problem: Problem) -> None:
+    """A loss of the lines stays beside a torque that no entry makes and that is nearly half of it; alone, that torque is no name."""
+    theta, omega = (np.concatenate([getattr(run, key).mean(axis=0) for run in problem.runs]) for key in ("theta", "omega"))
+    ripple = 350.0 * np.sin(2.0 * np.pi * theta / np.radians(3.7)) * np.sign(omega)
+    listed = problem.predict_all(problem.start(), [effect("line_loss_quadratic", c=3e4)])
+    roles, draws = split.split(problem), SIGMA * np.random.default_rng(4).standard_normal((16, problem.measured.size))
+    seen = noise.Noise(np.full(problem.measured.size, SIGMA), draws, 0.0)
+    fitted = np.where(roles.fit, weight(problem), 0.0)
+    for torque, names in ((listed + ripple, {"line_loss_quadratic"}), (problem.predict_all(problem.start()) + ripple, set())):
+        hidden = with_torque(problem, torque)
+        found = build_up.search(hidden, seen, roles, fit(hidden, fitted))
+        assert {item.score.candidate.effect.id for item in found.found} == names
+
+
+def test_the_error_of_an_arm_counts_in_the_torque_as_measured(problem: Problem) -> None:
+    """With both tracks at one angle the true torque is the measured one times the factor; its error is divided by it again."""
+    alike = replace(problem.runs[0], theta=np.repeat(problem.runs[0].theta[:1], 2, axis=0))
+    alone = Problem(problem.vehicle, [replace(alike, measured=alike.side_torque.sum(axis=0))])
+    model = alone.predict_all(alone.start())
+    for linear in (0.1, -2.0):
+        factor = 1.0 + linear * alike.theta[0]
+        seen = alone.predict_all(alone.start(), [effect("moment_arm_error", linear=linear)])
+        np.testing.assert_allclose(alone.measured - seen, (factor * alone.measured - model) / factor, rtol=1e-9, atol=1e-6)
+
+
 def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(problem: Problem) -> None:
     """The first of two effects was misnamed; its rival takes its place, and the intervals stay those of their own effect."""
     linear, quadratic, offset = effect("line_loss_linear", b=2e4), effect("line_loss_quadratic", c=2e5), effect("slope_bias", torque=300.0)
@@ -220,7 +259,7 @@ def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(proble
     final = fit(hidden, fitted, [linear, offset])
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     item = build_up.Found(score, ("line_loss_quadratic",), (), 1.0)
-    result, found = build_up._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()))
+    result, found = build_up._confront(hidden, seen, fitted, roles, final, 0, item, float(roles.fit.sum()), stays=False)
     assert [candidate.effect.id for candidate, _ in result.effects] == ["line_loss_quadratic", "slope_bias"]
     assert found.score.candidate.effect.id == "line_loss_quadratic"
     change = problem.predict_all(result.x, result.effects[:1]) - problem.predict_all(result.x, [(result.effects[0][0], {"c": 0.0})])
@@ -231,9 +270,10 @@ def test_effects_and_their_columns_keep_one_order_when_a_rival_takes_over(proble
 
 def test_relief_ceilings_follow_the_arms_of_the_sheet(problem: Problem) -> None:
     relief = CATALOGUE["relief_saturation"]
-    found = fingerprint._ceilings(problem, relief)
-    assert len(found) == len(fingerprint.CEILINGS)
-    shapes = dict(found[-1].shapes)
+    assert relief.variants is not None
+    found = relief.variants(fingerprint._seen(problem))
+    assert len(found) == len(CEILINGS)
+    shapes = found[-1]
     run = problem.runs[0]
     pushed = np.maximum(run.torque_per_line, 0.0).sum(axis=0)
     theta = run.theta.mean(axis=0)
@@ -241,8 +281,8 @@ def test_relief_ceilings_follow_the_arms_of_the_sheet(problem: Problem) -> None:
     assert np.ptp(pushed / arm) < 0.01 * pushed.mean()  # one pressure makes this torque at every angle
     # One line alone pushes in one direction only, and says nothing about the other.
     single = [replace(each, gains=np.where(np.arange(each.gains.shape[1])[:, None] == 0, each.gains, 0.0)) for each in problem.runs]
-    for candidate in fingerprint._ceilings(Problem(problem.vehicle, single), relief):
-        assert all(np.isfinite(value) for _, value in candidate.shapes)
+    for variant in relief.variants(fingerprint._seen(Problem(problem.vehicle, single))):
+        assert all(np.isfinite(value) for value in variant.values())
 
 
 def test_the_next_experiment_does_not_depend_on_when_an_effect_began(problem: Problem) -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from lugre_steering.diagnosis.conclude import limits, verify
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
+from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
@@ -20,16 +21,17 @@ from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.recording import BagFinding
+from lugre_steering.recording import BagFinding, Recording
 
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 
 
 def conclude(
-    done: Finished, findings: Sequence[BagFinding], *, seed: int, material: float, progress: Callable[[str], None]
+    done: Finished, findings: Sequence[BagFinding], recordings: Sequence[Recording], *,
+    seed: int, material: float, progress: Callable[[str], None],
 ) -> Diagnosis:
-    """The result of a search; ``findings``: what the check of the data found, ``material``: see ``diagnose``."""
+    """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     problem, found = done.problem, done.found
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
@@ -53,12 +55,13 @@ def conclude(
     vehicle = augmented_vehicle(done, whole, effects, after)
     kept = {entry.id for entry in vehicle.effects}
     ended = [effect.id for effect in effects if effect.id not in kept]
+    causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
     return Diagnosis(
         schema=SCHEMA,
         bags=tuple(run.name for run in problem.runs),
         verdict=verdict,
-        statement=statement(done, verdict, effects, judged, left.text, ended),
+        statement=statement(done, verdict, effects, judged, causal, left.text, ended),
         noise_floor_Nm=done.noise.floor,
         baseline=Errors(verify.rmse(problem, found.baseline, problem.valid), judged.before),
         augmented=Augmented(
@@ -66,6 +69,7 @@ def conclude(
             heldout_rmse_Nm=after,
             improvement=judged.gain if named else 0.0,
             improvement_ci95=judged.interval if named else (0.0, 0.0),
+            causal_rmse_Nm=causal,
             vehicle=vehicle,
         ),
         effects=tuple(effects),

@@ -50,13 +50,15 @@ def _intervals(done: Finished, whole: Fit) -> list[dict[str, FittedValue]]:
     """Value, 95 % interval and unit of each free parameter, effect by effect."""
     covariance = verify.robust_covariance(done.problem, whole, done.weight, done.roles.cluster)
     spread = verify.jackknife(done.problem, whole, done.weight)
+    form = verify.form_spread(done.problem, whole, done.weight)
     position = 0
     found: list[dict[str, FittedValue]] = []
     for candidate, values in whole.effects:
         parameters: dict[str, FittedValue] = {}
         for key in candidate.free:
             place = done.problem.nuisances + position
-            half = verify.WIDTH * max(float(np.sqrt(max(covariance[place, place], 0.0))), float(spread[position]))
+            drawn = max(float(np.sqrt(max(covariance[place, place], 0.0))), float(spread[position]))
+            half = float(np.hypot(verify.WIDTH * drawn, verify.NORMAL * form[place]))
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
             )

@@ -60,7 +60,11 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     axes = [locate.coordinates(run, run.measured) for run in done.problem.runs]
     stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
     axis, share, _ = locate.telling_coordinate(stacked, residual, done.weight, done.noise.draws)
-    proposal = unlisted.propose(stacked, residual, done.fitted, done.held, units.is_linear(done.problem.vehicle))
+    # A formula is of use only in what a model knows beforehand: its own torque, not the measured one.
+    parts = np.split(final.prediction, done.problem.edges[1:-1])
+    own = [locate.coordinates(run, part) for run, part in zip(done.problem.runs, parts, strict=True)]
+    known = {key: np.concatenate([bag[key] for bag in own]) for key in own[0]}
+    proposal = unlisted.propose(known, residual, done.fitted, done.held, units.is_linear(done.problem.vehicle))
     shape = None
     if pattern is not None and gain > (proposal.gain if proposal is not None else FORMULA):
         proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)

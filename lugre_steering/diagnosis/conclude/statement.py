@@ -7,15 +7,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.verify import Judged
 from lugre_steering.diagnosis.result import NamedEffect, Verdict
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.problem import STATIC, resized
+from lugre_steering.vehicle.size import VEHICLE, Size
 
 
-def at_end(effect: NamedEffect) -> list[tuple[str, float, str]]:
+def at_end(effect: NamedEffect, size: Size = VEHICLE) -> list[tuple[str, float, str]]:
     """Name, value and unit of the amplitudes of a named effect that were fitted to an end of their range other than zero."""
-    entry = CATALOGUE[effect.id]
+    entry = resized(CATALOGUE[effect.id], size)
     amplitudes = {parameter.name: (parameter.low, parameter.high) for parameter in entry.parameters if not parameter.is_shape}
     alone = next(iter(amplitudes.values()), ())  # one that acts on a line goes by the name of the line
     return [
@@ -26,10 +30,24 @@ def at_end(effect: NamedEffect) -> list[tuple[str, float, str]]:
     ]
 
 
+def calibrations_at_bounds(done: Finished) -> list[str]:
+    """Baseline values that recalibration left at an end of their range, in words."""
+    problem, x = done.problem, done.found.final.x
+    low, high = problem.bounds()
+    return [
+        c.name.replace("_", " ")
+        for c, value, least, most in zip(problem.calibrations, x, low, high, strict=False)
+        # Static friction that is no more than the sliding one is nothing to wonder at.
+        if min(np.inf if c.name == STATIC.name else value - least, most - value) < 1e-6 * (most - least)
+    ]
+
+
 def statement(
-    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, left: str, ended: Sequence[str]
+    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str,
+    ended: Sequence[str],
 ) -> str:
-    """The verdict for a reader who sees nothing else; ``judged``: on held-out data, ``left``: what remains,
+    """The verdict for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
+    looking ahead, ``left``: what remains,
     ``ended``: effects that do not act in the last bag."""
     floor, torque = done.torque(done.noise.floor), done.torque
     if verdict == "consistent":
@@ -49,16 +67,23 @@ def statement(
         for effect in effects
         if effect.indistinguishable_from
     ]
-    ends = [f"{effect.id} with {name} = {value:.3g} {unit}" for effect in effects for name, value, unit in at_end(effect)]
+    ends = [
+        f"{effect.id} with {name} = {value:.3g} {unit}"
+        for effect in effects
+        for name, value, unit in at_end(effect, done.problem.size)
+    ]
     last = done.problem.runs[-1].name
+    bounds = calibrations_at_bounds(done)
     return (
         f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
         f"from {torque(judged.before)} to {torque(judged.after)} "
         f"(improvement {100 * judged.gain:.0f} %, 95 % interval "
-        f"{100 * judged.interval[0]:.0f} to {100 * judged.interval[1]:.0f} %) at a noise floor of {floor}."
+        f"{100 * judged.interval[0]:.0f} to {100 * judged.interval[1]:.0f} %) at a noise floor of {floor}. "
+        f"Without looking ahead, as the live node must, the error on all samples is {torque(causal)}."
         + (" Each third of the data was held out in turn, since one alone hardly shows it." if judged.rotated else "")
         + (f" With these data {'; '.join(ties)}." if ties else "")
         + (f" At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another." if ends else "")
+        + (f" Recalibrated as far as is allowed, so perhaps another machine or another law: {', '.join(bounds)}." if bounds else "")
         + (f" {' and '.join(ended)} does not act in {last}, the last recording: augmented.yaml is without." if ended else "")
         + (f" Structure is left: {left}." if left else "")
     )

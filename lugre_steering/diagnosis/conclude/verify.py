@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search import onset
+from lugre_steering.diagnosis.search import flexible, onset
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import CYCLE, Mask, Split, split
@@ -19,6 +19,9 @@ RESAMPLES = 2000
 STRETCHES = 6
 ENOUGH = 5
 """Stretches of CLUSTER_S that must be left to judge by."""
+BEND = 0.03
+"""Standard deviation of what a law is off its own torque at any place: a few per cent, by judgement; laws fit no better."""
+NORMAL = float(stats.norm.ppf(0.975))
 WIDTH = float(stats.t.ppf(0.975, STRETCHES - 1))
 """Half width of a 95 % interval in standard deviations known from STRETCHES estimates."""
 
@@ -109,3 +112,15 @@ def robust_covariance(problem: Problem, result: Fit, weight: Array, cluster: Int
     own = np.maximum(np.diag(sandwich), 1e-300)
     scale = np.sqrt(np.maximum(np.diag(bread), own) / own)
     return np.asarray(sandwich * np.outer(scale, scale))
+
+
+def form_spread(problem: Problem, result: Fit, weight: Array) -> Array:
+    """Standard deviations (q,) of all fitted values from the form of the laws: each bends by BEND of its torque, independently at
+    some places along its own coordinate.
+
+    Nature's law is not the one that is fitted, and no length of recording mends that (Kennedy and O'Hagan 2001).
+    """
+    shifts = np.hstack([
+        result.covariance @ (result.jacobian.T @ flexible.bends(problem, result, weight, index)) for index in range(len(result.effects))
+    ])  # fmt: skip
+    return np.asarray(BEND * np.sqrt(np.sum(shifts**2, axis=1)))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search import flexible
+from lugre_steering.diagnosis.search import flexible, rig
 from lugre_steering.diagnosis.search.fingerprint import Score, screen
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.ties import simplest, tied
@@ -27,7 +27,7 @@ from lugre_steering.diagnosis.search.trial import (
 )
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
@@ -42,6 +42,9 @@ WHOLE = (0.75, 0.09, 0.93)
 decade above, and at most. Strong signals show more of their shape, so a right name must leave less."""
 LAST = 0.5
 """Share of what was left that the last accepted effect must explain."""
+MOST = 0.5
+"""Share of the excess, fitted and held out, from which names stand although more is there; and of their own gain that a pattern
+outside the catalogue must leave them."""
 SLIGHT, SURE = 0.02, 0.3
 """Share of the whole excess that a further effect must explain (no law of the first is truer than that), unless its energy
 is so large against the noise."""
@@ -89,30 +92,53 @@ def search(
     samples, doubt = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt
 
     def standing(built: _Built) -> int:
-        return _keep(built.steps, problem, weight, cost(problem, built.baseline, weight), samples, doubt)
+        return max(len(given), _keep(built.steps, problem, weight, cost(problem, built.baseline, weight), samples, doubt))
 
-    built = _build_up(problem, noise, split, baseline, None, progress)
+    given = _rig_steps(problem, noise, weight, baseline, samples, progress) if is_rig(problem.vehicle) else []
+    built = _build_up(problem, noise, split, baseline, None, progress, given)
     first, tried, needed, kept = built.first, built.trials, bool(built.steps), standing(built)
+    builds = [built]
     for opening in _others(problem, weight, built) if needed and not kept else ():
         progress(f"building up again from {opening.trials[0].candidate.label}")
         built = _build_up(problem, noise, split, built.baseline, opening, progress)
         tried, kept = tried + built.trials, standing(built)
+        builds.append(built)
         if kept:
             break
+    if needed and not kept:
+        kept, built = max(((_most(problem, noise, split, each), each) for each in builds), key=lambda found: found[0])
     baseline, start_cost = built.baseline, cost(problem, built.baseline, weight)
     excess = start_cost - samples
-    final, found = _confirmed(problem, noise, weight, split, baseline, built.steps[:kept], samples, progress)
+    final, found = _confirmed(problem, noise, weight, split, baseline, built.steps[:kept], samples, len(given), progress)
     # What rings on at standstill passes for noise, so a pattern may be there though nothing seems left over.
     pattern = strongest(problem, baseline, weight) if not found or excess > PATTERN_EXCESS * samples else None
     if pattern is not None and found:
         named = [cost(problem, built.steps[0][0], weight), cost(problem, final, weight)][-len(found) :]
-        if _foreign(pattern.cost(problem, weight), named, start_cost):
-            final, found = baseline, []
+        if _foreign(pattern.cost(problem, weight), named, start_cost) and not _beside(problem, weight, pattern, final, start_cost):
+            final, found = (built.steps[len(given) - 1][0], found[: len(given)]) if given else (baseline, [])
     explained = (start_cost - cost(problem, final, weight)) / max(excess, 1e-9)
     return Search(
         baseline, final, tuple(found), excess / samples, float(np.clip(explained, 0.0, 1.0)), bool(found) or not needed,
         first.scores, tuple(tried), pattern,
     )  # fmt: skip
+
+
+_Step = tuple[Fit, Found, float]
+"""A fit, what was added last, and the share of what was left that this took."""
+
+
+def _rig_steps(
+    problem: Problem, noise: Noise, weight: Array, baseline: Fit, samples: float, progress: Callable[[str], None]
+) -> list[_Step]:
+    """Steps of a build-up that begins with what every joint or axis may have."""
+    progress("inertia, viscous friction, offset and gravity")
+    start = before = cost(problem, baseline, weight)
+    steps: list[_Step] = []
+    for result, score in rig.carried(problem, noise, weight, baseline, _slight(start, samples)):
+        after = cost(problem, result, weight)
+        steps.append((result, Found(score, (), (), before - after), (before - after) / max(before - samples, before - after)))
+        before = after
+    return steps
 
 
 @dataclass(frozen=True)
@@ -129,7 +155,7 @@ class _Built:
 
     baseline: Fit
     first: _Round
-    steps: list[tuple[Fit, Found, float]]
+    steps: list[_Step]
     trials: list[Trial]
 
 
@@ -147,21 +173,22 @@ def _others(problem: Problem, weight: Array, built: _Built) -> list[_Round]:
 
 
 def _build_up(
-    problem: Problem, noise: Noise, split: Split, baseline: Fit, opening: _Round | None, progress: Callable[[str], None]
+    problem: Problem, noise: Noise, split: Split, baseline: Fit, opening: _Round | None, progress: Callable[[str], None],
+    given: Sequence[_Step] = (),
 ) -> _Built:
     """Add effects while they are significant, larger than our own error, and explain what is left.
 
-    ``opening``: a first round to go on from; without it the shortlist of the screen is fitted.
+    ``opening``: a first round to go on from; without it the shortlist of the screen is fitted. ``given``: steps that stand already.
     """
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
     samples = float(split.fit.sum())
     start_cost = cost(problem, baseline, weight)
-    steps: list[tuple[Fit, Found, float]] = []
-    current, restarts = baseline, 0
+    steps: list[_Step] = list(given)
+    current, restarts = given[-1][0] if given else baseline, 0
     first, first_choice = opening or _Round(), opening is None
     all_trials: list[Trial] = []
     for _ in range(MAX_ROUNDS):
-        if len(steps) == (MAX_EFFECTS if first_choice else AGAIN_EFFECTS):
+        if len(steps) >= len(given) + (MAX_EFFECTS if first_choice else AGAIN_EFFECTS):
             break
         if opening is not None and not steps:
             scores, trials = list(opening.scores), list(opening.trials)
@@ -169,9 +196,9 @@ def _build_up(
             progress("fingerprints")
             taken = [candidate.effect.id for candidate, _ in current.effects]
             scores = screen(problem, current, weight, noise.draws, taken)
-            scores = _always(scores) if steps else scores
+            scores = _always(scores) if len(steps) > len(given) else scores
             trials = _tried(problem, weight, current, scores, samples, progress)
-        if not steps:
+        if len(steps) == len(given):
             first = _Round(tuple(scores), tuple(trials))
         if not trials:
             break
@@ -233,14 +260,14 @@ def _tried(
 
 
 def _confirmed(
-    problem: Problem, noise: Noise, weight: Array, split: Split, baseline: Fit, steps: Sequence[tuple[Fit, Found, float]],
-    samples: float, progress: Callable[[str], None],
+    problem: Problem, noise: Noise, weight: Array, split: Split, baseline: Fit, steps: Sequence[_Step],
+    samples: float, given: int, progress: Callable[[str], None],
 ) -> tuple[Fit, list[Found]]:
-    """The steps that stand, each effect held against its rivals in the final model."""
+    """The steps that stand, each effect held against its rivals in the final model; the first ``given`` are those of every joint."""
     final, found = steps[-1][0] if steps else baseline, [item for _, item, _ in steps]
     for index in range(len(found)):
         progress(f"rivals of {found[index].score.candidate.label}")
-        final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples)
+        final, found[index] = _confront(problem, noise, weight, split, final, index, found[index], samples, stays=index < given)
     return final, found
 
 
@@ -256,9 +283,12 @@ def _foreign(with_pattern: float, named: Sequence[float], start: float) -> bool:
 
 
 def _confront(
-    problem: Problem, noise: Noise, weight: Array, split: Split, final: Fit, index: int, item: Found, samples: float
+    problem: Problem, noise: Noise, weight: Array, split: Split, final: Fit, index: int, item: Found, samples: float, stays: bool
 ) -> tuple[Fit, Found]:
-    """One accepted effect against its known and met rivals, everything else of the final model in place."""
+    """One accepted effect against its known and met rivals, everything else of the final model in place.
+
+    One that ``stays`` is there on every joint: its rivals are told and do not take its place.
+    """
     own, values = final.effects[index]
     rest = [effect for i, effect in enumerate(final.effects) if i != index]
     without = fit(problem, weight, rest, final.x, linearisations=6)
@@ -290,7 +320,10 @@ def _confront(
     ]
     group = ranked([champion, *trials], before)
     rivals = tied(problem, weight, split, group[0], group[1:], before, samples)
-    chosen, rivals = simplest(group[0], rivals, before)
+    if stays:
+        chosen, rivals = champion, [trial for trial in (group[0], *rivals) if trial is not champion]
+    else:
+        chosen, rivals = simplest(group[0], rivals, before)
     names_left = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:6]
     effects = list(chosen.fit.effects)
     effects.insert(index, effects.pop())
@@ -301,8 +334,8 @@ def _confront(
 
 
 def _prune(
-    steps: list[tuple[Fit, Found, float]], problem: Problem, weight: Array, samples: float, start: float, current: Fit
-) -> tuple[list[tuple[Fit, Found, float]], Fit]:
+    steps: list[_Step], problem: Problem, weight: Array, samples: float, start: float, current: Fit
+) -> tuple[list[_Step], Fit]:
     """Drop earlier effects that the latest one has made superfluous: they had only filled in for its shape."""
     for index in range(len(steps) - 2, -1, -1):
         rest = [effect for i, effect in enumerate(current.effects) if i != index]
@@ -327,7 +360,7 @@ def _slight(start: float, samples: float) -> float:
 
 
 def _keep(
-    steps: Sequence[tuple[Fit, Found, float]], problem: Problem, weight: Array, start: float, samples: float, doubt: float
+    steps: Sequence[_Step], problem: Problem, weight: Array, start: float, samples: float, doubt: float
 ) -> int:
     """How many steps of the build-up stand: the fewest that explain the whole, unless the next explains most of the rest.
 
@@ -342,6 +375,32 @@ def _keep(
         if whole >= needed and gained >= LAST:
             kept = i + 1
     return kept
+
+
+def _most(problem: Problem, noise: Noise, split: Split, built: _Built) -> int:
+    """How many steps stand though much is left: each helps where it was not fitted, and together they are most of what is there.
+
+    A name that stands is no less true for what else there is.
+    """
+    kept = 0
+    fitted, held = (np.where(role, 1.0 / noise.sigma, 0.0) for role in (split.fit, split.held))
+    start = [cost(problem, built.baseline, weight) for weight in (fitted, held)]
+    noisy = [float(split.fit.sum()), float(split.held.sum())]
+    last = start[1]
+    for i, (result, _, _) in enumerate(built.steps):
+        left = [cost(problem, result, weight) for weight in (fitted, held)]
+        if last - left[1] < max(OWN_ERROR * noisy[1], SLIGHT * (start[1] - noisy[1])):
+            break
+        last = left[1]
+        if all(before - after > MOST * (before - n) for before, after, n in zip(start, left, noisy, strict=True)):
+            kept = i + 1
+    return kept
+
+
+def _beside(problem: Problem, weight: Array, pattern: Pattern, named: Fit, start: float) -> bool:
+    """Whether names are needed beside a pattern: with it they still take most of what they take alone."""
+    both = strongest(problem, named, weight).cost(problem, weight)
+    return pattern.cost(problem, weight) - both > MOST * (start - cost(problem, named, weight))
 
 
 def choose(scores: Sequence[Score], samples: float) -> list[Score]:

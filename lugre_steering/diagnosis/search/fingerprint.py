@@ -16,11 +16,12 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.diagnosis.search import onset
-from lugre_steering.effects.entry import Seen
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.entry import Effect, Seen
+from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
+from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, is_rig, resized
 from lugre_steering.recording import Array
+from lugre_steering.vehicle import Vehicle
 
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
@@ -64,12 +65,22 @@ class Score:
         return {**dict(self.candidate.shapes), **free}
 
 
+def possible(vehicle: Vehicle, effect: Effect) -> bool:
+    """Whether a machine can have it: all that the effect needs is there, and a single joint has words for it."""
+    if is_rig(vehicle) and effect.id not in ORIGINS and not effect.joint_title:
+        return False
+    if effect.of_angle and vehicle.coordinate.unit != "rad":
+        return False
+    return all(getattr(vehicle, section) is not None for section in effect.needs)
+
+
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
     for effect in CATALOGUE.values():
-        if not effect.observable or effect.id in without or any(getattr(problem.vehicle, section) is None for section in effect.needs):
+        if not effect.observable or effect.id in without or not possible(problem.vehicle, effect):
             continue
+        effect = resized(effect, problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
             for shapes in effect.variants(_seen(problem)):
@@ -131,8 +142,10 @@ def signature(problem: Problem, fit: Fit, base: Sequence[Array], candidate: Cand
     return columns
 
 
-def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Sequence[str] = ()) -> list[Score]:
-    """Every candidate against the residual of ``fit``, best first; ``draws`` (m, n) are residuals that hide nothing.
+def screen(
+    problem: Problem, fit: Fit, weight: Array, draws: Array, without: Sequence[str] = (), among: Sequence[Candidate] | None = None
+) -> list[Score]:
+    """Every candidate (or those ``among``) against the residual of ``fit``, best first; ``draws`` (m, n) are residuals that hide nothing.
 
     ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
     """
@@ -165,7 +178,7 @@ def screen(problem: Problem, fit: Fit, weight: Array, draws: Array, without: Seq
                 found += [part] if part is not None else []
         return found
 
-    scores = list(itertools.chain.from_iterable(in_threads(score, candidates(problem, without))))
+    scores = list(itertools.chain.from_iterable(in_threads(score, candidates(problem, without) if among is None else among)))
     trials: dict[str, int] = {}
     for item in scores:
         trials[item.candidate.effect.id] = trials.get(item.candidate.effect.id, 0) + 1

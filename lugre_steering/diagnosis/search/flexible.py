@@ -41,22 +41,28 @@ def _shape(problem: Problem, current: Fit, weight: Array, index: int) -> tuple[A
 
     What recalibration alone would still gain is no merit of the shape.
     """
+    basis = current.basis()
+    error = (problem.measured - current.prediction) * weight
+    columns = bends(problem, current, weight, index)
+    if columns.shape[1] < 3:
+        columns = columns[:, :0]
+    return error - basis @ (basis.T @ error), columns - basis @ (basis.T @ columns)
+
+
+def bends(problem: Problem, current: Fit, weight: Array, index: int) -> Array:
+    """Weighted columns (n, k): the torque of one effect near each of some places along its own coordinate; they add up to it."""
     effect = current.effects[index][0].effect
     axes = [locate.coordinates(run, run.measured) for run in problem.runs]
     axis = effect.coordinate if effect.coordinate in axes[0] else OTHER_AXIS.get(effect.stage, "angle since reversal")
     # Laws are odd or even: a difference between the two directions is physics of its own.
     coordinate = np.abs(np.concatenate([bag[axis] for bag in axes]))
     part = locate.contribution(problem, current, index)
-    basis = current.basis()
-    error = (problem.measured - current.prediction) * weight
-    error = error - basis @ (basis.T @ error)
     acting = np.abs(part) * weight > 1e-3 * np.max(np.abs(part) * weight)
     knots = np.unique(np.quantile(coordinate[acting], np.linspace(0.0, 1.0, KNOTS))) if acting.any() else np.zeros(0)
-    if knots.size < 3:
-        return error, np.zeros((error.size, 0))
+    if knots.size < 3:  # a direction has no places
+        return np.asarray((part * weight)[:, None])
     columns = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
-    columns = (columns * part).T * weight[:, None]
-    return error, columns - basis @ (basis.T @ columns)
+    return np.asarray((columns * part).T * weight[:, None])
 
 
 def _taken(error: Array, columns: Array) -> float:

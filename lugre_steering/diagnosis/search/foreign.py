@@ -57,7 +57,7 @@ class _Family:
 
 
 def strongest(problem: Problem, baseline: Fit, weight: Array) -> Pattern:
-    """The pattern that explains most of what a fitted baseline leaves over, recalibrated beside it."""
+    """The pattern that explains most of what a fit leaves over (its effects stay), recalibrated beside it."""
     families = _families(problem, baseline)
     trials = [(family, value) for family in families for value in family.grid]
     family, value = min(trials, key=lambda trial: _left(problem, baseline, weight, trial[0].columns(trial[1]))[0])
@@ -71,13 +71,13 @@ def strongest(problem: Problem, baseline: Fit, weight: Array) -> Pattern:
         coefficients = _left(problem, beside, weight, columns)[1]
         torque = columns @ coefficients
         rest.measured = problem.measured - torque
-        beside = fit(rest, weight, start=beside.x, linearisations=6)
+        beside = fit(rest, weight, beside.effects, beside.x, linearisations=6)
     return Pattern(torque, beside, family.text(value, coefficients))
 
 
 def _left(problem: Problem, beside: Fit, weight: Array, columns: Array) -> tuple[float, Array]:
     """Energy left over by a pattern and a linear recalibration together, and the pattern's coefficients (k,)."""
-    both = np.column_stack([columns * weight[:, None], normalised(beside.jacobian[:, : problem.nuisances])])
+    both = np.column_stack([columns * weight[:, None], normalised(beside.jacobian)])
     error = (problem.measured - beside.prediction) * weight
     solution = np.linalg.lstsq(both, error, rcond=1e-10)[0]
     return float(np.sum((error - both @ solution) ** 2)), np.asarray(solution[: columns.shape[1]], np.float64)
@@ -88,7 +88,7 @@ def _families(problem: Problem, baseline: Fit) -> tuple[_Family, ...]:
     travel = max(float(np.ptp(run.theta)) for run in runs)
     sides = [run.theta for run in runs]
     rates = [run.omega.sum(axis=0) for run in runs]
-    signs = [np.sign(np.where(np.abs(run.omega) > 1e-3, run.omega, 0.0)).sum(axis=0) for run in runs]
+    signs = [np.sign(np.where(np.abs(run.omega) > 1e-3 * run.angle_unit, run.omega, 0.0)).sum(axis=0) for run in runs]
     steps = [float(run.time[1] - run.time[0]) for run in runs]
     model = np.split(baseline.prediction, problem.edges[1:-1])
 

@@ -48,7 +48,7 @@ def coordinates(run: Run, torque: Array, temperature: Array | None = None) -> di
     """State-space coordinates (n,) of one run, by the names of ``units.COORDINATES``."""
     mean_rate = run.omega.mean(axis=0)
     dt = run.time[1] - run.time[0]
-    moving = np.abs(mean_rate) > 1e-3
+    moving = np.abs(mean_rate) > 1e-3 * run.angle_unit
     since, dwell, travelled, rest, last = np.zeros(run.time.size), np.zeros(run.time.size), 0.0, 0.0, 0.0
     for i, rate in enumerate(mean_rate):
         if moving[i]:

@@ -1,0 +1,48 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The error of the written model as the live node has it: motion from past samples only, bristles relaxed at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.chain.compiled import njit
+from lugre_steering.chain.rates import MOTION, follow
+from lugre_steering.data.dataset import Run, _at, angle_noise
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.recording import Array, Recording, Signal
+from lugre_steering.vehicle import Vehicle
+
+
+@njit(cache=True)
+def _follow_all(s: Any, time: Array, angle: Array, rate: Array, sigma: float, out: Array) -> None:
+    """Angle, rate and acceleration (3, n) after each sample."""
+    for i in range(time.size):
+        follow(s, time[i] - time[max(i - 1, 0)], angle[i], rate[i], sigma)
+        out[0, i], out[1, i], out[2, i] = s.theta, s.omega, s.alpha
+
+
+def causal_rmse(vehicle: Vehicle, recordings: Sequence[Recording], runs: Sequence[Run]) -> float:
+    """Root mean square error [N m] over the valid samples of ``runs``, which were made from the recordings."""
+    problem = Problem(vehicle, [_seen_live(vehicle, *pair) for pair in zip(recordings, runs, strict=True)])
+    error = problem.measured - problem.predict_all(problem.start())
+    return float(np.sqrt(np.mean(error[problem.valid] ** 2)))
+
+
+def _seen_live(vehicle: Vehicle, recording: Recording, run: Run) -> Run:
+    """The run with the motion that a causal filter makes of the recorded angles, and rates where they were recorded."""
+    motion = np.array([_causal(vehicle, recording, side, run.time) for side in vehicle.sides])
+    return replace(run, theta=motion[:, 0], omega=motion[:, 1], alpha=motion[:, 2])
+
+
+def _causal(vehicle: Vehicle, recording: Recording, side: str, time: Array) -> Array:
+    """Angle, rate and acceleration (3, n) known at the instants (n,)."""
+    angle, rate = recording.angle[side], recording.rate.get(side)
+    given = np.full(angle.time_s.size, np.nan) if rate is None else np.interp(angle.time_s, rate.time_s, rate.value)
+    state, motion = np.zeros(1, MOTION), np.zeros((3, angle.time_s.size))
+    _follow_all(state[0], angle.time_s, angle.value, given, angle_noise(vehicle), motion)
+    return np.array([_at(time, Signal(angle.time_s, row)) for row in motion])

@@ -1,0 +1,50 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What every joint or axis may have beside friction, fitted together before anything is looked for: inertia, viscous friction,
+an offset, gravity.
+
+Each hides the others while it is missing, so one after another they would be judged wrongly; those stay that the data carry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lugre_steering.diagnosis.search.fingerprint import Score, candidates, screen
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial, cost, refine
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Candidate, Problem, Values
+from lugre_steering.recording import Array
+
+TERMS = ("yaw_inertia", "viscous_friction", "slope_bias", "kingpin_jacking")
+
+
+def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit, least: float) -> list[tuple[Fit, Score]]:
+    """The terms without which the energy left over would rise by at least ``least``, what matters most first.
+
+    Each with the fit that has it and those before it, and its score against what the others leave.
+    """
+    known = {candidate.effect.id for candidate, _ in problem.standing}
+    terms = [c for c in candidates(problem, sorted(known)) if c.effect.id in TERMS]
+    full = _fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
+    order: list[Candidate] = []  # what can be spared first comes last
+    while full.effects:
+        rests = [[e for i, e in enumerate(full.effects) if i != index] for index in range(len(full.effects))]
+        leaner = [_fitted(problem, weight, rest, full) for rest in rests]
+        index = min(range(len(leaner)), key=lambda i: cost(problem, leaner[i], weight))
+        if order or cost(problem, leaner[index], weight) - cost(problem, full, weight) > least:
+            order.insert(0, full.effects[index][0])
+        full = leaner[index]
+    found: list[tuple[Fit, Score]] = []
+    current = baseline
+    for candidate in order:
+        (score,) = (s for s in screen(problem, current, weight, noise.draws, among=[candidate]) if s.candidate == candidate)
+        current = _fitted(problem, weight, [*current.effects, (candidate, score.values)], current)
+        current = refine(problem, weight, Trial(score, current, cost(problem, current, weight))).fit
+        found.append((current, score))
+    return found
+
+
+def _fitted(problem: Problem, weight: Array, effects: Sequence[tuple[Candidate, Values]], near: Fit) -> Fit:
+    return fit(problem, weight, effects, near.x, tolerance=TRIAL_TOLERANCE)

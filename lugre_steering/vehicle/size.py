@@ -1,0 +1,56 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How large a machine is beside a rubber-tracked vehicle, in decades: what is written for one must hold for all."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from lugre_steering.vehicle.sections import Vehicle
+
+FRICTION_NM, STRIBECK_RAD_S, TRAVEL_RAD = 25e3, 0.026, 0.8
+"""Friction torque and Stribeck speed of one track, and travel, of the vehicle whose size counts as one."""
+SPARE = 5.0
+"""By how much the torque of a rig is overstated, so that ranges written for a vehicle, which rests on friction, are wide enough for it."""
+
+_DIMENSIONS = {"N m": (1, 0), "rad": (0, 1), "W": (1, 1), "J": (1, 1), "kg m2": (1, -1)}
+"""Exponents of torque and angle; power and energy are torque times angle, so a linear axis has them right too."""
+_UNIT = re.compile(r"(N m|kg m2|rad|W|J)(?![A-Za-z])(?:\^?(\d))?")
+
+
+@dataclass(frozen=True)
+class Size:
+    """Units of torque [N m] and angle [rad] of a machine; powers of ten, so that all vehicles alike share one."""
+
+    torque: float = 1.0
+    angle: float = 1.0
+
+    def of(self, unit: str) -> float:
+        """What a number in a unit of the catalogue, written for a vehicle, is worth on this machine."""
+        above, _, below = unit.partition("/")
+        return self._product(above) / self._product(below)
+
+    def _product(self, text: str) -> float:
+        worth = 1.0
+        for name, power in _UNIT.findall(text):
+            torque, angle = _DIMENSIONS[name]
+            worth *= (self.torque**torque * self.angle**angle) ** int(power or 1)
+        return worth
+
+
+VEHICLE = Size()
+"""The size that counts as one."""
+
+
+def decade(value: float, reference: float) -> float:
+    """The power of ten nearest to value / reference; 1 where there is no value."""
+    return 10.0 ** round(math.log10(value / reference)) if 0.0 < value < math.inf else 1.0
+
+
+def angle_unit(vehicle: Vehicle) -> float:
+    """Size of the travel of a linear axis as its sheet tells; an angle is one on machines of any size."""
+    if vehicle.coordinate.unit == "rad" or vehicle.contact is None:
+        return 1.0
+    return decade(math.radians(vehicle.contact.stribeck_speed_deg_s), STRIBECK_RAD_S)
