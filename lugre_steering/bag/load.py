@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,6 +38,7 @@ LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 
 _Columns = tuple[IntArray, IntArray, Array, Array]  # stamp, log time, value, rate
+_Samples = tuple[IntArray, Array, Array]  # stamp, value, rate of what is usable
 _NOTHING: _Columns = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 
@@ -54,7 +55,7 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
         findings = list(bag.findings)
         found = shortened(sorted(bag.topics)) or "none"
     rejected: dict[str, Counter[str]] = {topic: Counter(malformed=count) for topic, count in malformed.items()}
-    clean: dict[Channel, tuple[IntArray, Array, Array]] = {}
+    clean: dict[Channel, _Samples] = {}
     for i, channel in enumerate(channels):
         if channel in topics:
             stamp, log, value, rate = map(np.concatenate, zip(_NOTHING, *pieces[i], strict=True))
@@ -68,13 +69,34 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
             if len(use):
                 clean[channel] = stamp[use], value[use], rate[use]
     if not clean:
-        wanted = ", ".join(sorted({channel.topic for channel in channels}))
-        counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
-        left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
-        damage = f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
-        raise BagError(
-            f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}"
-        )
+        raise _nothing_usable(path, channels, found, rejected, findings)
+    return _recording(name, clean, rejected, findings)
+
+
+def _nothing_usable(
+    path: str | Path,
+    channels: Sequence[Channel],
+    found: str,
+    rejected: Mapping[str, Mapping[str, int]],
+    findings: Sequence[Finding],
+) -> BagError:
+    """What to say of a bag without a usable message; ``found``: the topics in it."""
+    wanted = ", ".join(sorted({channel.topic for channel in channels}))
+    counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
+    left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
+    damage = f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
+    return BagError(
+        f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}"
+    )
+
+
+def _recording(
+    name: str,
+    clean: Mapping[Channel, _Samples],
+    rejected: Mapping[str, Mapping[str, int]],
+    findings: Sequence[Finding],
+) -> Recording:
+    """The usable samples in seconds since the first of them."""
     start_ns = min(int(stamp[0]) for stamp, _, _ in clean.values())
     signals: dict[Kind, dict[str, Signal]] = {kind: {} for kind in Kind}
     rates: dict[str, Signal] = {}

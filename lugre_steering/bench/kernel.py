@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import perf_counter
 
 import numpy as np
@@ -19,7 +19,7 @@ from lugre_steering.chain.step import Records, torque_side
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
-from lugre_steering.vehicle import load
+from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.vehicle.model import build_model
 from lugre_steering.vehicle.tables import limit_device
 
@@ -142,57 +142,24 @@ def best_time(task: Callable[[], object], repeats: int) -> float:
     return best
 
 
-def measure() -> list[dict[str, object]]:
+Row = dict[str, object]
+
+
+def measure() -> list[Row]:
     """One row per way: name, nanoseconds per step and track, largest error relative to the torque range."""
     vehicle = load(config_folder() / "test_vehicle.yaml")
     model = build_model(vehicle)
     p, rubber = model.parameters[0], model.rubber
     long, short = manoeuvre(60.0), manoeuvre(20.0)
-    still = np.zeros(long[0].size)
     ode = StiffOde(p, rubber, *short)
     truth = ode.by_sample(1e-9)
-    rows: list[dict[str, object]] = []
-
-    def row(name: str, seconds: float, steps: int, torque: Array | None) -> None:
-        error = math.nan if torque is None else float(np.abs(torque - truth).max() / np.ptp(truth))
-        rows.append({"name": name, "ns_per_step_and_track": 1e9 * seconds / steps, "relative_error": error})
-
-    def kernel(parameters: Records) -> Callable[[], Array]:
-        return lambda: torque_side(parameters, rubber, *long, still)
-
-    stopped = vehicle.replace(effects=(limit_device(),))
-    one, lean = build_model(stopped).parameters[0], build_model(stopped, lean=True).parameters[0]
-    neutral, every = p.copy(), p.copy()
-    shape = next(f"{effect.id}_{p.name}" for effect in CATALOGUE.values() for p in effect.parameters if p.is_shape)
-    neutral[shape] = 1.0  # without its amplitude it does nothing, but the stages are passed
-    for field, value in every_effect().items():
-        every[field] = value
-    loop = CLoop.build()
-    tasks = {
-        BASELINE: kernel(p),
-        "C loop, gcc -O3": kernel(p) if loop is None else lambda: loop.torque_side(p, rubber, *long),
-        "Numba kernel, effect stages in place, neutral": kernel(neutral),
-        "Numba kernel, one effect on (end stop)": kernel(one),
-        "Numba kernel composed for a file with the end stop": kernel(lean),
-        "Numba kernel, all effects on at once": kernel(every),
-    }
-    # By turns, so that all see the same machine.
-    best = dict.fromkeys(tasks, math.inf)
-    for _ in range(60):
-        for name, task in tasks.items():
-            best[name] = min(best[name], best_time(task, 1))
-    torque = {
-        BASELINE: torque_side(p, rubber, *short, still[: short[0].size]),
-        "C loop, gcc -O3": None if loop is None else loop.torque_side(p, rubber, *short),
-    }
-    for name, seconds in best.items():
-        if loop is not None or not name.startswith("C loop"):
-            row(name, seconds, long[0].size, torque.get(name))
+    rows = _kernels(vehicle, p, rubber, truth)
 
     sets = np.repeat(p, SETS)
     torque_sets(sets, rubber, *short)
     seconds = best_time(lambda: torque_sets(sets, rubber, *long), 5)
-    row(f"lanes, {SETS} sets, per set", seconds, long[0].size * SETS, torque_sets(sets, rubber, *short)[:, -1])
+    torque = torque_sets(sets, rubber, *short)[:, -1]
+    rows.append(_row(f"lanes, {SETS} sets, per set", seconds, long[0].size * SETS, torque, truth))
     for name, way, rtols in (
         ("plain Python loop", lambda _: plain_loop(p, rubber, *short), (0.0,)),
         ("Radau, whole record at once", ode.in_one_call, (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)),
@@ -201,8 +168,66 @@ def measure() -> list[dict[str, object]]:
         for rtol in rtols:
             start = perf_counter()
             result = way(rtol)
-            row(f"{name}, rtol {rtol:g}" if rtol else name, perf_counter() - start, short[0].size, result)
+            seconds = perf_counter() - start
+            rows.append(_row(f"{name}, rtol {rtol:g}" if rtol else name, seconds, short[0].size, result, truth))
     return rows
+
+
+def _row(name: str, seconds: float, steps: int, torque: Array | None, truth: Array) -> Row:
+    error = math.nan if torque is None else float(np.abs(torque - truth).max() / np.ptp(truth))
+    return {"name": name, "ns_per_step_and_track": 1e9 * seconds / steps, "relative_error": error}
+
+
+def _kernels(vehicle: Vehicle, p: Records, rubber: Array, truth: Array) -> list[Row]:
+    """Rows of the compiled step in its variants, and of the C loop; the errors of those without additions."""
+    long, short = manoeuvre(60.0), manoeuvre(20.0)
+    still = np.zeros(long[0].size)
+
+    def kernel(parameters: Records) -> Callable[[], Array]:
+        return lambda: torque_side(parameters, rubber, *long, still)
+
+    stopped = vehicle.replace(effects=(limit_device(),))
+    loop = CLoop.build()
+    tasks = {
+        BASELINE: kernel(p),
+        "C loop, gcc -O3": kernel(p) if loop is None else lambda: loop.torque_side(p, rubber, *long),
+        "Numba kernel, effect stages in place, neutral": kernel(_neutral(p)),
+        "Numba kernel, one effect on (end stop)": kernel(build_model(stopped).parameters[0]),
+        "Numba kernel composed for a file with the end stop": kernel(build_model(stopped, lean=True).parameters[0]),
+        "Numba kernel, all effects on at once": kernel(_with(p, every_effect())),
+    }
+    best = by_turns(tasks, 60)
+    torque = {
+        BASELINE: torque_side(p, rubber, *short, still[: short[0].size]),
+        "C loop, gcc -O3": None if loop is None else loop.torque_side(p, rubber, *short),
+    }
+    return [
+        _row(name, seconds, long[0].size, torque.get(name), truth)
+        for name, seconds in best.items()
+        if loop is not None or not name.startswith("C loop")
+    ]
+
+
+def _neutral(p: Records) -> Records:
+    """Parameters with a shape but no amplitude: the effect does nothing, but the stages are passed."""
+    shape = next(f"{effect.id}_{p.name}" for effect in CATALOGUE.values() for p in effect.parameters if p.is_shape)
+    return _with(p, {shape: 1.0})
+
+
+def _with(p: Records, values: Mapping[str, float]) -> Records:
+    changed = p.copy()
+    for field, value in values.items():
+        changed[field] = value
+    return changed
+
+
+def by_turns(tasks: Mapping[str, Callable[[], object]], turns: int) -> dict[str, float]:
+    """Shortest duration [s] of each task; by turns, so that all see the same machine."""
+    best = dict.fromkeys(tasks, math.inf)
+    for _ in range(turns):
+        for name, task in tasks.items():
+            best[name] = min(best[name], best_time(task, 1))
+    return best
 
 
 def verdict(rows: list[dict[str, object]]) -> str:

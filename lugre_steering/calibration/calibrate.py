@@ -46,7 +46,7 @@ from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, P
 from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
-from lugre_steering.recording import Array, Recording
+from lugre_steering.recording import Array, BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.version import __version__
 
@@ -187,30 +187,39 @@ def calibrate_recordings(
     wrong = wrong_sheet(problem)
     progress("fitting")
     fitted = estimate(problem, priors=priors)
-    progress("judging on held-out stretches")
-    held = heldout_rmse(problem, fitted, priors)
-    progress("what the data cannot tell")
-    weak, assumed = identifiability(problem, fitted)
-    calibrated = _rounded(apply_calibration(vehicle, problem, fitted.x))
-    rows = parameter_rows(problem, fitted, calibrated, priors)
-    used = fitted.weight > 0.0
-    rmse = result.FittedErrors(
-        sheet=_rms((problem.measured - problem.predict_all(problem.start()))[used]),
-        calibrated=_rms(fitted.residual[used]),
-        noise_floor=fitted.noise_floor,
-    )
-    names = [calibration.name for calibration in problem.calibrations]
-    matrix = tuple(tuple(row) for row in fitted.covariance[: len(names), : len(names)].tolist())
     found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
     further = [*cut.items(), *apart.items(), *weather_findings(problem, fitted.fit).items()]
     found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])
     first = f"The vehicle file seems wrong: {wrong.statement}. " if wrong else ""
-    return Calibrated(problem, fitted, result.Calibration(
+    names = tuple(recording.name for recording in recordings)
+    return Calibrated(problem, fitted, _summed_up(names, problem, fitted, found, first, priors, progress))
+
+
+def _summed_up(
+    bags: tuple[str, ...],
+    problem: Problem,
+    fitted: Estimate,
+    found: Sequence[BagFinding],
+    first: str,
+    priors: bool,
+    progress: Progress,
+) -> result.Calibration:
+    """What the fit came to; ``first`` is what its statement begins with."""
+    progress("judging on held-out stretches")
+    held = heldout_rmse(problem, fitted, priors)
+    progress("what the data cannot tell")
+    weak, assumed = identifiability(problem, fitted)
+    calibrated = _rounded(apply_calibration(problem.vehicle, problem, fitted.x))
+    rows = parameter_rows(problem, fitted, calibrated, priors)
+    rmse = _fitted_errors(problem, fitted)
+    names = [calibration.name for calibration in problem.calibrations]
+    matrix = tuple(tuple(row) for row in fitted.covariance[: len(names), : len(names)].tolist())
+    return result.Calibration(
         schema=result.SCHEMA,
         tool_version=__version__,
         date=datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        bags=tuple(recording.name for recording in recordings),
-        vehicle=vehicle.name,
+        bags=bags,
+        vehicle=problem.vehicle.name,
         priors=priors,
         duration_s=sum(float(run.time[-1] - run.time[0]) for run in problem.runs),
         parameters=tuple(rows),
@@ -220,10 +229,20 @@ def calibrate_recordings(
         undetermined=tuple(weak),
         assumed=tuple(assumed),
         data_quality=tuple(found),
-        statement=units.words(vehicle, first + statement(rows, rmse, held, weak, assumed)),
+        statement=units.words(problem.vehicle, first + statement(rows, rmse, held, weak, assumed)),
         calibrated=calibrated,
         seen=seen_range(problem),
-    ))  # fmt: skip
+    )
+
+
+def _fitted_errors(problem: Problem, fitted: Estimate) -> result.FittedErrors:
+    """RMSE [N m] of sheet and calibrated vehicle on the samples that were fitted."""
+    used = fitted.weight > 0.0
+    return result.FittedErrors(
+        sheet=_rms((problem.measured - problem.predict_all(problem.start()))[used]),
+        calibrated=_rms(fitted.residual[used]),
+        noise_floor=fitted.noise_floor,
+    )
 
 
 def check_motion(problem: Problem) -> None:

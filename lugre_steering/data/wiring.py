@@ -399,6 +399,27 @@ def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:
     return float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
 
 
+@dataclass(frozen=True)
+class _Shifts:
+    """Slope of the measured torque, every ``stride`` samples or ``dt`` seconds, that may be shifted by up to ``reach`` places;
+    its ``energy`` in the stretch that each shift leaves."""
+
+    measured: Array
+    energy: Array
+    reach: int
+    stride: int
+    dt: float
+
+    def match(self, torque: Array) -> tuple[float, float, float]:
+        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the torque."""
+        expected = _slope(torque, self.stride, self.dt)[self.reach : self.measured.size - self.reach]
+        power = max(float(np.sum(expected**2)), 1e-30)
+        overlap = correlate(self.measured, expected, mode="valid")
+        gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
+        left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(self.energy, 1e-30)
+        return float(left.min()), (_lowest(left) - self.reach) * self.dt, float(left[self.reach])
+
+
 def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
     """Torque stamped late or early against the angles, by more than softer springs, play or a slow sensor could imitate.
 
@@ -407,64 +428,69 @@ def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
     variants fits better there.
     """
     model = build_model(vehicle)
-    step = float(run.time[1] - run.time[0])
-    stride = max(1, round(1.0 / SKEW_RATE_HZ / step))
-    dt = stride * step
-
-    known_delay, known_lag = delay_s(vehicle), lag_s(vehicle)
-
-    def seen(trial: Model) -> Array:
-        """Torque of a model as sensors show it whose delay and lag the vehicle file knows."""
-        torque = _torques(trial, run).sum(axis=0)
-        return lagged(np.interp(run.time - known_delay, run.time, torque), step, known_lag)
-
-    def slope(torque: Array) -> Array:
-        return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
-
-    nominal = np.concatenate([[0.0], np.cumsum(slope(seen(model)) ** 2)])
-    ends = np.arange(int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt) + 1)
-    # Without the strongest slopes in what is shifted, weak ones that hidden physics changes would decide.
-    reach = int(np.flatnonzero(nominal[nominal.size - 1 - ends] - nominal[ends] >= SKEW_HELD * nominal[-1])[-1])
-    if reach * dt < 2.0 * SKEW_S:
+    nominal = _seen(vehicle, run, model)
+    shifts = _shifts(run, nominal)
+    if shifts is None or abs(shifts.match(nominal)[1]) <= SKEW_S:
         return
-    measured = slope(run.measured)
-    window = measured.size - 2 * reach
-    energy = np.convolve(measured**2, np.ones(window), mode="valid")
-    presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
-
-    def match(torque: Array) -> tuple[float, float, float]:
-        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the torque."""
-        expected = slope(torque)[reach : reach + window]
-        power = max(float(np.sum(expected**2)), 1e-30)
-        overlap = correlate(measured, expected, mode="valid")
-        gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
-        left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(energy, 1e-30)
-        return float(left.min()), (_lowest(left) - reach) * dt, float(left[reach])
-
-    if abs(match(seen(model))[1]) <= SKEW_S:
-        return
-    gaps = [f"{effect.id}_{effect.play}" for effect in CATALOGUE.values() if effect.play]
     matches, unshifted = [], np.inf
-    for softer, play in product(SOFTER, PLAY):
-        trial = replace(model, parameters=tuple(p.copy() for p in model.parameters))
-        for record in trial.parameters:
-            record["sigma_0"] *= softer
-            for gap in gaps:
-                record[gap] += play * presliding
-        torque = seen(trial)
-        matches.append(match(torque))
-        unshifted = min(unshifted, matches[-1][2], *(match(lagged(torque, step, lag))[2] for lag in LAG_S))
+    for torque in (_seen(vehicle, run, variant) for variant in _variants(model)):
+        matches.append(shifts.match(torque))
+        slow = (shifts.match(lagged(torque, _step(run), lag))[2] for lag in LAG_S)
+        unshifted = min(unshifted, matches[-1][2], *slow)
     best, shift, _ = min(matches)
     if abs(shift) > SKEW_S and best < min(SKEW_ENERGY * unshifted, GOOD**2):
         kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
         topics = ", ".join(_topics(vehicle, kind).values())
         late = "late" if shift > 0.0 else "early"
-        least = "at least " if abs(shift) > (reach - 1.5) * dt else ""  # the best lies at the end of the search, or beyond
+        # The best may lie at the end of the search, or beyond.
+        least = "at least " if abs(shift) > (shifts.reach - 1.5) * shifts.dt else ""
         yield Finding(
             "clock_skew", topics,
             f"{topics}: stamped {least}{abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
             f"{unshifted:.2f} as recorded, {best:.2f} shifted); synchronise the clocks of the devices",
         )  # fmt: skip
+
+
+def _step(run: Run) -> float:
+    return float(run.time[1] - run.time[0])
+
+
+def _seen(vehicle: Vehicle, run: Run, model: Model) -> Array:
+    """Torque of a model as sensors show it whose delay and lag the vehicle file knows."""
+    torque = _torques(model, run).sum(axis=0)
+    return lagged(np.interp(run.time - delay_s(vehicle), run.time, torque), _step(run), lag_s(vehicle))
+
+
+def _slope(torque: Array, stride: int, dt: float) -> Array:
+    return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
+
+
+def _shifts(run: Run, nominal: Array) -> _Shifts | None:
+    """The shifts that can be tried; none where the nominal torque moves too little for it."""
+    stride = max(1, round(1.0 / SKEW_RATE_HZ / _step(run)))
+    dt = stride * _step(run)
+    held = np.concatenate([[0.0], np.cumsum(_slope(nominal, stride, dt) ** 2)])
+    ends = np.arange(int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt) + 1)
+    # Without the strongest slopes in what is shifted, weak ones that hidden physics changes would decide.
+    reach = int(np.flatnonzero(held[held.size - 1 - ends] - held[ends] >= SKEW_HELD * held[-1])[-1])
+    if reach * dt < 2.0 * SKEW_S:
+        return None
+    measured = _slope(run.measured, stride, dt)
+    energy = np.convolve(measured**2, np.ones(measured.size - 2 * reach), mode="valid")
+    return _Shifts(measured, energy, reach, stride, dt)
+
+
+def _variants(model: Model) -> Iterator[Model]:
+    """The model with every stiffness in SOFTER and every play in PLAY."""
+    presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
+    gaps = [f"{effect.id}_{effect.play}" for effect in CATALOGUE.values() if effect.play]
+    for softer, play in product(SOFTER, PLAY):
+        variant = replace(model, parameters=tuple(p.copy() for p in model.parameters))
+        for record in variant.parameters:
+            record["sigma_0"] *= softer
+            for gap in gaps:
+                record[gap] += play * presliding
+        yield variant
 
 
 def _lowest(values: Array) -> float:

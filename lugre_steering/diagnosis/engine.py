@@ -76,23 +76,12 @@ def diagnose_recordings(
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
     findings += [finding.in_bag(bag) for bag, finding in apart.items()]
-    travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
     roles = split(problem)
     progress("comparing with the vehicle file")
     if roles.fit.sum() >= MIN_SAMPLES and (wrong := wrong_sheet(problem)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
-    if travel < MIN_SLIDING or roles.fit.sum() < MIN_SAMPLES:
-        if travel < MIN_SLIDING:
-            lacking = f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
-        else:
-            lacking = f"only {roles.fit.sum()} usable samples are left to fit; at least {MIN_SAMPLES} are needed (see data_quality)"
-        drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description
-        advice = Experiment(drive, ("friction level", "stiffness"), lacking)
-        statement = (
-            f"The recording of {sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s does not determine the "
-            f"baseline: {lacking}. Nothing can be said about missing physics."
-        )
-        return _insufficient(qualities, vehicle, findings, statement, advice)
+    if lacking := _lacking(problem, int(roles.fit.sum())):
+        return _undetermined(qualities, vehicle, findings, problem, lacking)
     progress("recalibrating the baseline")
     noise, roles, found = investigate(problem, seed, progress)
     left = problem.measured - found.final.prediction
@@ -115,6 +104,28 @@ def diagnose_recordings(
 
 def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
     return [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
+
+
+def _lacking(problem: Problem, samples: int) -> str:
+    """What the recordings lack to determine the baseline, if anything; ``samples`` are left to fit."""
+    travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
+    if travel < MIN_SLIDING:
+        return f"the contact turned by {travel:.1f} presliding lengths; at least {MIN_SLIDING:g} are needed"
+    if samples < MIN_SAMPLES:
+        return f"only {samples} usable samples are left to fit; at least {MIN_SAMPLES} are needed (see data_quality)"
+    return ""
+
+
+def _undetermined(
+    qualities: Sequence[Quality], vehicle: Vehicle, findings: Sequence[BagFinding], problem: Problem, lacking: str
+) -> Diagnosis:
+    drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description
+    advice = Experiment(drive, ("friction level", "stiffness"), lacking)
+    statement = (
+        f"The recording of {sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s does not determine the "
+        f"baseline: {lacking}. Nothing can be said about missing physics."
+    )
+    return _insufficient(qualities, vehicle, findings, statement, advice)
 
 
 def _wrong_sheet(

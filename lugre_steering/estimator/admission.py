@@ -29,6 +29,10 @@ CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm
 
 REJECTED, ACCEPTED, JUMPED = range(3)
 """What ``admit`` says of a sample."""
+_GOES_ON = -1
+"""Nothing decides about the sample yet."""
+_SOUND = -1
+"""No reason to reject it."""
 
 
 @njit
@@ -91,75 +95,105 @@ def _other_side(core, k, stamp_ns):
 
 
 @njit
-def admit(core, k, stamp_ns, value):
-    """Whether channel ``k`` accepts the sample, and whether its angle jumps; counts the reason if not."""
-    c, ch = core.config[0], core.channels[k]
+def _absurd(c, kind, value):
+    """Whether no such sensor can show this value."""
+    if kind == Kind.ANGLE:
+        return abs(value) > c.max_angle
+    if kind == Kind.PRESSURE:
+        return abs(value) > c.max_pressure
+    return abs(value) > (AIR_LIMIT_DEGC if kind == Kind.AIR_TEMPERATURE else 1e12)
+
+
+@njit
+def _unusable(core, ch, stamp_ns, value):
+    """Why the sample can be used under no circumstances, or ``_SOUND``."""
     if stamp_ns <= 0:
-        ch.reasons[ZERO] += 1
-        return REJECTED
+        return ZERO
     if not math.isfinite(value):
-        ch.reasons[NOT_FINITE] += 1
-        return REJECTED
-    if (ch.kind == Kind.ANGLE and abs(value) > c.max_angle) or (ch.kind == Kind.PRESSURE and abs(value) > c.max_pressure):
-        ch.reasons[ABSURD] += 1
+        return NOT_FINITE
+    if _absurd(core.config[0], ch.kind, value):
         if ch.kind == Kind.ANGLE:
             core.guard[ch.index].calm = 0.0
             core.guard[ch.index].absurd = True
-        return REJECTED
-    if (ch.kind == Kind.AIR_TEMPERATURE and abs(value) > AIR_LIMIT_DEGC) or abs(value) > 1e12:
-        ch.reasons[ABSURD] += 1
-        return REJECTED
+        return ABSURD
     if ch.last_ns == 0:
-        return ACCEPTED
+        return _SOUND
     ahead = stamp_ns - ch.last_ns
     if ahead == 0:
-        ch.reasons[DUPLICATE] += 1
-        return REJECTED
-    if -c.backward_jump_ns < ahead < 0:
-        ch.reasons[BACKWARD] += 1
-        return REJECTED
-    if ch.kind == Kind.AIR_TEMPERATURE:  # air may come as rarely as it likes, and no sample of it is needed at any instant
+        return DUPLICATE
+    return BACKWARD if -core.config[0].backward_jump_ns < ahead < 0 else _SOUND
+
+
+@njit
+def _suspect(ch, reason, stamp_ns, value):
+    """Refuse the sample, until one soon after it agrees with it."""
+    ch.reasons[reason] += 1
+    ch.suspect_ns = stamp_ns
+    ch.suspect_value = value
+    return REJECTED
+
+
+@njit
+def _jump_in_time(core, k, stamp_ns, value, follows_suspect):
+    """What a stamp far from the last one means: refused, a new beginning, or ``_GOES_ON``."""
+    ch = core.channels[k]
+    other_side = _other_side(core, k, stamp_ns) if ch.kind == Kind.ANGLE else _THERE
+    if not follows_suspect or other_side == _DOUBTED:
+        return _suspect(ch, JUMP, stamp_ns, value)
+    if stamp_ns > ch.last_ns:
+        return _GOES_ON
+    if other_side == _SHARED:
+        restart(core, k)
         return ACCEPTED
+    if ch.kind != Kind.ANGLE:
+        _clear(ch)
+        return ACCEPTED
+    # This side alone had strayed ahead: it goes on from the sample before, which the stray one made suspect.
+    ch.last_ns = ch.suspect_ns
+    ch.cursor = ch.head
+    return _GOES_ON
+
+
+@njit
+def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
+    """What an angle means that the joint cannot have reached: refused, a new beginning, a confirmed jump; else ``_GOES_ON``."""
+    c = core.config[0]
+    reach = c.max_rate * (stamp_ns - ch.last_ns) * 1e-9 + 10.0 * c.angle_noise
+    change = value - ch.last_value
+    # After absurd readings the next ones are no better than they: the angle is believed where it can have gone.
+    strayed = core.guard[ch.index].absurd and not reachable(core, ch.index, ch.last_ns, stamp_ns, change)
+    if not strayed and abs(change) <= reach:
+        return _GOES_ON
+    near = follows_suspect and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
+    if not near:
+        return _suspect(ch, SPIKE, stamp_ns, value)
+    if ch.head == 1:  # two agree against the first one
+        _begin_side(core, ch.index)
+        return ACCEPTED
+    ch.suspect_ns = 0
+    return JUMPED
+
+
+@njit
+def admit(core, k, stamp_ns, value):
+    """Whether channel ``k`` accepts the sample, and whether its angle jumps; counts the reason if not."""
+    c, ch = core.config[0], core.channels[k]
+    reason = _unusable(core, ch, stamp_ns, value)
+    if reason != _SOUND:
+        ch.reasons[reason] += 1
+        return REJECTED
+    if ch.last_ns == 0 or ch.kind == Kind.AIR_TEMPERATURE:
+        return ACCEPTED  # air may come as rarely as it likes, and no sample of it is needed at any instant
+    verdict = _GOES_ON
     follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < CONFIRM_NS
+    ahead = stamp_ns - ch.last_ns
     if ahead < 0 or ahead > c.forward_jump_ns:
-        other_side = _other_side(core, k, stamp_ns) if ch.kind == Kind.ANGLE else _THERE
-        if not follows_suspect or other_side == _DOUBTED:
-            ch.reasons[JUMP] += 1
-            ch.suspect_ns = stamp_ns
-            ch.suspect_value = value
-            return REJECTED
-        if ahead < 0:
-            if other_side == _SHARED:
-                restart(core, k)
-                return ACCEPTED
-            if ch.kind != Kind.ANGLE:
-                _clear(ch)
-                return ACCEPTED
-            # This side alone had strayed ahead: it goes on from the sample before, which the stray one made suspect.
-            ch.last_ns = ch.suspect_ns
-            ch.cursor = ch.head
-            ahead = stamp_ns - ch.last_ns
-    if ch.kind == Kind.ANGLE:
-        reach = c.max_rate * ahead * 1e-9 + 10.0 * c.angle_noise
-        change = value - ch.last_value
-        # After absurd readings the next ones are no better than they: the angle is believed where it can have gone.
-        strayed = core.guard[ch.index].absurd and not reachable(core, ch.index, ch.last_ns, stamp_ns, change)
-        if strayed or abs(change) > reach:
-            near = (
-                follows_suspect
-                and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
-            )
-            if not near:
-                ch.reasons[SPIKE] += 1
-                ch.suspect_ns = stamp_ns
-                ch.suspect_value = value
-                return REJECTED
-            if ch.head == 1:  # two agree against the first one
-                _begin_side(core, ch.index)
-                return ACCEPTED
-            ch.suspect_ns = 0
-            return JUMPED
-    if ahead > c.max_gap_ns:
+        verdict = _jump_in_time(core, k, stamp_ns, value, follows_suspect)
+    if verdict == _GOES_ON and ch.kind == Kind.ANGLE:
+        verdict = _jump_of_angle(core, ch, stamp_ns, value, follows_suspect)
+    if verdict != _GOES_ON:
+        return verdict
+    if stamp_ns - ch.last_ns > c.max_gap_ns:
         ch.reasons[GAP] += 1
     ch.suspect_ns = 0
     return ACCEPTED

@@ -28,7 +28,7 @@ from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
-from lugre_steering.vehicle.model import build_model
+from lugre_steering.vehicle.model import Model, build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 
 RUBBER_DEGC = (-80.0, 150.0)
@@ -251,9 +251,8 @@ def _set_options(config: Records, parameters: Records, options: Options) -> None
     config["plan_tolerance"] = options.plan_tolerance_rad
 
 
-def _new_core(vehicle: Vehicle, options: Options) -> Core:
-    model = build_model(vehicle, lean=True)
-    sides = len(vehicle.sides)
+def _config(vehicle: Vehicle, model: Model) -> Records:
+    """What the compiled loop needs to know of the vehicle, but for the options."""
     config = np.zeros(1, CONFIG)
     config["max_angle"] = math.pi
     config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
@@ -268,23 +267,38 @@ def _new_core(vehicle: Vehicle, options: Options) -> Core:
     config["weight"] = 1.0
     known = known_range(vehicle)
     config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
+    return config
 
-    parameters = np.concatenate(model.parameters)
-    _set_options(config, parameters, options)
-    channels = np.zeros(len(vehicle.channels), CHANNEL)
+
+def _channel_rows(vehicle: Vehicle) -> tuple[Records, int]:
+    """A row for each channel, and the number of lines among them (a torque sensor counts as one)."""
+    rows = np.zeros(len(vehicle.channels), CHANNEL)
     lines = 0
-    for row, channel in zip(channels, vehicle.channels, strict=True):
+    for row, channel in zip(rows, vehicle.channels, strict=True):
         row["kind"] = int(channel.kind)
         if channel.kind is Kind.ANGLE:
             row["index"] = vehicle.sides.index(channel.name)
         elif channel.kind in (Kind.PRESSURE, Kind.TORQUE):
             row["index"] = lines
             lines += 1
-    if vehicle.hydraulics is not None:
-        table = CylinderTable(vehicle.hydraulics, vehicle.sides)
-        geometry, areas, line_index = table.geometry, table.areas, table.lines
-    else:
-        geometry, areas, line_index = np.zeros((0, 5)), np.zeros((0, 2)), np.zeros((0, 2), np.int64)
+    return rows, lines
+
+
+def _cylinders(vehicle: Vehicle) -> tuple[Array, Array, IntArray]:
+    """Geometry, areas and lines of the cylinders; empty without hydraulics."""
+    if vehicle.hydraulics is None:
+        return np.zeros((0, 5)), np.zeros((0, 2)), np.zeros((0, 2), np.int64)
+    table = CylinderTable(vehicle.hydraulics, vehicle.sides)
+    return table.geometry, table.areas, table.lines
+
+
+def _new_core(vehicle: Vehicle, options: Options) -> Core:
+    model = build_model(vehicle, lean=True)
+    sides = len(vehicle.sides)
+    config, parameters = _config(vehicle, model), np.concatenate(model.parameters)
+    _set_options(config, parameters, options)
+    channels, lines = _channel_rows(vehicle)
+    geometry, areas, line_index = _cylinders(vehicle)
     return Core(
         config=config,
         channels=channels,

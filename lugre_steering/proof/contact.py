@@ -99,6 +99,51 @@ class HiddenContact(NamedTuple):
     ambient_drift_from: float = -1e9
 
 
+class Cells(NamedTuple):
+    """Arrays of a running track: bristle deflection before and after a step [rad], temperature [degC], friction level [N m]
+    and stiffness [N m/rad] per patch (p,); Maxwell elements (6,), and temperatures from belt to carcass [degC] (3,)."""
+
+    z: Array
+    z_next: Array
+    T: Array
+    level: Array
+    stiffness: Array
+    chain: Array
+    sink: Array
+
+
+class Memory(NamedTuple):
+    """What a track has been through: contact angle [rad] and its rate [rad/s], the angle of the last turning point and
+    the way since; dwell [s], slip [rad], direction of the lugs, present and largest deflection [rad], flash and mean
+    temperature [K, degC]."""
+
+    theta: float
+    rate: float
+    turned_at: float
+    way: float
+    rest: float
+    slipped: float
+    lugs: float
+    stretch: float
+    largest: float
+    flash: float
+    mean_T: float
+
+
+class Moment(NamedTuple):
+    """What stays the same within a step of ``h`` from angle ``theta``, whatever the rate of the contact."""
+
+    h: float
+    theta: float
+    speed_up: float
+    kept: float
+    elastic_before: float
+    lossy: float
+    viscous: float
+    width: float
+    compliance: float
+
+
 def patches(sheet: Sheet, rng: np.random.Generator) -> Patches:
     """Quarter the footprint of every roller; each quarter sits at the centroid of its share of the ground pressure.
 
@@ -157,6 +202,220 @@ def _wind_up(torque: float, width: float, soft: float, compliance: float, stiffe
 
 
 @njit(cache=True)
+def _level_factor(t: float, m: Memory, hidden: HiddenContact) -> float:
+    """What direction, place, wear and dwell make of the friction level of all patches."""
+    factor = 1.0 + hidden.direction_asymmetry_a * _gate(t, hidden.direction_asymmetry_from) * m.lugs
+    where = t if hidden.surface_patch_in_time > 0.0 else m.theta
+    window = 0.5 * (
+        np.tanh((where - hidden.surface_patch_low) / hidden.surface_patch_edge)
+        - np.tanh((where - hidden.surface_patch_high) / hidden.surface_patch_edge)
+    )
+    factor *= 1.0 + hidden.surface_patch_amount * _gate(t, hidden.surface_patch_from) * window
+    worn = 1.0 - 1.0 / (1.0 + m.slipped / hidden.wear_polishing_slip_scale)
+    factor *= 1.0 - hidden.wear_polishing_amount * worn
+    aged = np.log(1.0 + m.rest / hidden.static_ageing_time)
+    factor *= 1.0 + hidden.static_ageing_rate * _gate(t, hidden.static_ageing_from) * aged
+    return factor
+
+
+@njit(cache=True)
+def _of_table(table: Array, temperature: float) -> float:
+    """Value of a row of the rubber table, linear between its nodes."""
+    place = (temperature - LOWEST_DEGC) / STEP_K
+    i = min(max(int(place), 0), table.size - 2)
+    value: float = table[i] + (place - i) * (table[i + 1] - table[i])
+    return value
+
+
+@njit(cache=True)
+def _sliding(rate: float, v: TrueVehicle) -> float:
+    """Stribeck curve of the whole track at its reference temperature [N m]."""
+    drop = (abs(rate) / v.stribeck_speed_rad_s) ** v.stribeck_exponent
+    curve: float = v.coulomb_torque_Nm + (v.static_torque_Nm - v.coulomb_torque_Nm) * np.exp(-drop)
+    return curve
+
+
+@njit(cache=True)
+def _set_levels(curve: float, hot: float, rubber: RubberTable, patch: Patches, cells: Cells) -> None:
+    """Friction level of each patch, from the state at the start of the step; ``hot``: the flash temperature [K]."""
+    for p in range(cells.level.size):
+        cells.level[p] = patch.torque_share[p] * curve * _of_table(rubber.loss_ratio, cells.T[p] + hot)
+
+
+@njit(cache=True)
+def _set_stiffness(
+    spread: float, stiffer: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, cells: Cells
+) -> None:
+    """Stiffness of each patch, from the state at the start of the step."""
+    for p in range(cells.stiffness.size):
+        soft = _of_table(rubber.storage, cells.T[p])
+        deviation = 1.0 + NATURAL_SPREAD * patch.natural[p] + spread * patch.graded[p]
+        cells.stiffness[p] = patch.torque_share[p] * v.stiffness_Nm_rad * soft * stiffer * max(deviation, 0.05)
+
+
+@njit(cache=True)
+def _speed_up(t: float, m: Memory, hidden: HiddenContact) -> float:
+    """How much sooner bristles follow: little moved since the last turning point (Payne), stretched as never before (Mullins)."""
+    small = 1.0 / (1.0 + (abs(m.theta - m.turned_at) / hidden.payne_softening_angle) ** 1.2)
+    virgin = np.exp(-(m.largest - m.stretch) / hidden.mullins_softening_width)
+    speed_up = 1.0 + hidden.payne_softening_amount * _gate(t, hidden.payne_softening_from) * small
+    speed_up *= 1.0 + hidden.mullins_softening_amount * _gate(t, hidden.mullins_softening_from) * virgin
+    return speed_up
+
+
+@njit(cache=True)
+def _moment(t: float, h: float, v: TrueVehicle, hidden: HiddenContact, m: Memory, cells: Cells) -> Moment:
+    relaxed = 0.0
+    for j in range(cells.chain.size):
+        relaxed += cells.chain[j]
+    relaxed *= hidden.stress_relaxation_share_per_decade * 0.5229
+    viscous = hidden.viscous_friction_sigma2 * _gate(t, hidden.viscous_friction_from)
+    # Exact at 0.1 rad/s; less than linear above, more below (Eyring).
+    viscous /= np.arcsinh(0.1 / hidden.viscous_friction_bend_speed) / 0.1
+    elastic_before, whole = 0.0, 0.0
+    for p in range(cells.z.size):
+        elastic_before += cells.stiffness[p] * cells.z[p]
+        whole += cells.stiffness[p]
+    # sigma1 ~ sqrt(sigma0(T)), shared like the stiffness
+    lossy = v.damping_Nms_rad / np.sqrt(whole * v.stiffness_Nm_rad)
+    width = hidden.backlash_width * _gate(t, hidden.backlash_from)
+    compliance = hidden.linkage_compliance_compliance * _gate(t, hidden.linkage_compliance_from)
+    return Moment(
+        h, m.theta, _speed_up(t, m, hidden), 1.0 - relaxed, elastic_before, lossy, viscous, width, compliance
+    )
+
+
+@njit(cache=True)
+def _torques(rate: float, now: Moment, v: TrueVehicle, hidden: HiddenContact, cells: Cells) -> tuple[float, float]:
+    """Friction torque at the end of a step at this rate of the contact, and the same with the aligning torque [N m]."""
+    elastic = _bristles(rate, now.h, now.speed_up, cells.stiffness, cells.level, cells.z, cells.z_next)
+    friction = (elastic * now.kept) + now.lossy * (elastic - now.elastic_before) / now.h
+    friction += now.viscous * np.arcsinh(rate / hidden.viscous_friction_bend_speed)
+    return friction, friction + v.aligning_torque_Nm * np.sin(now.theta + now.h * rate)
+
+
+@njit(cache=True)
+def _give_way(
+    sensor: float, rate: float, now: Moment, v: TrueVehicle, hidden: HiddenContact, cells: Cells
+) -> tuple[float, float, float]:
+    """Rate of the contact, and its torques, where play and springs give way between it and the angle ``sensor``.
+
+    False position, Illinois rule, around the expected ``rate``.
+    """
+    low_rate, high_rate, low_error, high_error = 0.0, 0.0, 0.0, 0.0
+    bracketed, width_of_search = 0, 0.003
+    trial = rate - width_of_search
+    friction, torque = 0.0, 0.0
+    for _ in range(60):
+        friction, torque = _torques(trial, now, v, hidden, cells)
+        soft, stiffening = hidden.backlash_soft_torque, hidden.linkage_compliance_stiffening_torque
+        lost = _wind_up(torque, now.width, soft, now.compliance, stiffening)
+        error = now.theta + now.h * trial + lost - sensor
+        if abs(error) < 1e-11:
+            break
+        if bracketed == 0:
+            if error < 0.0:
+                low_rate, low_error, bracketed = trial, error, 1
+                trial = rate + width_of_search
+            else:
+                width_of_search *= 3.0
+                trial = rate - width_of_search
+            continue
+        if bracketed == 1:
+            if error < 0.0:
+                low_rate, low_error = trial, error
+                width_of_search *= 3.0
+                trial = rate + width_of_search
+                continue
+            high_rate, high_error, bracketed = trial, error, 2
+        elif error < 0.0:
+            low_rate, low_error = trial, error
+            high_error *= 0.5  # Illinois rule: keep the false position method from stalling
+        else:
+            high_rate, high_error = trial, error
+            low_error *= 0.5
+        trial = (low_rate * high_error - high_rate * low_error) / (high_error - low_error)
+    return trial, friction, torque
+
+
+@njit(cache=True)
+def _rub(
+    t: float, rate: float, pull: float, now: Moment, v: TrueVehicle, hidden: HiddenContact, m: Memory,
+    patch: Patches, cells: Cells,
+) -> tuple[float, float]:  # fmt: skip
+    """Bristles and temperatures of the patches at the end of the step; slip [rad/s] and heating [W] of the track."""
+    lost_share = hidden.heat_partition_lost_share * _gate(t, hidden.heat_partition_from)
+    lost_share *= (abs(rate) / 0.1) ** 0.1  # quicker rubbing leaves relatively more heat in the ground
+    rise = hidden.ambient_drift_rise * _gate(t, hidden.ambient_drift_from)
+    since = max(t - max(hidden.ambient_drift_from, 0.0), 0.0)
+    air = v.air_degC + rise * (1.0 - np.exp(-since / hidden.ambient_drift_time))
+    slip, power, count = 0.0, 0.0, cells.z.size
+    for p in range(count):
+        speed = (cells.z_next[p] - cells.z[p]) / now.h
+        slip += patch.torque_share[p] * abs(rate - speed)
+        local = 0.5 * cells.stiffness[p] * (cells.z[p] + cells.z_next[p]) * (rate - speed)
+        local += now.lossy * cells.stiffness[p] * speed * rate
+        power += local
+        cooling = v.heat_loss_W_K * (cells.T[p] - air)
+        cells.T[p] += now.h * (
+            ((1.0 - lost_share) * local * count - cooling - pull * (m.mean_T - cells.sink[0])) / v.heat_capacity_J_K
+            - (cells.T[p] - m.mean_T) / MIXING_S
+        )
+        cells.z[p] = cells.z_next[p]
+    return slip, power
+
+
+@njit(cache=True)
+def _warm_carcass(pull: float, h: float, mean_T: float, hidden: HiddenContact, sink: Array) -> None:
+    """Heat that the belt gives to the carcass, node by node."""
+    node = hidden.carcass_heat_sink_capacity / _SINK_NODES
+    flow = pull * (mean_T - sink[0])
+    for j in range(_SINK_NODES):
+        onward = 6.0 * pull * (sink[j] - sink[j + 1]) if j + 1 < _SINK_NODES else 0.0
+        sink[j] += h * (flow - onward) / node
+        flow = onward
+
+
+@njit(cache=True)
+def _relax(t: float, rate: float, h: float, hidden: HiddenContact, chain: Array) -> None:
+    """Maxwell elements fill with time and are erased by motion."""
+    for j in range(chain.size):
+        erased = abs(rate) * chain[j] / hidden.stress_relaxation_erase_angle
+        chain[j] += h * ((1.0 - chain[j]) / _CHAIN_S[j] - erased)
+        if t < hidden.stress_relaxation_from:
+            chain[j] = 0.0
+
+
+@njit(cache=True)
+def _remember(
+    t: float, h: float, rate: float, slip: float, power: float, hidden: HiddenContact, m: Memory, patch: Patches, cells: Cells
+) -> Memory:
+    """The memory at the end of a step."""
+    warm, stretch = 0.0, 0.0
+    for p in range(cells.z.size):
+        warm += cells.T[p]
+        stretch += patch.torque_share[p] * abs(cells.z[p])
+    heated = hidden.flash_temperature_rise * np.sqrt(max(power, 0.0) / 3000.0)
+    theta, turned_at, way = m.theta + h * rate, m.turned_at, m.way
+    if rate * way < -1e-9:
+        way = -way
+        turned_at = theta
+    return Memory(
+        theta,
+        rate,
+        turned_at,
+        way,
+        m.rest + h * (1.0 - m.rest * slip / hidden.static_ageing_slip_scale),
+        m.slipped + h * slip * _gate(t, hidden.wear_polishing_from),
+        m.lugs + h * abs(rate) * (np.sign(rate) - m.lugs) / hidden.direction_asymmetry_turn_angle,
+        stretch,
+        max(m.largest, stretch),
+        m.flash + h * (heated - m.flash) / hidden.flash_temperature_time,
+        warm / cells.z.size,
+    )
+
+
+@njit(cache=True)
 def run_track(
     angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, hidden: HiddenContact,
     level_factor: Array | None = None, stiffness_factor: Array | None = None,
@@ -165,164 +424,40 @@ def run_track(
 
     The factors (n,), if any, are what an unlisted law makes of friction level and stiffness.
     """
-    n, count = angle.size, patch.torque_share.size
+    n, count, warm = angle.size, patch.torque_share.size, float(v.rubber_degC)
     friction, aligning, contact, heat = np.zeros(n), np.zeros(n), np.empty(n), np.empty(n)
-    z, z_next = np.zeros(count), np.zeros(count)
-    T = np.full(count, v.rubber_degC)
-    level, stiffness = np.empty(count), np.empty(count)
-    chain = np.zeros(len(_CHAIN_S))
-    sink = np.full(_SINK_NODES, v.rubber_degC)
-    mean_T, flash, air = v.rubber_degC, 0.0, v.air_degC
-    theta, torque = angle[0], v.aligning_torque_Nm * np.sin(angle[0])
-    contact[0], heat[0], aligning[0] = theta, mean_T, torque
-    previous_rate, sensor_rate, turned_at, way = 0.0, 0.0, theta, 1.0
-    rest, slipped, lugs, largest = 0.0, 0.0, 0.0, 0.0
-    damping = v.damping_Nms_rad
+    cells = Cells(
+        np.zeros(count), np.zeros(count), np.full(count, warm), np.empty(count), np.empty(count),
+        np.zeros(len(_CHAIN_S)), np.full(_SINK_NODES, warm),
+    )  # fmt: skip
+    m = Memory(angle[0], 0.0, angle[0], 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, warm)
+    contact[0], heat[0], aligning[0] = angle[0], warm, v.aligning_torque_Nm * np.sin(angle[0])
+    sensor_rate = 0.0
     loaded = hidden.backlash_width > 0.0 or hidden.linkage_compliance_compliance > 0.0
     for k in range(1, n):
         t = k * h
-        # Friction level and stiffness of each patch, from the state at the start of the step.
-        spread = hidden.distributed_contact_spread * _gate(t, hidden.distributed_contact_from)
-        factor = 1.0 + hidden.direction_asymmetry_a * _gate(t, hidden.direction_asymmetry_from) * lugs
-        where = t if hidden.surface_patch_in_time > 0.0 else theta
-        window = 0.5 * (
-            np.tanh((where - hidden.surface_patch_low) / hidden.surface_patch_edge)
-            - np.tanh((where - hidden.surface_patch_high) / hidden.surface_patch_edge)
-        )
-        factor *= 1.0 + hidden.surface_patch_amount * _gate(t, hidden.surface_patch_from) * window
-        worn = 1.0 - 1.0 / (1.0 + slipped / hidden.wear_polishing_slip_scale)
-        factor *= 1.0 - hidden.wear_polishing_amount * worn
-        aged = np.log(1.0 + rest / hidden.static_ageing_time)
-        factor *= 1.0 + hidden.static_ageing_rate * _gate(t, hidden.static_ageing_from) * aged
-        stiffer = 1.0
+        factor, stiffer = _level_factor(t, m, hidden), 1.0
         if level_factor is not None and stiffness_factor is not None:
             factor *= level_factor[k]
             stiffer = stiffness_factor[k]
-        rate = previous_rate + (angle[k] - angle[k - 1]) / h - sensor_rate  # exact when nothing gives way
+        rate = m.rate + (angle[k] - angle[k - 1]) / h - sensor_rate  # exact when nothing gives way
         sensor_rate = (angle[k] - angle[k - 1]) / h
-        drop = (abs(rate) / v.stribeck_speed_rad_s) ** v.stribeck_exponent
-        curve = factor * (v.coulomb_torque_Nm + (v.static_torque_Nm - v.coulomb_torque_Nm) * np.exp(-drop))
-        hot = flash * _gate(t, hidden.flash_temperature_from)
-        for p in range(count):
-            place = (T[p] + hot - LOWEST_DEGC) / STEP_K
-            i = min(max(int(place), 0), rubber.storage.size - 2)
-            level[p] = patch.torque_share[p] * curve * (
-                rubber.loss_ratio[i] + (place - i) * (rubber.loss_ratio[i + 1] - rubber.loss_ratio[i])
-            )
-            place = (T[p] - LOWEST_DEGC) / STEP_K
-            i = min(max(int(place), 0), rubber.storage.size - 2)
-            soft = rubber.storage[i] + (place - i) * (rubber.storage[i + 1] - rubber.storage[i])
-            deviation = 1.0 + NATURAL_SPREAD * patch.natural[p] + spread * patch.graded[p]
-            stiffness[p] = patch.torque_share[p] * v.stiffness_Nm_rad * soft * stiffer * max(deviation, 0.05)
-        stretch = 0.0
-        for p in range(count):
-            stretch += patch.torque_share[p] * abs(z[p])
-        small = 1.0 / (1.0 + (abs(theta - turned_at) / hidden.payne_softening_angle) ** 1.2)
-        virgin = np.exp(-(largest - stretch) / hidden.mullins_softening_width)
-        speed_up = 1.0 + hidden.payne_softening_amount * _gate(t, hidden.payne_softening_from) * small
-        speed_up *= 1.0 + hidden.mullins_softening_amount * _gate(t, hidden.mullins_softening_from) * virgin
-        relaxed = 0.0
-        for j in range(chain.size):
-            relaxed += chain[j]
-        relaxed *= hidden.stress_relaxation_share_per_decade * 0.5229
-        viscous = hidden.viscous_friction_sigma2 * _gate(t, hidden.viscous_friction_from)
-        bend = hidden.viscous_friction_bend_speed
-        viscous /= np.arcsinh(0.1 / bend) / 0.1  # exact at 0.1 rad/s; less than linear above, more below (Eyring)
-        elastic_before, whole = 0.0, 0.0
-        for p in range(count):
-            elastic_before += stiffness[p] * z[p]
-            whole += stiffness[p]
-        lossy = damping / np.sqrt(whole * v.stiffness_Nm_rad)  # sigma1 ~ sqrt(sigma0(T)), shared like the stiffness
-        width = hidden.backlash_width * _gate(t, hidden.backlash_from)
-        compliance = hidden.linkage_compliance_compliance * _gate(t, hidden.linkage_compliance_from)
-        # The rate of the contact: the sensor's, unless something between the two gives way under the torque.
-        low_rate, high_rate, low_error, high_error = 0.0, 0.0, 0.0, 0.0
-        bracketed, width_of_search = 0, 0.003
-        trial = rate - width_of_search if loaded else (angle[k] - theta) / h
-        for _ in range(60):
-            elastic = _bristles(trial, h, speed_up, stiffness, level, z, z_next)
-            part = (elastic * (1.0 - relaxed)) + lossy * (elastic - elastic_before) / h
-            part += viscous * np.arcsinh(trial / bend)
-            torque = part + v.aligning_torque_Nm * np.sin(theta + h * trial)
-            if not loaded:
-                break
-            lost = _wind_up(
-                torque, width, hidden.backlash_soft_torque, compliance, hidden.linkage_compliance_stiffening_torque
-            )
-            error = theta + h * trial + lost - angle[k]
-            if abs(error) < 1e-11:
-                break
-            if bracketed == 0:
-                if error < 0.0:
-                    low_rate, low_error, bracketed = trial, error, 1
-                    trial = rate + width_of_search
-                else:
-                    width_of_search *= 3.0
-                    trial = rate - width_of_search
-                continue
-            if bracketed == 1:
-                if error < 0.0:
-                    low_rate, low_error = trial, error
-                    width_of_search *= 3.0
-                    trial = rate + width_of_search
-                    continue
-                high_rate, high_error, bracketed = trial, error, 2
-            elif error < 0.0:
-                low_rate, low_error = trial, error
-                high_error *= 0.5  # Illinois rule: keep the false position method from stalling
-            else:
-                high_rate, high_error = trial, error
-                low_error *= 0.5
-            trial = (low_rate * high_error - high_rate * low_error) / (high_error - low_error)
-        rate = trial
-        friction[k] = part
-        aligning[k] = torque - part
-        theta += h * rate
-        # Memories: direction of the lugs, dwell, slip, relaxation, last turning point.
-        slip, power, warm = 0.0, 0.0, 0.0
-        lost_share = hidden.heat_partition_lost_share * _gate(t, hidden.heat_partition_from)
-        lost_share *= (abs(rate) / 0.1) ** 0.1  # quicker rubbing leaves relatively more heat in the ground
+        hot = m.flash * _gate(t, hidden.flash_temperature_from)
+        _set_levels(factor * _sliding(rate, v), hot, rubber, patch, cells)
+        spread = hidden.distributed_contact_spread * _gate(t, hidden.distributed_contact_from)
+        _set_stiffness(spread, stiffer, v, rubber, patch, cells)
+        now = _moment(t, h, v, hidden, m, cells)
+        if loaded:
+            rate, part, torque = _give_way(angle[k], rate, now, v, hidden, cells)
+        else:
+            rate = (angle[k] - m.theta) / h
+            part, torque = _torques(rate, now, v, hidden, cells)
+        friction[k], aligning[k] = part, torque - part
         pull = hidden.carcass_heat_sink_conductance * _gate(t, hidden.carcass_heat_sink_from)
-        rise = hidden.ambient_drift_rise * _gate(t, hidden.ambient_drift_from)
-        since = max(t - max(hidden.ambient_drift_from, 0.0), 0.0)
-        air = v.air_degC + rise * (1.0 - np.exp(-since / hidden.ambient_drift_time))
-        stretch = 0.0
-        for p in range(count):
-            speed = (z_next[p] - z[p]) / h
-            slip += patch.torque_share[p] * abs(rate - speed)
-            local = 0.5 * stiffness[p] * (z[p] + z_next[p]) * (rate - speed)
-            local += lossy * stiffness[p] * speed * rate
-            power += local
-            T[p] += h * (
-                ((1.0 - lost_share) * local * count - v.heat_loss_W_K * (T[p] - air) - pull * (mean_T - sink[0]))
-                / v.heat_capacity_J_K
-                - (T[p] - mean_T) / MIXING_S
-            )
-            warm += T[p]
-            z[p] = z_next[p]
-            stretch += patch.torque_share[p] * abs(z[p])
+        slip, power = _rub(t, rate, pull, now, v, hidden, m, patch, cells)
         if hidden.carcass_heat_sink_conductance > 0.0:
-            node = hidden.carcass_heat_sink_capacity / _SINK_NODES
-            flow = pull * (mean_T - sink[0])
-            for j in range(_SINK_NODES):
-                onward = 6.0 * pull * (sink[j] - sink[j + 1]) if j + 1 < _SINK_NODES else 0.0
-                sink[j] += h * (flow - onward) / node
-                flow = onward
-        mean_T = warm / count
-        largest = max(largest, stretch)
-        rest += h * (1.0 - rest * slip / hidden.static_ageing_slip_scale)
-        slipped += h * slip * _gate(t, hidden.wear_polishing_from)
-        lugs += h * abs(rate) * (np.sign(rate) - lugs) / hidden.direction_asymmetry_turn_angle
-        for j in range(chain.size):
-            erased = abs(rate) * chain[j] / hidden.stress_relaxation_erase_angle
-            chain[j] += h * ((1.0 - chain[j]) / _CHAIN_S[j] - erased)
-            if t < hidden.stress_relaxation_from:
-                chain[j] = 0.0
-        heated = hidden.flash_temperature_rise * np.sqrt(max(power, 0.0) / 3000.0)
-        flash += h * (heated - flash) / hidden.flash_temperature_time
-        if rate * way < -1e-9:
-            way = -way
-            turned_at = theta
-        previous_rate = rate
-        contact[k], heat[k] = theta, mean_T
+            _warm_carcass(pull, h, m.mean_T, hidden, cells.sink)
+        _relax(t, rate, h, hidden, cells.chain)
+        m = _remember(t, h, rate, slip, power, hidden, m, patch, cells)
+        contact[k], heat[k] = m.theta, m.mean_T
     return Track(friction, aligning, contact, heat)

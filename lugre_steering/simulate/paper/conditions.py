@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -37,6 +38,11 @@ def _list(values: Array, digits: int = 0) -> str:
     return ", ".join(f"{x:.{digits}f}" for x in values)
 
 
+def _by(unit: str, values: tuple[float, ...], x: Array, series: Iterable[Array]) -> tuple[Curve, ...]:
+    """A curve over ``x`` for each value that was tried."""
+    return tuple(Curve(f"{value:g} {unit}", x, y) for value, y in zip(values, series, strict=True))
+
+
 def ambient(bench: Bench) -> Outcome:
     """Ambient and initial rubber temperature from -20 to 40 degC (the paper's figure 11)."""
     motion = motion_of(BUILT_IN["double-cycle"], bench.vehicle)
@@ -58,23 +64,19 @@ def ambient(bench: Bench) -> Outcome:
             bool(np.all(np.diff(spread) < 0.0)),
         ),
     )
+    heated = [run.tracks["temperature"][0] for run in runs]
     panels = (
         Panel(
             "steering torque of the double steering cycle",
             "time (s)",
             "torque (kN m)",
-            tuple(
-                Curve(f"{t:g} degC", motion.time, run.torque * 1e-3) for t, run in zip(AMBIENT_DEGC, runs, strict=True)
-            ),
+            _by("degC", AMBIENT_DEGC, motion.time, [run.torque * 1e-3 for run in runs]),
         ),
         Panel(
             "rubber temperature, left track",
             "time (s)",
             "temperature (degC)",
-            tuple(
-                Curve(f"{t:g} degC", motion.time, run.tracks["temperature"][0])
-                for t, run in zip(AMBIENT_DEGC, runs, strict=True)
-            ),
+            _by("degC", AMBIENT_DEGC, motion.time, heated),
         ),
     )
     ratio = float(table[0, 0] / table[AMBIENT_DEGC.index(20.0), 0])
@@ -106,49 +108,6 @@ def rate(bench: Bench) -> Outcome:
     )
     residual = np.array([abs(run.torque[-1]) for run in runs])
     early = np.array([_at_angle(run, sweeps(run.motion)[3], AFTER_REVERSAL_DEG - LIMIT_DEG) for run in runs])
-    grid = np.linspace(1.0, 2.0 * LIMIT_DEG - 1.0, 200)
-    swept = np.array([[_at_angle(run, sweeps(run.motion)[3], a - LIMIT_DEG) for a in grid] for run in runs])
-    difference = (swept - swept[-1]) * 1e-3
-    checks = (
-        Check(
-            "faster = less torque at the same angle (neutral and beyond, each full sweep)",
-            "torque decreases gradually",
-            f"{_list(table[:, -1])} N m at 20 deg, last full sweep",
-            bool(np.all(np.diff(table, axis=0) < 0.0)),
-        ),
-        Check(
-            "faster = less residual torque at neutral",
-            "residual torque decreases",
-            f"{_list(residual)} N m",
-            bool(np.all(np.diff(residual) < 0.0)),
-        ),
-    )
-    panels = (
-        Panel(
-            "torque over angle",
-            "mean steering angle (deg)",
-            "torque (kN m)",
-            tuple(
-                Curve(f"{r:g} deg/s", np.degrees(run.motion.theta.mean(axis=0)), run.torque * 1e-3)
-                for r, run in zip(RATES_DEG_S, runs, strict=True)
-            ),
-        ),
-        Panel(
-            "last full sweep: torque above that at 10 deg/s",
-            "angle since the start of the sweep (deg)",
-            "difference (kN m)",
-            tuple(Curve(f"{r:g} deg/s", grid, above) for r, above in zip(RATES_DEG_S, difference, strict=True)),
-        ),
-        Panel(
-            "over the steering rate, last full sweep",
-            "mean steering rate (deg/s)",
-            "torque (kN m)",
-            (
-                Curve("at 20 deg", np.array(RATES_DEG_S), table[:, -1] * 1e-3),
-                Curve("residual at neutral", np.array(RATES_DEG_S), residual * 1e-3),
-            ),
-        ),
-    )
     fall = table[:, -1]
     notes = (
         f"{100 * float((fall[0] - fall[1]) / (fall[0] - fall[-1])):.0f} % of the fall from 2 to 10 deg/s lies "
@@ -164,7 +123,56 @@ def rate(bench: Bench) -> Outcome:
     )
     columns = ("rate (deg/s)", *(f"torque at {a:g} deg (N m)" for a in PAST_NEUTRAL_DEG), "residual at neutral (N m)")
     return Outcome(
-        "paper-rate", "Influence of the steering rate", columns, rows, checks, panels, bench.calibrated, notes
+        "paper-rate",
+        "Influence of the steering rate",
+        columns,
+        rows,
+        _rate_checked(table, residual),
+        _rate_drawn(runs, fall, residual),
+        bench.calibrated,
+        notes,
+    )
+
+
+def _rate_checked(table: Array, residual: Array) -> tuple[Check, ...]:
+    """Checks of the torques [N m] past neutral (rates, points) and of those left at neutral (rates,)."""
+    return (
+        Check(
+            "faster = less torque at the same angle (neutral and beyond, each full sweep)",
+            "torque decreases gradually",
+            f"{_list(table[:, -1])} N m at 20 deg, last full sweep",
+            bool(np.all(np.diff(table, axis=0) < 0.0)),
+        ),
+        Check(
+            "faster = less residual torque at neutral",
+            "residual torque decreases",
+            f"{_list(residual)} N m",
+            bool(np.all(np.diff(residual) < 0.0)),
+        ),
+    )
+
+
+def _rate_drawn(runs: list[plant.Truth], at_20_deg: Array, residual: Array) -> tuple[Panel, ...]:
+    """Torque over angle, its difference to the fastest run, and torques [N m] (rates,) over the rate."""
+    grid = np.linspace(1.0, 2.0 * LIMIT_DEG - 1.0, 200)
+    swept = np.array([[_at_angle(run, sweeps(run.motion)[3], a - LIMIT_DEG) for a in grid] for run in runs])
+    over_angle = tuple(
+        Curve(f"{r:g} deg/s", np.degrees(run.motion.theta.mean(axis=0)), run.torque * 1e-3)
+        for r, run in zip(RATES_DEG_S, runs, strict=True)
+    )
+    over_rate = (
+        Curve("at 20 deg", np.array(RATES_DEG_S), at_20_deg * 1e-3),
+        Curve("residual at neutral", np.array(RATES_DEG_S), residual * 1e-3),
+    )
+    return (
+        Panel("torque over angle", "mean steering angle (deg)", "torque (kN m)", over_angle),
+        Panel(
+            "last full sweep: torque above that at 10 deg/s",
+            "angle since the start of the sweep (deg)",
+            "difference (kN m)",
+            _by("deg/s", RATES_DEG_S, grid, (swept - swept[-1]) * 1e-3),
+        ),
+        Panel("over the steering rate, last full sweep", "mean steering rate (deg/s)", "torque (kN m)", over_rate),
     )
 
 
@@ -223,40 +231,18 @@ def six_cycles(bench: Bench) -> Outcome:
 
 def pavement(bench: Bench) -> Outcome:
     """Pavements of the shipped table (the paper's figure 14), scaled by the calibrated friction level."""
-    table, factor = pavements(), bench.calibrated["friction level factor"]
-    motion = motion_of(BUILT_IN["double-cycle"], bench.vehicle)
-    runs: dict[str, plant.Truth] = {}
-    assert bench.vehicle.friction is not None
-    for name in (name for group in RANKING for name in group):
-        friction = dataclasses.replace(
-            bench.vehicle.friction, static=factor * table[name]["static"], coulomb=factor * table[name]["coulomb"]
-        )
-        runs[name] = plant.run(bench.vehicle.replace(friction=friction), motion)
+    table, runs = pavements(), _on_pavements(bench)
     peaks = {name: extremes(run) for name, run in runs.items()}
-    ranked = all(bool(np.all(peaks[a] > peaks[b])) for upper, lower in pairwise(RANKING) for a in upper for b in lower)
-    order = sorted(peaks, key=lambda name: -float(peaks[name][0]))
-    falling = all(bool(np.all(np.diff(p) < 0.0)) for p in peaks.values())
-    checks = (
-        Check(
-            "ranking at all four extremes",
-            "dry concrete or asphalt > wet asphalt > wet concrete > dry dirt > gravel",
-            " > ".join(f"{name.replace('_', ' ')} {peaks[name][0] * 1e-3:.1f}" for name in order) + " kN m",
-            ranked,
-        ),
-        Check(
-            "the torque falls in the course of steering on each",
-            "decreases gradually",
-            "all six" if falling else "no",
-            falling,
-        ),
-    )
-    shown = [name for name in runs if name != "dry_asphalt"]
     panels = (
         Panel(
             "steering torque of the double steering cycle",
             "time (s)",
             "torque (kN m)",
-            tuple(Curve(name.replace("_", " "), motion.time, runs[name].torque * 1e-3) for name in shown),
+            tuple(
+                Curve(name.replace("_", " "), run.motion.time, run.torque * 1e-3)
+                for name, run in runs.items()
+                if name != "dry_asphalt"
+            ),
         ),
     )
     assumed = ", ".join(name.replace("_", " ") for name in runs if table[name]["source"] == "assumed")
@@ -269,16 +255,52 @@ def pavement(bench: Bench) -> Outcome:
         "dry asphalt has the same coefficients as dry concrete and is not drawn.",
     )
     rows = tuple(
-        (
-            name.replace("_", " "),
-            table[name]["static"],
-            table[name]["coulomb"],
-            table[name]["source"],
-            *map(float, peaks[name]),
-        )
-        for name in runs
+        (name.replace("_", " "), *(table[name][key] for key in ("static", "coulomb", "source")), *map(float, peak))
+        for name, peak in peaks.items()
     )
     columns = ("pavement", "static", "Coulomb", "source", *(f"extreme {i} (N m)" for i in (1, 2, 3, 4)))
     return Outcome(
-        "paper-pavements", "Influence of the pavement", columns, rows, checks, panels, bench.calibrated, notes
+        "paper-pavements",
+        "Influence of the pavement",
+        columns,
+        rows,
+        _pavement_checked(peaks),
+        panels,
+        bench.calibrated,
+        notes,
+    )
+
+
+def _on_pavements(bench: Bench) -> dict[str, plant.Truth]:
+    """The double steering cycle on every pavement of RANKING."""
+    table, factor = pavements(), bench.calibrated["friction level factor"]
+    motion = motion_of(BUILT_IN["double-cycle"], bench.vehicle)
+    runs: dict[str, plant.Truth] = {}
+    assert bench.vehicle.friction is not None
+    for name in (name for group in RANKING for name in group):
+        friction = dataclasses.replace(
+            bench.vehicle.friction, static=factor * table[name]["static"], coulomb=factor * table[name]["coulomb"]
+        )
+        runs[name] = plant.run(bench.vehicle.replace(friction=friction), motion)
+    return runs
+
+
+def _pavement_checked(peaks: dict[str, Array]) -> tuple[Check, ...]:
+    """Checks of the four extremes [N m] of each pavement."""
+    ranked = all(bool(np.all(peaks[a] > peaks[b])) for upper, lower in pairwise(RANKING) for a in upper for b in lower)
+    order = sorted(peaks, key=lambda name: -float(peaks[name][0]))
+    falling = all(bool(np.all(np.diff(p) < 0.0)) for p in peaks.values())
+    return (
+        Check(
+            "ranking at all four extremes",
+            "dry concrete or asphalt > wet asphalt > wet concrete > dry dirt > gravel",
+            " > ".join(f"{name.replace('_', ' ')} {peaks[name][0] * 1e-3:.1f}" for name in order) + " kN m",
+            ranked,
+        ),
+        Check(
+            "the torque falls in the course of steering on each",
+            "decreases gradually",
+            "all six" if falling else "no",
+            falling,
+        ),
     )

@@ -45,8 +45,34 @@ def double_cycle(bench: Bench) -> Outcome:
             ("Mc", "Mf", "Mi", "Ml"), PUBLISHED_EXTREMES_NM, ours, errors, arrived, flat, strict=False
         )
     )
+    columns = (
+        "extreme",
+        "published (N m)",
+        "improved (N m)",
+        "error (%)",
+        "improved at arrival (N m)",
+        "original (N m)",
+    )
+    panels = (
+        _angles(motion.time, motion.theta, bench),
+        _torque("steering torque", _published(improved), improved, plain),
+        _enlarged(ours, flat),
+    )
+    return Outcome(
+        "paper-extremes",
+        "Double steering cycle on dry concrete",
+        columns,
+        rows,
+        _extremes_checked(ours, flat, errors),
+        panels,
+        bench.calibrated,
+        _extremes_noted(ours),
+    )
+
+
+def _extremes_checked(ours: Array, flat: Array, errors: Array) -> tuple[Check, ...]:
     spread = float((flat.max() - flat.min()) / flat.mean())
-    checks = (
+    return (
         Check(
             f"each extreme within {100 * TOLERANCE:g} %",
             ", ".join(f"{x:.0f}" for x in PUBLISHED_EXTREMES_NM) + " N m",
@@ -60,37 +86,12 @@ def double_cycle(bench: Bench) -> Outcome:
             spread <= EQUAL,
         ),
     )
-    marks = sweeps(motion)[:4]
-    sign = np.array([direction(motion, s) for s in marks])
-    peaks = [s.start + int((d * improved.torque[s]).argmax()) for s, d in zip(marks, sign, strict=True)]
-    number = np.arange(1.0, 5.0)
-    at, signed = motion.time[peaks], np.array(PUBLISHED_EXTREMES_NM) * sign
-    panels = (
-        _angles(motion.time, motion.theta, bench),
-        Panel(
-            "steering torque",
-            "time (s)",
-            "torque (kN m)",
-            (
-                Curve("published extremes", at, signed * 1e-3, "points"),
-                Curve("improved LuGre", motion.time, improved.torque * 1e-3, "improved"),
-                Curve("original LuGre", motion.time, plain.torque * 1e-3, "original"),
-            ),
-        ),
-        Panel(
-            "the four extremes, enlarged",
-            "number of the extreme",
-            "size of the torque (kN m)",
-            (
-                Curve("published", number, np.array(PUBLISHED_EXTREMES_NM) * 1e-3, "points"),
-                Curve("improved LuGre", number, ours * 1e-3, "improved"),
-                Curve("original LuGre", number, flat * 1e-3, "original"),
-            ),
-        ),
-    )
+
+
+def _extremes_noted(ours: Array) -> tuple[str, ...]:
     steps = -np.diff(ours) / ours[0]
     published_steps = -np.diff(PUBLISHED_EXTREMES_NM) / PUBLISHED_EXTREMES_NM[0]
-    notes = (
+    return (
         f"published drops are uneven ({_percent(published_steps)} of Mc); heating alone gives nearly even ones "
         f"({_percent(steps)}), so Mi is "
         "the worst fit. The uneven part hints at a difference between the two directions, which the model has no "
@@ -98,24 +99,6 @@ def double_cycle(bench: Bench) -> Outcome:
         f"the paper's limit angle is lost: {LIMIT_DEG:g} deg mean (inner track 32 deg) and 3 s holds are assumed. "
         f"The original "
         "LuGre's first extreme is slightly lower because its first sweep is only half as long.",
-    )
-    columns = (
-        "extreme",
-        "published (N m)",
-        "improved (N m)",
-        "error (%)",
-        "improved at arrival (N m)",
-        "original (N m)",
-    )
-    return Outcome(
-        "paper-extremes",
-        "Double steering cycle on dry concrete",
-        columns,
-        rows,
-        checks,
-        panels,
-        bench.calibrated,
-        notes,
     )
 
 
@@ -126,6 +109,37 @@ def _percent(values: Array) -> str:
 def _angles(time: Array, theta: Array, bench: Bench) -> Panel:
     curves = tuple(Curve(side, time, np.degrees(row)) for side, row in zip(bench.vehicle.sides, theta, strict=True))
     return Panel("steering angles of the tracks (Ackermann)", "time (s)", "angle (deg)", curves)
+
+
+def _published(improved: plant.Truth) -> Curve:
+    """The published extremes at the instants at which the torque of the improved model peaks."""
+    motion = improved.motion
+    marks = sweeps(motion)[:4]
+    sign = np.array([direction(motion, s) for s in marks])
+    peaks = [s.start + int((d * improved.torque[s]).argmax()) for s, d in zip(marks, sign, strict=True)]
+    at, signed = motion.time[peaks], np.array(PUBLISHED_EXTREMES_NM) * sign
+    return Curve("published extremes", at, signed * 1e-3, "points")
+
+
+def _torque(title: str, beside: Curve, improved: plant.Truth, plain: plant.Truth) -> Panel:
+    """Both models over time, with a curve to compare them with."""
+    time = improved.motion.time
+    curves = (
+        beside,
+        Curve("improved LuGre", time, improved.torque * 1e-3, "improved"),
+        Curve("original LuGre", time, plain.torque * 1e-3, "original"),
+    )
+    return Panel(title, "time (s)", "torque (kN m)", curves)
+
+
+def _enlarged(ours: Array, flat: Array) -> Panel:
+    number = np.arange(1.0, 5.0)
+    curves = (
+        Curve("published", number, np.array(PUBLISHED_EXTREMES_NM) * 1e-3, "points"),
+        Curve("improved LuGre", number, ours * 1e-3, "improved"),
+        Curve("original LuGre", number, flat * 1e-3, "original"),
+    )
+    return Panel("the four extremes, enlarged", "number of the extreme", "size of the torque (kN m)", curves)
 
 
 def composition(bench: Bench) -> Outcome:
@@ -139,8 +153,34 @@ def composition(bench: Bench) -> Outcome:
         peaks.append([float(np.abs(truth.part(part)).max()) for part in PARTS])
     share, peak = np.array(shares), np.array(peaks)
     rows = tuple((rate, *map(float, s), *map(float, p)) for rate, s, p in zip(RATES_DEG_S, share, peak, strict=True))
+    truth = plant.run(bench.vehicle, motion_of(BUILT_IN["double-cycle"], bench.vehicle))
     middle = RATES_DEG_S.index(6.0)
-    checks = (
+    notes = (
+        f"at 6 deg/s damping peaks at {peak[middle, 1]:.0f} N m just after each reversal but vanishes in steady "
+        f"sliding (dz/dt = 0, no "
+        f"viscous term), so its mean share, {share[middle, 1]:.2f} %, is below the aligning torque's, "
+        f"{share[middle, 2]:.2f} %.",
+    )
+    columns = (
+        "rate (deg/s)",
+        *(f"{part} share (%)" for part in PARTS),
+        *(f"{part} peak (N m)" for part in PARTS),
+    )
+    return Outcome(
+        "paper-composition",
+        "Composition of the torque",
+        columns,
+        rows,
+        _composition_checked(share, peak),
+        _composition_drawn(truth, peak),
+        bench.calibrated,
+        notes,
+    )
+
+
+def _composition_checked(share: Array, peak: Array) -> tuple[Check, ...]:
+    """Checks of mean shares [%] and peaks [N m] (rates, parts)."""
+    return (
         Check(
             "the elastic part dominates",
             "friction is mainly elastic",
@@ -160,40 +200,21 @@ def composition(bench: Bench) -> Outcome:
             bool(share[:, 2].max() < 5.0),
         ),
     )
-    motion = motion_of(BUILT_IN["double-cycle"], bench.vehicle)
-    truth = plant.run(bench.vehicle, motion)
-    small = tuple(Curve(part, motion.time, truth.part(part) * 1e-3) for part in PARTS[1:])
-    panels = (
-        Panel(
-            "torque and its elastic part",
-            "time (s)",
-            "torque (kN m)",
-            (
-                Curve("total", motion.time, truth.torque * 1e-3, "test"),
-                Curve("elastic", motion.time, truth.part("elastic") * 1e-3, "improved"),
-            ),
-        ),
+
+
+def _composition_drawn(truth: plant.Truth, peak: Array) -> tuple[Panel, ...]:
+    """The parts over time, and the peaks [N m] (rates, parts) of the small ones over the rate."""
+    time = truth.motion.time
+    whole = (
+        Curve("total", time, truth.torque * 1e-3, "test"),
+        Curve("elastic", time, truth.part("elastic") * 1e-3, "improved"),
+    )
+    small = tuple(Curve(part, time, truth.part(part) * 1e-3) for part in PARTS[1:])
+    peaks = tuple(Curve(part, np.array(RATES_DEG_S), peak[:, i] * 1e-3) for i, part in enumerate(PARTS) if i)
+    return (
+        Panel("torque and its elastic part", "time (s)", "torque (kN m)", whole),
         Panel("the small parts, enlarged", "time (s)", "torque (kN m)", small),
-        Panel(
-            "peak of the small parts over the steering rate",
-            "mean steering rate (deg/s)",
-            "torque (kN m)",
-            tuple(Curve(part, np.array(RATES_DEG_S), peak[:, i] * 1e-3) for i, part in enumerate(PARTS) if i),
-        ),
-    )
-    notes = (
-        f"at 6 deg/s damping peaks at {peak[middle, 1]:.0f} N m just after each reversal but vanishes in steady "
-        f"sliding (dz/dt = 0, no "
-        f"viscous term), so its mean share, {share[middle, 1]:.2f} %, is below the aligning torque's, "
-        f"{share[middle, 2]:.2f} %.",
-    )
-    columns = (
-        "rate (deg/s)",
-        *(f"{part} share (%)" for part in PARTS),
-        *(f"{part} peak (N m)" for part in PARTS),
-    )
-    return Outcome(
-        "paper-composition", "Composition of the torque", columns, rows, checks, panels, bench.calibrated, notes
+        Panel("peak of the small parts over the steering rate", "mean steering rate (deg/s)", "torque (kN m)", peaks),
     )
 
 
@@ -207,25 +228,51 @@ def limit_stop(bench: Bench) -> Outcome:
     residual = measured - np.interp(stamp_s, motion.time, improved.torque)
     inner = np.interp(stamp_s, motion.time, np.abs(motion.theta).max(axis=0))
     floor = float(np.sqrt(np.mean(residual[inner < limit_device().parameters["engage_angle"]] ** 2)))
-    stop = run.truth.part("parallel")
-    rows, risen = [], []
+    rows = _holds(run, stamp_s, measured, residual)
+    beside = Curve("measured (synthetic)", stamp_s, measured * 1e-3, "test")
+    left = (
+        Curve("residual", stamp_s, residual * 1e-3),
+        Curve("true torque of the stop", motion.time, run.truth.part("parallel") * 1e-3, "improved"),
+    )
+    panels = (
+        _torque("steering torque", beside, improved, plain),
+        Panel("cylinder torque minus improved LuGre", "time (s)", "torque (kN m)", left),
+    )
+    size = ", ".join(f"{name} {value:g}" for name, value in limit_device().parameters.items())
+    notes = (
+        "no field recording of the paper is available: the black curve is this project's own simulation with an "
+        "elastic end stop "
+        f"added ({size}; SI), its size an assumption; the baseline does not know of it.",
+    )
+    columns = ("hold", "measured (N m)", "improved LuGre (N m)", "rise (N m)", "true stop torque (N m)")
+    title = "Torque while held at the limit stops"
+    checks = _holds_checked([rise for _, _, _, rise, _ in rows], floor, float(np.ptp(measured)))
+    return Outcome("paper-limit-stop", title, columns, rows, checks, panels, bench.calibrated, notes)
+
+
+def _holds(
+    run: Simulated, stamp_s: Array, measured: Array, residual: Array
+) -> tuple[tuple[int, float, float, float, float], ...]:
+    """Per hold at a limit its number, measured and modelled torque, their difference, and the stop's true torque [N m]."""
+    motion, stop = run.truth.motion, run.truth.part("parallel")
+    rows = []
     for i, (a, b) in enumerate(zip(sweeps(motion)[:4], sweeps(motion)[1:], strict=False)):
         begin, end = motion.time[a.stop], motion.time[b.start]
         held = (stamp_s > begin) & (stamp_s < end)
         side = float(np.sign(motion.theta[0, a.stop]))
-        rise = side * float(np.mean(residual[held]))
-        risen.append(rise)
-        true = side * float(np.interp(0.5 * (begin + end), motion.time, stop))
-        rows.append(
-            (
-                i + 1,
-                side * float(np.mean(measured[held])),
-                side * float(np.mean((measured - residual)[held])),
-                rise,
-                true,
-            )
-        )
-    checks = (
+        rows.append((
+            i + 1,
+            side * float(np.mean(measured[held])),
+            side * float(np.mean((measured - residual)[held])),
+            side * float(np.mean(residual[held])),
+            side * float(np.interp(0.5 * (begin + end), motion.time, stop)),
+        ))  # fmt: skip
+    return tuple(rows)
+
+
+def _holds_checked(risen: list[float], floor: float, span: float) -> tuple[Check, ...]:
+    """Checks of the rises [N m] against the error ``floor`` elsewhere and the ``span`` of the measured torque [N m]."""
+    return (
         Check(
             "measured rises above the model at each held limit",
             "big difference between simulated and measured torque",
@@ -236,39 +283,9 @@ def limit_stop(bench: Bench) -> Outcome:
             "and agrees with it elsewhere",
             "good agreement",
             f"{floor:.0f} N m RMS below the angle where the stop engages",
-            floor < 0.005 * float(np.ptp(measured)),
+            floor < 0.005 * span,
         ),
     )
-    panels = (
-        Panel(
-            "steering torque",
-            "time (s)",
-            "torque (kN m)",
-            (
-                Curve("measured (synthetic)", stamp_s, measured * 1e-3, "test"),
-                Curve("improved LuGre", motion.time, improved.torque * 1e-3, "improved"),
-                Curve("original LuGre", motion.time, plain.torque * 1e-3, "original"),
-            ),
-        ),
-        Panel(
-            "cylinder torque minus improved LuGre",
-            "time (s)",
-            "torque (kN m)",
-            (
-                Curve("residual", stamp_s, residual * 1e-3),
-                Curve("true torque of the stop", motion.time, stop * 1e-3, "improved"),
-            ),
-        ),
-    )
-    size = ", ".join(f"{name} {value:g}" for name, value in limit_device().parameters.items())
-    notes = (
-        "no field recording of the paper is available: the black curve is this project's own simulation with an "
-        "elastic end stop "
-        f"added ({size}; SI), its size an assumption; the baseline does not know of it.",
-    )
-    columns = ("hold", "measured (N m)", "improved LuGre (N m)", "rise (N m)", "true stop torque (N m)")
-    title = "Torque while held at the limit stops"
-    return Outcome("paper-limit-stop", title, columns, tuple(rows), checks, panels, bench.calibrated, notes)
 
 
 def cylinder_torque(run: Simulated) -> tuple[Array, Array]:

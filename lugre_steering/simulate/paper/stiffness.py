@@ -6,8 +6,10 @@ figure 8c)."""
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lugre_steering.recording import Array
 from lugre_steering.simulate import plant
@@ -33,8 +35,60 @@ def presliding_angle(torque: Array, stiffness: float, static: float) -> Array:
     return np.asarray(-(static / stiffness) * np.log1p(-torque / static))
 
 
+@dataclass(frozen=True)
+class _Loaded:
+    """Both tracks loaded alike: torque [N m] and sum of both angles [deg] over time [s] (n,), and where the load is held;
+    the torque at break-away [N m], and the stiffness set in the model [N m/deg]."""
+
+    time: Array
+    torque: Array
+    angle: Array
+    held: NDArray[np.bool_]
+    break_away: float
+    true: float
+
+    @property
+    def slope(self) -> float:
+        """Initial slope of torque over angle [N m/deg], from a parabola through small loads."""
+        small = (self.torque > 0.0) & (self.torque < SMALL_SHARE * self.break_away)
+        basis = np.stack([self.angle[small], self.angle[small] ** 2], axis=1)
+        return float(np.linalg.lstsq(basis, self.torque[small], rcond=None)[0][0])
+
+    @property
+    def secant(self) -> float:
+        """Held torque over held angle [N m/deg]."""
+        return float(self.torque[-1] / self.angle[-1])
+
+
 def stiffness(bench: Bench) -> Outcome:
     """Both tracks are loaded alike (the small Ackermann difference is left out, as in the paper)."""
+    run = _load(bench)
+    columns = ("load (% of break-away)", "torque (N m)", "angle sum (deg)", "torque / angle (N m/deg)", "error (%)")
+    notes = (
+        f"the paper divides the held load by the angle. A LuGre contact softens towards break-away, so at "
+        f"{100 * LOAD_SHARE:g} % this "
+        f"quotient is {run.secant:.0f} N m/deg, {100 * (1 - run.secant / run.true):.0f} % below the bristle stiffness; only the "
+        f"slope at small load gives it. "
+        f"If the published {PUBLISHED_NM_PER_DEG:g} is such a quotient, the true bristle stiffness is higher (by a "
+        f"factor "
+        f"{run.true / run.secant:.2f} at this load). The parameter is kept at the published number.",
+        "LuGre does not creep under constant load; the slight change of angle that the paper saw during the hold is "
+        "not in the model.",
+    )
+    return Outcome(
+        "paper-stiffness",
+        "Stiffness identification",
+        columns,
+        _rows(run),
+        _checks(run),
+        _panels(run),
+        bench.calibrated,
+        notes,
+    )
+
+
+def _load(bench: Bench) -> _Loaded:
+    """Load slowly to LOAD_SHARE of break-away, and hold."""
     p = baseline_parameters(bench.vehicle)
     time = np.arange(0.0, 2.0 + LOADING_S + HOLD_S, STEP_S)
     wanted = LOAD_SHARE * p["static_torque"] * np.clip((time - 2.0) / LOADING_S, 0.0, 1.0)
@@ -43,66 +97,47 @@ def stiffness(bench: Bench) -> Outcome:
     torque = plant.run(bench.vehicle, motion).torque
     angle = np.degrees(motion.theta.sum(axis=0))
     break_away = len(bench.vehicle.sides) * p["static_torque"]
-    small = (torque > 0.0) & (torque < SMALL_SHARE * break_away)
-    slope = float(np.linalg.lstsq(np.stack([angle[small], angle[small] ** 2], axis=1), torque[small], rcond=None)[0][0])
-    true = math.radians(p["sigma_0"])
-    held = time >= 2.0 + LOADING_S
-    secant = float(torque[-1] / angle[-1])
+    return _Loaded(time, torque, angle, time >= 2.0 + LOADING_S, break_away, math.radians(p["sigma_0"]))
+
+
+def _rows(run: _Loaded) -> tuple[tuple[float, ...], ...]:
     shares = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5, LOAD_SHARE * 0.999])
-    at = np.searchsorted(torque[~held], shares * break_away)
-    rows = tuple(
-        (100.0 * s, float(m), float(a), float(m / a), 100.0 * (float(m / a) / true - 1.0))
-        for s, m, a in zip(shares.tolist(), torque[at], angle[at], strict=True)
+    at = np.searchsorted(run.torque[~run.held], shares * run.break_away)
+    return tuple(
+        (100.0 * s, float(m), float(a), float(m / a), 100.0 * (float(m / a) / run.true - 1.0))
+        for s, m, a in zip(shares.tolist(), run.torque[at], run.angle[at], strict=True)
     )
-    steady = float(np.ptp(torque[held]) / torque[-1])
-    published = f"{PUBLISHED_NM_PER_DEG:g} N m per unit of angle (unit lost; deg by size)"
-    checks = (
+
+
+def _checks(run: _Loaded) -> tuple[Check, ...]:
+    slope, steady = run.slope, float(np.ptp(run.torque[run.held]) / run.torque[-1])
+    return (
         Check(
             "initial slope of torque over the sum of both angles = stiffness (within 1 %)",
-            published,
-            f"{slope:.1f} N m/deg, set in the model {true:.1f}",
-            abs(slope / true - 1.0) < TOLERANCE and abs(slope / PUBLISHED_NM_PER_DEG - 1.0) < TOLERANCE,
+            f"{PUBLISHED_NM_PER_DEG:g} N m per unit of angle (unit lost; deg by size)",
+            f"{slope:.1f} N m/deg, set in the model {run.true:.1f}",
+            abs(slope / run.true - 1.0) < TOLERANCE and abs(slope / PUBLISHED_NM_PER_DEG - 1.0) < TOLERANCE,
         ),
         Check(
             "the load is held for more than 10 s without turning",
             "over 10 s, the angle changes slightly",
-            f"{HOLD_S:g} s at {torque[-1] * 1e-3:.1f} kN m ({100 * LOAD_SHARE:g} % of break-away), torque steady to "
+            f"{HOLD_S:g} s at {run.torque[-1] * 1e-3:.1f} kN m ({100 * LOAD_SHARE:g} % of break-away), torque steady to "
             f"{100 * steady:.2f} %",
-            HOLD_S > 10.0 and steady < 0.01 and float(torque.max()) < break_away,
+            HOLD_S > 10.0 and steady < 0.01 and float(run.torque.max()) < run.break_away,
         ),
     )
-    panels = (
-        Panel(
-            "torque over the sum of both angles",
-            "left plus right angle (deg)",
-            "torque (kN m)",
-            (
-                Curve("slow loading and hold", angle, torque * 1e-3, "test"),
-                Curve("initial slope", *_line(slope, angle, torque), "improved"),
-                Curve(
-                    "torque / angle at the held load",
-                    np.array([0.0, angle[-1]]),
-                    np.array([0.0, torque[-1] * 1e-3]),
-                    "original",
-                ),
-            ),
-        ),
-        Panel("load", "time (s)", "torque (kN m)", (Curve("torque", time, torque * 1e-3, "test"),)),
+
+
+def _panels(run: _Loaded) -> tuple[Panel, ...]:
+    held = np.array([0.0, run.angle[-1]]), np.array([0.0, run.torque[-1] * 1e-3])
+    over_angle = (
+        Curve("slow loading and hold", run.angle, run.torque * 1e-3, "test"),
+        Curve("initial slope", *_line(run.slope, run.angle, run.torque), "improved"),
+        Curve("torque / angle at the held load", *held, "original"),
     )
-    notes = (
-        f"the paper divides the held load by the angle. A LuGre contact softens towards break-away, so at "
-        f"{100 * LOAD_SHARE:g} % this "
-        f"quotient is {secant:.0f} N m/deg, {100 * (1 - secant / true):.0f} % below the bristle stiffness; only the "
-        f"slope at small load gives it. "
-        f"If the published {PUBLISHED_NM_PER_DEG:g} is such a quotient, the true bristle stiffness is higher (by a "
-        f"factor "
-        f"{true / secant:.2f} at this load). The parameter is kept at the published number.",
-        "LuGre does not creep under constant load; the slight change of angle that the paper saw during the hold is "
-        "not in the model.",
-    )
-    columns = ("load (% of break-away)", "torque (N m)", "angle sum (deg)", "torque / angle (N m/deg)", "error (%)")
-    return Outcome(
-        "paper-stiffness", "Stiffness identification", columns, rows, checks, panels, bench.calibrated, notes
+    return (
+        Panel("torque over the sum of both angles", "left plus right angle (deg)", "torque (kN m)", over_angle),
+        Panel("load", "time (s)", "torque (kN m)", (Curve("torque", run.time, run.torque * 1e-3, "test"),)),
     )
 
 
