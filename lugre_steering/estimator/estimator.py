@@ -15,6 +15,7 @@ from numba import njit
 from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
+from lugre_steering.effects.law import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import admit
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
@@ -141,6 +142,13 @@ class Estimator:
     def saturated_steps(self) -> int:
         """Steps so far with a rubber temperature outside the rubber table."""
         return int(self._core.state["saturated"].sum())
+
+    @property
+    def law_left_steps(self) -> Mapping[str, int]:
+        """Steps so far with the coordinate of a law outside the range on which it was seen, by the law's place in the file; what
+        was counted before a restart is forgotten."""
+        state = self._core.state
+        return {f"laws[{i}]": int(state[f"{slot(i).id}_outside"].sum()) for i in range(len(self.vehicle.laws))}
 
     def snapshot(self) -> list[np.ndarray[Any, Any]]:
         """A copy of the whole state, for ``restore``."""

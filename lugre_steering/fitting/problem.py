@@ -190,9 +190,9 @@ class Problem:
                 if since <= start:
                     acting["air_temperature"] = air
             for candidate, values in effects:
-                for name, value in values.items() if candidate.start(bag) <= start else ():
-                    if not candidate.effect.per_line:
-                        acting[f"{candidate.effect.id}_{name}"] = value
+                if candidate.start(bag) <= start and not candidate.effect.per_line:
+                    for field, number in candidate.effect.fields(values).items():
+                        acting[field] = number
             phases.append((start, acting))
         total = np.zeros(run.time.size)
         for side in range(run.theta.shape[0]):

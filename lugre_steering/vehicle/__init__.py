@@ -17,6 +17,7 @@ from lugre_steering.vehicle.sections import (
     Friction,
     Hydraulics,
     Initial,
+    LawEntry,
     Levers,
     MasterCurve,
     Rollers,
@@ -31,7 +32,7 @@ from lugre_steering.vehicle.sections import (
 from lugre_steering.vehicle.tables import pavements
 
 __all__ = [
-    "SCHEMA", "Axle", "Contact", "Cylinder", "DmaTable", "EffectEntry", "Friction", "Hydraulics", "Initial", "Levers",
+    "SCHEMA", "Axle", "Contact", "Cylinder", "DmaTable", "EffectEntry", "Friction", "Hydraulics", "Initial", "LawEntry", "Levers",
     "MasterCurve", "Rollers", "Rubber", "Sensors", "Topics", "TorqueSensor", "Track", "Vehicle", "Wlf", "add_effect",
     "each_once", "from_mapping", "load", "pavements", "save", "to_mapping",
 ]  # fmt: skip

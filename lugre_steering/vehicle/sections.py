@@ -215,6 +215,27 @@ class EffectEntry:
 
 
 @dataclass(frozen=True)
+class LawEntry:
+    """A law that no entry of the catalogue is: channel x f(coordinate), see ``effects.law``; numbers in SI units.
+
+    ``range``: where the coordinate was seen; f is held beyond. f is a closed ``form`` of ``values``, or a table of equally
+    spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it foretold) tell how sure it is.
+    """
+
+    channel: str
+    coordinate: str
+    form: str
+    range: tuple[float, ...]
+    values: dict[str, float] = field(default_factory=dict)
+    knots: tuple[float, ...] = ()
+    memory: str = "none"
+    memory_size: float = quantity(0.0, 1e12, default=0.0)
+    title: str | None = None
+    intervals: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    heldout_gain: float | None = None
+
+
+@dataclass(frozen=True)
 class Topics:
     """Names of the input topics where they differ from the standard ones."""
 
@@ -246,6 +267,7 @@ class Vehicle:
     topics: Topics = field(default_factory=Topics)
     sides: tuple[str, ...] = SIDES
     effects: tuple[EffectEntry, ...] = ()
+    laws: tuple[LawEntry, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
