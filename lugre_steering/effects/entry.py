@@ -141,7 +141,7 @@ class Effect:
         plain = (p.name for p in self.parameters if not p.is_shape and not p.optional and p.name not in ends)
         return self.acts_by or tuple(plain)
 
-    def fields(self, values: Mapping[str, float]) -> dict[str, float | Array]:
+    def fields(self, values: Mapping[str, float] | Mapping[str, float | Array]) -> dict[str, float | Array]:
         """What the parameter record holds of it, by field: its tables, and the given values of its parameters."""
         return {f"{self.id}_{name}": value for name, value in {**self.constants, **values}.items()}
 

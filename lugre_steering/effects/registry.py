@@ -23,7 +23,7 @@ from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.step import new_parameters, run_side
 from lugre_steering.effects import own
 from lugre_steering.effects.entry import STAGES, Effect
-from lugre_steering.effects.law import slot
+from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
 
 GROUP = "lugre_steering.effects"

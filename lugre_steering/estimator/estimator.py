@@ -15,7 +15,7 @@ from numba import njit
 from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
-from lugre_steering.effects.law import slot
+from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import admit
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core

@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.step import Records, new_parameters
-from lugre_steering.effects.law import slot
+from lugre_steering.effects.laws import slot
 from lugre_steering.effects.registry import composed, effect
 from lugre_steering.recording import Array
 from lugre_steering.vehicle.laws import law_fields
@@ -41,9 +41,8 @@ def build_model(vehicle: Vehicle, *, lean: bool = False, more_laws: int = 0) -> 
     values: dict[str, float | Array] = {**baseline_parameters(vehicle)}
     contact = vehicle.friction or vehicle.contact
     assert contact is not None
-    rubber, values["table_low"], values["table_step"] = ratio_table(
-        vehicle.rubber, contact.reference_temperature_degC, contact.temperature_law
-    )
+    rubber, low, step = ratio_table(vehicle.rubber, contact.reference_temperature_degC, contact.temperature_law)
+    values |= {"table_low": low, "table_step": step}
     for entry in vehicle.effects:
         known = effect(entry.id)
         if not known.per_line:
@@ -54,8 +53,8 @@ def build_model(vehicle: Vehicle, *, lean: bool = False, more_laws: int = 0) -> 
             lines[f"{entry.id}_{known.parameters[0].name}"][vehicle.hydraulics.lines.index(name)] = value
     for i, law in enumerate(vehicle.laws):
         values |= slot(i).fields(law_fields(law))
-    for field, value in values.items():
-        record[field] = value
+    for field, number in values.items():
+        record[field] = number
     return Model(composition, tuple(record.copy() for _ in vehicle.sides), lines, rubber)
 
 

@@ -216,7 +216,7 @@ class EffectEntry:
 
 @dataclass(frozen=True)
 class LawEntry:
-    """A law that no entry of the catalogue is: channel x f(coordinate), see ``effects.law``; numbers in SI units.
+    """A law that no entry of the catalogue is: channel x f(coordinate), see ``effects.laws``; numbers in SI units.
 
     ``range``: where the coordinate was seen; f is held beyond. f is a closed ``form`` of ``values``, or a table of equally
     spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it foretold) tell how sure it is.

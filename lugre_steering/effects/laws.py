@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from lugre_steering.chain.compiled import exp, law
+from lugre_steering.chain.compiled import law
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.signs import SIGN_RATE_RAD_S
 from lugre_steering.recording import Array
@@ -68,7 +68,7 @@ def remembered(kind, size, kept, now, dt):
     if kind == 0.0:
         return now
     if kind == 1.0:
-        return kept + (now - kept) * (1.0 - exp(-dt / size))
+        return kept + (now - kept) * dt / (size + 0.5 * dt)  # exp(-dt / size) to second order
     if kind == 2.0:
         return min(max(kept, now - size), now + size)
     if now > size:
@@ -143,7 +143,7 @@ def limit(cell, value, torque, last_torque, dt):
     return torque, value
 
 
-_HOOKS = {"tangent": tangent, "level": level, "torque": torque, "loss": loss, "limit": limit}
+_HOOKS: dict[str, Callable[..., object]] = {"tangent": tangent, "level": level, "torque": torque, "loss": loss, "limit": limit}
 _MEMORY = dict.fromkeys(("value", "kept", "since", "slip", "work", "outside"), 0.0)
 _SIZE = Parameter("size", "1", "of the law as it was found", 1.0, 0.0, 10.0)
 Form = Callable[..., Array]
@@ -158,7 +158,7 @@ def _linear(c: Array, value: float, slope: float) -> Array:
 
 
 def _power(c: Array, value: float, scale: float, exponent: float) -> Array:
-    return value * np.abs(c / scale) ** exponent
+    return np.asarray(value * np.abs(c / scale) ** exponent)
 
 
 def _exponential(c: Array, start: float, end: float, length: float) -> Array:
