@@ -40,6 +40,8 @@ class Parameter:
     """Refinement of the shape: zero (or as the vehicle sheet has it) in the screen, fitted only once the effect is accepted."""
     example: float | None = None
     """A value at which it acts in an ordinary double cycle, where ``scale`` would leave it idle."""
+    pull: float = 0.0
+    """Weight with which a fit pulls it to zero, per ``scale`` and noise standard deviation."""
 
     @property
     def typical(self) -> float:

@@ -122,11 +122,12 @@ class Problem:
     """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, effect parameters)."""
 
     def __init__(
-        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None
+        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None, *, more_laws: int = 0
     ) -> None:
+        """``more_laws``: so many laws are tried in place of effects of the catalogue, of which only the vehicle's are there."""
         self.vehicle = vehicle
         self.runs = list(runs)
-        self.model: Model = build_model(vehicle)
+        self.model: Model = build_model(vehicle, lean=more_laws > 0, more_laws=more_laws)
         self.calibrations = tuple(calibrations_for(vehicle) if calibrations is None else calibrations)
         self.measured = np.concatenate([run.measured for run in runs])
         self.valid = np.concatenate([run.valid for run in runs])
