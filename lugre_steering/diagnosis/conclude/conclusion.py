@@ -15,8 +15,10 @@ from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.conclude.left_over import left_over
+from lugre_steering.diagnosis.conclude.left_over import beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
+from lugre_steering.diagnosis.laws.find import find
+from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, finite
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
@@ -39,6 +41,12 @@ def conclude(
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
     left = left_over(done, final)
+    lawful, beside = None, done
+    if left.structured and not named:
+        lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress)
+    if lawful is not None:
+        beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
+        left = beside_laws(left, left_over(beside, final), sentence(lawful, done.torque))
     if named:
         verdict = "missing_physics"
     elif left.structured:
@@ -46,16 +54,19 @@ def conclude(
     else:
         verdict = "consistent"
     effects = named_effects(done, whole, material) if named else []
-    after = judged.after if named else judged.before
-    vehicle = augmented_vehicle(done, whole, effects, after)
+    better = named or lawful is not None
+    after = judged.after if better else judged.before
+    vehicle = augmented_vehicle(beside, whole, effects, after)
+    if lawful is not None:
+        vehicle = vehicle.replace(laws=(*vehicle.laws, *entries(lawful)))
     kept = {entry.id for entry in vehicle.effects}
     ended = [effect["id"] for effect in effects if effect["id"] not in kept]
     baseline = {"rmse_Nm": verify.rmse(problem, found.baseline, problem.valid), "heldout_rmse_Nm": judged.before}
     augmented: dict[str, Any] = {
         "rmse_Nm": verify.rmse(problem, final, problem.valid),
         "heldout_rmse_Nm": after,
-        "improvement": judged.gain if named else 0.0,
-        "improvement_ci95": list(judged.interval) if named else [0.0, 0.0],
+        "improvement": judged.gain if better else 0.0,
+        "improvement_ci95": list(judged.interval) if better else [0.0, 0.0],
     }
     progress("next experiment")
     json = {
@@ -67,6 +78,7 @@ def conclude(
         "baseline": baseline,
         "augmented": augmented,
         "effects": effects,
+        "laws": described(lawful) if lawful is not None else [],
         "unexplained": left.entry,
         "detection_limits": _limits(done, [effect["id"] for effect in effects]),
         "data_quality": findings,
@@ -75,7 +87,7 @@ def conclude(
     return Diagnosis(
         units.in_words(vehicle, finite(json)),
         vehicle,
-        traces(done, whole, final, None if judged.rotated else found.final if named else found.baseline),
+        traces(beside, whole, final, None if judged.rotated else found.final if named else final),
         evidence(done, effects),
         {effect["id"]: CATALOGUE[effect["id"]].coordinate for effect in effects},
     )

@@ -79,6 +79,14 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     return LeftOver({"structured": True, "description": text, "formula": formula, "where": where}, text, True)
 
 
+def beside_laws(before: LeftOver, after: LeftOver, law: str) -> LeftOver:
+    """Unlisted structure ``before`` once a law is found for it, said in ``law``; ``after``: what is left beside the law."""
+    formula = f"missing torque: {law}"
+    rest = f"beside the law, {after.text or after.entry['description']}"
+    entry = {**before.entry, "description": f"{law}; {rest}", "formula": formula}
+    return LeftOver(entry, f"a law that was not listed does: {law}; {rest}", True)
+
+
 def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
     """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells."""
     pattern = done.found.pattern

@@ -37,6 +37,13 @@ def statement(
             f"{torque(baseline['heldout_rmse_Nm'])} at a noise floor of {floor}. No missing physics is needed; "
             "see detection_limits for what could have gone unseen."
         )
+    if verdict == "unlisted_physics" and augmented["improvement"] > 0.0:
+        return (
+            f"No entry of the catalogue explains what the recalibrated model leaves over, but {left}. With the law the held-out error "
+            f"falls from {torque(baseline['heldout_rmse_Nm'])} to {torque(augmented['heldout_rmse_Nm'])} (improvement "
+            f"{100 * augmented['improvement']:.0f} %, 95 % interval {100 * augmented['improvement_ci95'][0]:.0f} to "
+            f"{100 * augmented['improvement_ci95'][1]:.0f} %) at a noise floor of {floor}. augmented.yaml has it under 'laws'."
+        )
     if verdict == "unlisted_physics":
         return (
             f"The recalibrated model leaves {torque(baseline['heldout_rmse_Nm'])} on held-out data at a noise floor of {floor}, and no "

@@ -16,8 +16,10 @@ from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
 
-PIECES = 10
-"""Cubic B-splines of a free f; coordinates that only take signs need no more than three hats."""
+PIECES, HATS, FINE = 10, 3, 36
+"""Cubic B-splines of a free f; coordinates that only take signs need no more than three hats, and what is made of teeth more."""
+TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
+"""Channels whose f over the angle may be fine."""
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
 PLAYS = (0.05, 0.15)
 """Half widths of play and relay that are tried, as shares of the travel."""
@@ -47,18 +49,13 @@ class Cell:
     axis: Axis
     low: float
     high: float
-
-    @property
-    def pieces(self) -> int:
-        if self.axis.coordinate == "none":
-            return 1
-        return 3 if self.axis.coordinate == "direction" and self.axis.memory == "none" or self.axis.memory == "relay" else PIECES
+    pieces: int = PIECES
 
     def basis(self, places: Array) -> Array:
         """Columns (n, pieces) of a free f at some places, held beyond the range."""
         if self.pieces == 1:
             return np.ones((places.size, 1))
-        degree = 1 if self.pieces == 3 else 3
+        degree = 1 if self.pieces == HATS else 3
         inner = np.linspace(self.low, self.high, self.pieces - degree + 1)
         knots = np.concatenate([[self.low] * degree, inner, [self.high] * degree])
         return np.asarray(BSpline.design_matrix(np.clip(places, self.low, self.high), knots, degree).toarray())
@@ -85,8 +82,12 @@ class Traces:
                 low, high = -1.0, 1.0
             if not high - low > 1e-9 * max(abs(low), abs(high)):
                 continue
+            signs = axis.memory == "relay" or axis == Axis("direction")
+            pieces = 1 if axis.coordinate == "none" else HATS if signs else PIECES
             for channel in self.signals if axis.memory == "none" else REMEMBERING:
-                yield Cell(channel, axis, low, high)
+                yield Cell(channel, axis, low, high, pieces)
+                if axis == Axis("angle") and channel in TOOTHED:
+                    yield Cell(channel, axis, low, high, FINE)
 
     def columns(self, cell: Cell, bag: int) -> Array:
         """Change of the torque (n, pieces) of a bag by each piece of a free f."""
@@ -130,7 +131,7 @@ def trace(problem: Problem, fitted: Fit, index: int) -> Traces:
         return np.array([torque_side(p, problem.model.rubber, run.time, *motion) for motion in motions])
 
     bags: Sequence[int] = range(len(problem.runs))
-    nothing = Cell("gain", Axis("none"), -1.0, 1.0).fields(np.zeros(laws.KNOTS))
+    nothing = Cell("gain", Axis("none"), -1.0, 1.0, 1).fields(np.zeros(laws.KNOTS))
     base = {carried: [sides(bag, nothing, carried) for bag in bags] for carried in (False, True)}
 
     def signal(channel: str) -> list[Array]:
@@ -138,7 +139,7 @@ def trace(problem: Problem, fitted: Fit, index: int) -> Traces:
         acceleration = max(float(np.abs(run.alpha).max()) for run in problem.runs)
         per = {"viscous_loss": rate, "turbulent_loss": rate**2, "inertia": acceleration}.get(channel)
         small = SMALL.get(channel, 1e-2 if per is None else SMALLEST * amplitude / per)
-        values = Cell(channel, Axis("none"), -1.0, 1.0).fields(np.full(laws.KNOTS, small))
+        values = Cell(channel, Axis("none"), -1.0, 1.0, 1).fields(np.full(laws.KNOTS, small))
         return [(sides(bag, values, False) - base[False][bag]) / small / gain for bag in bags]
 
     def along(axis: Axis) -> list[Array]:

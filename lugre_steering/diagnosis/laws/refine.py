@@ -42,7 +42,7 @@ class Law(Effect):
         return dataclasses.replace(self.cell, axis=dataclasses.replace(self.cell.axis, memory_size=values["memory_size"]))
 
     def fields(self, values: Mapping[str, float] | Mapping[str, float | Array]) -> dict[str, float | Array]:
-        numbers = {name: float(value) for name, value in values.items()}  # type: ignore[arg-type]
+        numbers = {name: float(value) for name, value in values.items()}
         made = self.at(numbers).fields(self.shape(numbers))
         return {f"{self.id}_{name}": value for name, value in made.items()}
 
@@ -111,7 +111,7 @@ def _bent(cell: Cell, names: Sequence[str]) -> Iterator[dict[str, float]]:
             yield found
 
 
-def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tuple[float, str, Mapping[str, float], dict[str, float]]]:
+def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tuple[float, str, dict[str, float], dict[str, float]]]:
     """Closed forms by the energy (noise variances) that they lose against free pieces: that, form, fixed values, free values.
 
     Energy is told by the covariance of the pieces, so that places that the data hardly show do not count.
@@ -119,18 +119,14 @@ def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tup
     places = np.linspace(cell.low, cell.high, laws.KNOTS)
     onto = np.linalg.pinv(cell.basis(places))
     root = np.linalg.cholesky(np.linalg.pinv(covariance, rcond=1e-10) + 1e-12 * np.eye(len(coefficients)) / np.mean(np.diag(covariance))).T
-    found = []
+    target, found = root @ coefficients, []
     for form, fixed, bends in VARIANTS:
         linear = [name for name in laws.form_values(form) if name not in (*fixed, *bends, "scale")]
         always = {**fixed, **({"scale": max(abs(cell.low), abs(cell.high))} if form == "power" else {})}
         best: tuple[float, dict[str, float]] = (np.inf, {})
         for bent in _bent(cell, bends):
-            def sampled(unit: str, bent: Mapping[str, float] = bent) -> Array:
-                rest = {name: float(name == unit) for name in linear}
-                return laws.sampled(form, {**always, **bent, **rest}, (), cell.low, cell.high)  # noqa: B023
-
-            columns = root @ onto @ np.column_stack([sampled(name) for name in linear])
-            target = root @ coefficients
+            units = [{**always, **bent, **{name: float(name == unit) for name in linear}} for unit in linear]
+            columns = root @ onto @ np.column_stack([laws.sampled(form, unit, (), cell.low, cell.high) for unit in units])
             sizes = np.linalg.lstsq(columns, target, rcond=1e-10)[0]
             lost = float(np.sum((target - columns @ sizes) ** 2))
             if lost < best[0]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.diagnosis.laws.cells import Cell, Traces
+from lugre_steering.diagnosis.laws.cells import HATS, Cell, Traces
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.fitting.split import Split
@@ -100,7 +100,7 @@ class Screen:
             norm = float(np.sqrt(np.mean(np.sum(columns**2, axis=0))))
             if norm < 1e-12:
                 return Screened(cell, 0.0, np.zeros(self.errors.shape[1] - 1))
-            smoothing = SMOOTHING if cell.pieces > 3 else SMOOTHING[:1]
+            smoothing = SMOOTHING if cell.pieces > HATS else SMOOTHING[:1]
             left = np.min([_left(beside, columns / norm, self.errors, self.rows.fold, share) for share in smoothing], axis=0)
             gains = base - left
             return Screened(cell, float(gains[0]), gains[1:])
