@@ -158,7 +158,7 @@ def _linear(c: Array, value: float, slope: float) -> Array:
 
 
 def _power(c: Array, value: float, scale: float, exponent: float) -> Array:
-    return np.asarray(value * np.abs(c / scale) ** exponent, np.float64)
+    return value * np.float_power(np.abs(c / scale), exponent)
 
 
 def _exponential(c: Array, start: float, end: float, length: float) -> Array:

@@ -92,7 +92,7 @@ class Traces:
     def columns(self, cell: Cell, bag: int) -> Array:
         """Change of the torque (n, pieces) of a bag by each piece of a free f."""
         sides = zip(self.signals[cell.channel][bag], self.axes[cell.axis][bag], strict=True)
-        return np.sum([signal[:, None] * cell.basis(place) for signal, place in sides], axis=0)
+        return np.asarray(np.sum([signal[:, None] * cell.basis(place) for signal, place in sides], axis=0), np.float64)
 
 
 def axes_of(problem: Problem) -> list[Axis]:
