@@ -158,7 +158,8 @@ def _linear(c: Array, value: float, slope: float) -> Array:
 
 
 def _power(c: Array, value: float, scale: float, exponent: float) -> Array:
-    return value * np.float_power(np.abs(c / scale), exponent)
+    shape: Array = np.float_power(np.abs(c / scale), exponent)
+    return value * shape
 
 
 def _exponential(c: Array, start: float, end: float, length: float) -> Array:

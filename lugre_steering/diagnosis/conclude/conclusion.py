@@ -41,12 +41,13 @@ def conclude(
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
     left = left_over(done, final)
-    lawful, beside = None, done
+    lawful, beside, laws = None, done, []
     if left.structured and not named:
         lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress)
     if lawful is not None:
         beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
-        left = beside_laws(left, left_over(beside, final), sentence(lawful, done.torque))
+        laws = described(lawful)
+        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque))
     if named:
         verdict = "missing_physics"
     elif left.structured:
@@ -78,7 +79,7 @@ def conclude(
         "baseline": baseline,
         "augmented": augmented,
         "effects": effects,
-        "laws": described(lawful) if lawful is not None else [],
+        "laws": laws,
         "unexplained": left.entry,
         "detection_limits": _limits(done, [effect["id"] for effect in effects]),
         "data_quality": findings,

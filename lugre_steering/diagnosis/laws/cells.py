@@ -107,10 +107,10 @@ def axes_of(problem: Problem) -> list[Axis]:
     return plain + lagged + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
 
 
-def trace(problem: Problem, fitted: Fit, index: int) -> Traces:
+def trace(problem: Problem, fitted: Fit, place: int) -> Traces:
     """Run the chain with a small unit law in each channel, and once per axis with a law that carries it out, in the place
-    ``index`` of the problem's laws and beside the effects of the fit; the air stays as it was at the start."""
-    slot = laws.slot(index)
+    ``place`` of the problem's laws and beside the effects of the fit; the air stays as it was at the start."""
+    slot = laws.slot(place)
     gain, amplitude = problem.gain(fitted.x), float(np.abs(fitted.prediction).max())
 
     def record(bag: int, values: dict[str, float | Array]) -> Records:

@@ -79,15 +79,16 @@ def find(
     ties: tuple[Tried, ...] = ()
     current, first_bar, ceiling = baseline, 0.0, 0.0
     for index in range(MOST_LAWS):
+        place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
-        screen = Screen(lawful, current, weight, roles, noise.draws, trace(lawful, current, index), seed)
+        screen = Screen(lawful, current, weight, roles, noise.draws, trace(lawful, current, place), seed)
         screened = screen.search()
         least = max(bar(screened), OWN_ERROR * samples, SECOND * gains[0] if gains else 0.0)
         first_bar = first_bar or bar(screened)
         if screened[0].gain < least:
             ceiling = max(screened[0].gain, 0.0)
             break
-        tried = _tried(lawful, weight, current, screened, index, progress)
+        tried = _tried(lawful, weight, current, screened, place, progress)
         best, gain = tried[0], current.cost - tried[0].fit.cost
         if gain < least or _held(problem, best.fit, roles, noise) >= _held(problem, current, roles, noise):
             ceiling = max(gain, 0.0)
@@ -112,16 +113,16 @@ def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
 
 
 def _tried(
-    problem: Problem, weight: Array, current: Fit, screened: Sequence[Screened], index: int, progress: Callable[[str], None]
+    problem: Problem, weight: Array, current: Fit, screened: Sequence[Screened], place: int, progress: Callable[[str], None]
 ) -> list[Tried]:
     """The leading cells fitted in the chain, the best of them simplified; best first, a value more must pay."""
     tried = []
     for one in shortlist(screened):
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
-        tried.append(Tried(one, with_law(problem, weight, current, free_law(problem, one.cell, index))))
+        tried.append(Tried(one, with_law(problem, weight, current, free_law(problem, one.cell, place))))
     tried.sort(key=lambda each: each.fit.cost)
     tried = [
-        replace(each, fit=simplified(problem, weight, current, each.fit)) if i < SIMPLIFIED else each for i, each in enumerate(tried)
+        replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)
     ]
     gain = current.cost - min(each.fit.cost for each in tried)
     return sorted(tried, key=lambda each: each.fit.cost + PER_VALUE * gain * each.values)

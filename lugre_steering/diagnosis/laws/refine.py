@@ -47,8 +47,8 @@ class Law(Effect):
         return {f"{self.id}_{name}": value for name, value in made.items()}
 
 
-def _law(cell: Cell, index: int, form: str, parameters: Sequence[Parameter], **more: object) -> Law:
-    slot = laws.slot(index)
+def _law(cell: Cell, place: int, form: str, parameters: Sequence[Parameter], **more: object) -> Law:
+    slot = laws.slot(place)
     memory = (Parameter("memory_size", "s", "time constant", 1.0, 0.05, 60.0, (1.0,)),) if cell.axis.memory == "lag" else ()
     plain = {item.name: getattr(slot, item.name) for item in dataclasses.fields(slot) if item.name != "parameters"}
     return Law(**plain, parameters=(*parameters, *memory), cell=cell, form=form, **more)  # type: ignore[arg-type]
@@ -65,7 +65,7 @@ def typical(problem: Problem, channel: str) -> float:
     }.get(channel, SHARE)  # fmt: skip
 
 
-def free_law(problem: Problem, cell: Cell, index: int) -> tuple[Candidate, dict[str, float]]:
+def free_law(problem: Problem, cell: Cell, place: int) -> tuple[Candidate, dict[str, float]]:
     """The cell with f of free pieces, all zero."""
     scale, names = typical(problem, cell.channel), [f"piece_{i}" for i in range(cell.pieces)]
     basis = cell.basis(np.linspace(cell.low, cell.high, laws.KNOTS))
@@ -75,7 +75,7 @@ def free_law(problem: Problem, cell: Cell, index: int) -> tuple[Candidate, dict[
     def shape(values: Mapping[str, float]) -> Array:
         return np.asarray(basis @ np.array([values[name] for name in names]))
 
-    effect = _law(cell, index, laws.TABLE, parameters, shape=shape)
+    effect = _law(cell, place, laws.TABLE, parameters, shape=shape)
     start = dict.fromkeys(names, 0.0)
     if cell.axis.memory == "lag":
         start["memory_size"] = cell.axis.memory_size
@@ -136,7 +136,7 @@ def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tup
 
 
 def closed_law(
-    problem: Problem, cell: Cell, index: int, form: str, fixed: Mapping[str, float], start: Mapping[str, float]
+    problem: Problem, cell: Cell, place: int, form: str, fixed: Mapping[str, float], start: Mapping[str, float]
 ) -> tuple[Candidate, dict[str, float]]:
     """The cell with f of a closed form."""
     span, size = cell.high - cell.low, typical(problem, cell.channel)
@@ -154,7 +154,7 @@ def closed_law(
         given = {name: values[name] for name in start}
         return laws.sampled(form, {**fixed, **given}, (), cell.low, cell.high)
 
-    effect = _law(cell, index, form, [parameter(name) for name in start], shape=shape, fixed=fixed)
+    effect = _law(cell, place, form, [parameter(name) for name in start], shape=shape, fixed=fixed)
     values = dict(start)
     if cell.axis.memory == "lag":
         values["memory_size"] = cell.axis.memory_size
@@ -166,7 +166,7 @@ def with_law(problem: Problem, weight: Array, before: Fit, law: tuple[Candidate,
     return fit(problem, weight, [*before.effects, law], before.x, linearisations=5, tolerance=1e-4)
 
 
-def simplified(problem: Problem, weight: Array, before: Fit, free: Fit) -> Fit:
+def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: int) -> Fit:
     """The fit whose last law, of free pieces, is replaced by the simplest closed form that keeps its gain; or as it is."""
     candidate, values = free.effects[-1]
     law = candidate.effect
@@ -178,13 +178,9 @@ def simplified(problem: Problem, weight: Array, before: Fit, free: Fit) -> Fit:
     trials = closed_forms(cell, np.array([values[name] for name in names]), free.covariance[part, part])
     promising = [trial for trial in trials if trial[0] < (1.0 - KEPT) * gain * 2.0]
     for _, form, fixed, start in sorted(promising, key=lambda trial: (len(trial[3]), trial[0]))[:TRIED_FORMS]:
-        index = len(before.effects)
-        closed = with_law(problem, weight, replace_x(before, free.x), closed_law(problem, cell, index, form, fixed, start))
+        law_here = closed_law(problem, cell, place, form, fixed, start)
+        closed = with_law(problem, weight, dataclasses.replace(before, x=free.x), law_here)
         if before.cost - closed.cost >= KEPT * gain:
             return closed
     return free
 
-
-def replace_x(known: Fit, x: Array) -> Fit:
-    """A fit as the start of another, from other calibration values."""
-    return dataclasses.replace(known, x=x)

@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from lugre_steering.diagnosis.laws.cells import Traces, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law
 from lugre_steering.diagnosis.search.locate import contribution
@@ -20,6 +21,8 @@ from lugre_steering.vehicle import LawEntry
 WRITTEN_KNOTS = 65
 """Knots of a table in a file; of a fine one more."""
 NORMAL = 1.96
+POINTS = 24
+"""Steps of the coordinate in which the data are shown beside f."""
 CHANNEL_WORDS = {
     "friction_level": "a change of the friction level", "presliding_stiffness": "a change of the presliding stiffness",
     "conservative_torque": "a torque beside the contact", "coulomb_friction": "a friction torque against the motion",
@@ -118,21 +121,22 @@ def _shape_words(law: Law, values: Mapping[str, float], along: str) -> str:
 def described(found: FoundLaws) -> list[dict[str, Any]]:
     """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties."""
     torque = 0.5 * float(np.ptp(found.problem.measured))
-    described = []
+    made = []
+    traces = trace(found.problem, found.fit, len(found.problem.vehicle.laws) + len(found.gains) - 1)
     for index, (entry, (candidate, values)) in enumerate(zip(entries(found), found.fit.effects, strict=True)):
         law = _law(candidate.effect)
         largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, index)), 99.0))
-        described.append({
-            "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
+        made.append({
+            "id": law.id, "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
             "memory_size": entry.memory_size, "form": entry.form, "values": entry.values, "intervals": {
                 name: list(span) for name, span in entry.intervals.items()},
             "range": list(entry.range), "largest_Nm": largest, "largest_share": largest / torque,
             "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
             "share_of_ceiling": sum(found.gains) / (sum(found.gains) + found.ceiling),
             "ties": [_tie(tie) for tie in found.ties] if not index else [],
-            "f": _picture(found, index, law, values),
+            "f": {**_picture(found, index, law, values), **_points(found, index, traces, law, values)},
         })  # fmt: skip
-    return described
+    return made
 
 
 def _tie(tie: Tried) -> dict[str, Any]:
@@ -157,8 +161,30 @@ def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]
     return {"at": at[keep].tolist(), "f": f[keep].tolist(), "band": band[keep].tolist()}
 
 
-def sentence(found: FoundLaws, torque: Any) -> str:
-    """The laws with their sizes; ``torque`` writes a torque with its unit."""
-    parts = [f"{item['title']} (up to {torque(item['largest_Nm'])}, {100 * item['largest_share']:.2g} % of the torque)"
-             for item in described(found)]  # fmt: skip
-    return " and ".join(parts)
+def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:
+    """Laws with their sizes; ``torque`` writes a torque with its unit."""
+    return " and ".join(
+        f"{law['title']} (up to {torque(law['largest_Nm'])}, {100 * law['largest_share']:.2g} % of the torque)" for law in described
+    )
+
+
+def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
+    """What the data say of f within steps of its coordinate: fitted to the residual of the rest of the model."""
+    problem, cell = found.problem, law.at(values)
+    residual = problem.measured - found.fit.prediction + contribution(problem, found.fit, index)
+    edges = np.linspace(cell.low, cell.high, POINTS + 1)
+    axis = cell.axis if cell.axis in traces.axes else law.cell.axis
+    columns = []
+    for bag in range(len(problem.runs)):
+        parts = []
+        for signal, place in zip(traces.signals[cell.channel][bag], traces.axes[axis][bag], strict=True):
+            step = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, POINTS - 1)
+            parts.append(signal[:, None] * (step[:, None] == np.arange(POINTS)))
+        columns.append(np.sum(parts, axis=0))
+    weighted = np.concatenate(columns)[problem.valid]
+    gram = weighted.T @ weighted
+    size = np.diag(gram)
+    seen = size > 1e-4 * size.max()
+    kept = gram[np.ix_(seen, seen)]
+    f = np.linalg.solve(kept + 1e-9 * np.trace(kept) * np.eye(len(kept)), weighted[:, seen].T @ residual[problem.valid])
+    return {"points_at": (0.5 * (edges[1:] + edges[:-1]))[seen].tolist(), "points": f.tolist()}
