@@ -163,7 +163,8 @@ def _power(c: Array, value: float, scale: float, exponent: float) -> Array:
 
 
 def _exponential(c: Array, start: float, end: float, length: float) -> Array:
-    return end + (start - end) * np.exp(-(c - c[0]) / length)
+    left: Array = np.exp(-(c - c[0]) / length)
+    return end + (start - end) * left
 
 
 def _step(c: Array, before: float, after: float, at: float, width: float) -> Array:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -23,6 +23,8 @@ TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
 PLAYS = (0.05, 0.15)
 """Half widths of play and relay that are tried, as shares of the travel."""
+NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
+"""Sizes of a memory that are tried once one has shown, times its own."""
 SMALL = {"conservative_torque": 1.0, "coulomb_friction": 1.0, "load_friction": 1e-3, "lag": 1e-3}
 SMALLEST = 1e-4
 """Sizes of the unit laws by which channels are traced, and share of the torque amplitude for the others."""
@@ -107,7 +109,12 @@ def axes_of(problem: Problem) -> list[Axis]:
     return plain + lagged + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
 
 
-def trace(problem: Problem, fitted: Fit, place: int) -> Traces:
+def nearer(axis: Axis) -> list[Axis]:
+    """The same with other sizes of its memory."""
+    return [replace(axis, memory_size=share * axis.memory_size) for share in NEARER] if axis.memory != "none" else []
+
+
+def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Traces:
     """Run the chain with a small unit law in each channel, and once per axis with a law that carries it out, in the place
     ``place`` of the problem's laws and beside the effects of the fit; the air stays as it was at the start."""
     slot = laws.slot(place)
@@ -147,7 +154,6 @@ def trace(problem: Problem, fitted: Fit, place: int) -> Traces:
         values = cell.fields(np.linspace(-WIDE, WIDE, laws.KNOTS), TRACER)
         return [(sides(bag, values, True) - base[True][bag]) / TRACER for bag in bags]
 
-    axes = axes_of(problem)
     return Traces(
         dict(zip(laws.CHANNELS, in_threads(signal, list(laws.CHANNELS)), strict=True)),
         dict(zip(axes, in_threads(along, axes), strict=True)),

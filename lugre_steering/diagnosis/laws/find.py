@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.diagnosis.conclude import verify
-from lugre_steering.diagnosis.laws.cells import Cell, trace
+from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.search.build_up import OWN_ERROR
@@ -81,14 +81,14 @@ def find(
     for index in range(MOST_LAWS):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
-        screen = Screen(lawful, current, weight, roles, noise.draws, trace(lawful, current, place), seed)
+        screen = Screen(lawful, current, weight, roles, noise.draws, trace(lawful, current, place, axes_of(lawful)), seed)
         screened = screen.search()
         least = max(bar(screened), OWN_ERROR * samples, SECOND * gains[0] if gains else 0.0)
         first_bar = first_bar or bar(screened)
         if screened[0].gain < least:
             ceiling = max(screened[0].gain, 0.0)
             break
-        tried = _tried(lawful, weight, current, screened, place, progress)
+        tried = _tried(lawful, weight, current, screen, screened, place, progress)
         best, gain = tried[0], current.cost - tried[0].fit.cost
         if gain < least or _held(problem, best.fit, roles, noise) >= _held(problem, current, roles, noise):
             ceiling = max(gain, 0.0)
@@ -113,13 +113,17 @@ def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
 
 
 def _tried(
-    problem: Problem, weight: Array, current: Fit, screened: Sequence[Screened], place: int, progress: Callable[[str], None]
+    problem: Problem, weight: Array, current: Fit, screen: Screen, screened: Sequence[Screened], place: int,
+    progress: Callable[[str], None],
 ) -> list[Tried]:
     """The leading cells fitted in the chain, the best of them simplified; best first, a value more must pay."""
     tried = []
     for one in shortlist(screened):
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
-        tried.append(Tried(one, with_law(problem, weight, current, free_law(problem, one.cell, place))))
+        traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
+        best = screen.search(traces, one.cell)[0]
+        start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
+        tried.append(Tried(best, with_law(problem, weight, current, start)))
     tried.sort(key=lambda each: each.fit.cost)
     tried = [
         replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lugre_steering.diagnosis.laws.cells import Cell
+from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.effects import laws
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.fitting.fit import Fit, fit
@@ -65,8 +65,8 @@ def typical(problem: Problem, channel: str) -> float:
     }.get(channel, SHARE)  # fmt: skip
 
 
-def free_law(problem: Problem, cell: Cell, place: int) -> tuple[Candidate, dict[str, float]]:
-    """The cell with f of free pieces, all zero."""
+def free_law(problem: Problem, cell: Cell, place: int, pieces: Array) -> tuple[Candidate, dict[str, float]]:
+    """The cell with f of free pieces, that start as given."""
     scale, names = typical(problem, cell.channel), [f"piece_{i}" for i in range(cell.pieces)]
     basis = cell.basis(np.linspace(cell.low, cell.high, laws.KNOTS))
     low = 0.0 if cell.channel == "lag" else -np.inf
@@ -76,7 +76,7 @@ def free_law(problem: Problem, cell: Cell, place: int) -> tuple[Candidate, dict[
         return np.asarray(basis @ np.array([values[name] for name in names]))
 
     effect = _law(cell, place, laws.TABLE, parameters, shape=shape)
-    start = dict.fromkeys(names, 0.0)
+    start = dict(zip(names, np.maximum(pieces, low).tolist(), strict=True))
     if cell.axis.memory == "lag":
         start["memory_size"] = cell.axis.memory_size
     return Candidate(effect, free=tuple(start)), start
@@ -138,7 +138,9 @@ def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tup
 def closed_law(
     problem: Problem, cell: Cell, place: int, form: str, fixed: Mapping[str, float], start: Mapping[str, float]
 ) -> tuple[Candidate, dict[str, float]]:
-    """The cell with f of a closed form."""
+    """The cell with f of a closed form; a constant depends on nothing."""
+    if form == "constant":
+        cell = dataclasses.replace(cell, axis=Axis("none"), low=-1.0, high=1.0, pieces=1)
     span, size = cell.high - cell.low, typical(problem, cell.channel)
 
     def parameter(name: str) -> Parameter:

@@ -84,28 +84,34 @@ class Screen:
         self.nuisance = self.rows.mean(fitted.jacobian[:, : problem.nuisances] * scale / np.where(weight > 0.0, weight, 1.0)[:, None])
         own = self.rows.mean(residual[:, None])
         self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
-        self.cells = list(traces.cells())
 
-    def columns(self, cell: Cell) -> Array:
-        bags = [self.traces.columns(cell, bag) for bag in range(len(self.problem.runs))]
+    def columns(self, traces: Traces, cell: Cell) -> Array:
+        bags = [traces.columns(cell, bag) for bag in range(len(self.problem.runs))]
         return self.rows.mean(np.concatenate(bags))
 
-    def search(self, first: Cell | None = None) -> list[Screened]:
-        """All cells, best first; beside ``first`` if given, which then counts as recalibration."""
-        beside = self.nuisance if first is None else np.column_stack([self.nuisance, self.columns(first)])
-        base = _left(beside, np.zeros((beside.shape[0], 0)), self.errors, self.rows.fold, SMOOTHING[0])
+    def pieces(self, traces: Traces, cell: Cell) -> Array:
+        """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
+        columns, m = self.columns(traces, cell), self.nuisance.shape[1]
+        gram, right, _ = _normal(np.column_stack([self.nuisance, columns]), self.errors[:, :1])
+        return np.asarray(np.linalg.solve(gram + _penalty(gram, m, SMOOTHING[0]), right)[m:, 0])
+
+    def search(self, near: Traces | None = None, like: Cell | None = None) -> list[Screened]:
+        """All cells, best first; or of other traces at the same fit those of the channel and the pieces of one."""
+        traces = near or self.traces
+        cells = [cell for cell in traces.cells() if like is None or (cell.channel, cell.pieces) == (like.channel, like.pieces)]
+        base = _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[0])
 
         def one(cell: Cell) -> Screened:
-            columns = self.columns(cell)
+            columns = self.columns(traces, cell)
             norm = float(np.sqrt(np.mean(np.sum(columns**2, axis=0))))
             if norm < 1e-12:
                 return Screened(cell, 0.0, np.zeros(self.errors.shape[1] - 1))
             smoothing = SMOOTHING if cell.pieces > HATS else SMOOTHING[:1]
-            left = np.min([_left(beside, columns / norm, self.errors, self.rows.fold, share) for share in smoothing], axis=0)
+            left = np.min([_left(self.nuisance, columns / norm, self.errors, self.rows.fold, share) for share in smoothing], axis=0)
             gains = base - left
             return Screened(cell, float(gains[0]), gains[1:])
 
-        return sorted(in_threads(one, self.cells), key=lambda found: -found.gain)
+        return sorted(in_threads(one, cells), key=lambda found: -found.gain)
 
 
 def _permuted(errors: Array, fold: IntArray, seed: int) -> Array:
@@ -119,27 +125,32 @@ def _permuted(errors: Array, fold: IntArray, seed: int) -> Array:
     return np.column_stack(drawn)
 
 
+def _normal(both: Array, errors: Array) -> tuple[Array, Array, Array]:
+    """Normal equations of errors (n, k) on columns (n, p): matrix, right sides, energies."""
+    return both.T @ both, both.T @ errors, np.sum(errors**2, axis=0)
+
+
+def _penalty(gram: Array, m: int, smoothing: float) -> Array:
+    """What is added to normal equations: priors of the first ``m`` columns; for the others second differences, a little ridge."""
+    p = gram.shape[0] - m
+    penalty = 1e-9 * np.eye(m + p)
+    penalty[:m, :m] = np.eye(m)
+    if p:
+        second = np.diff(np.eye(p), 2, axis=0) if p > 2 else np.zeros((0, p))
+        penalty[m:, m:] += (smoothing * second.T @ second + RIDGE * np.eye(p)) * max(float(np.trace(gram[m:, m:])), 1e-30) / p
+    return penalty
+
+
 def _left(beside: Array, columns: Array, errors: Array, fold: IntArray, smoothing: float) -> Array:
     """Energy (k,) of errors (n, k) that columns and recalibration, fitted without it, leave of each fold in turn."""
     both = np.column_stack([beside, columns])
-    m, p = beside.shape[1], columns.shape[1]
-    penalty = np.zeros((m + p, m + p))
-    penalty[:m, :m] = np.eye(m)
-    if p > 2:
-        second = np.diff(np.eye(p), 2, axis=0)
-        penalty[m:, m:] = smoothing * second.T @ second
-    penalty[m:, m:] += RIDGE * np.eye(p)
-    grams, rights, energies = [], [], []
-    for k in range(FOLDS):
-        part = fold == k
-        grams.append(both[part].T @ both[part])
-        rights.append(both[part].T @ errors[part])
-        energies.append(np.sum(errors[part] ** 2, axis=0))
-    gram, right = sum(grams), sum(rights)
-    penalty[m:, m:] *= max(float(np.trace(gram[m:, m:])), 1e-30) / max(p, 1) if p else 1.0
+    folds = [_normal(both[fold == k], errors[fold == k]) for k in range(FOLDS)]
+    gram = np.sum([g for g, _, _ in folds], axis=0)
+    right = np.sum([r for _, r, _ in folds], axis=0)
+    penalty = _penalty(gram, beside.shape[1], smoothing)
     left = np.zeros(errors.shape[1])
-    for g, r, energy in zip(grams, rights, energies, strict=True):
-        values = np.linalg.solve(gram - g + penalty + 1e-9 * np.eye(m + p), right - r)
+    for g, r, energy in folds:
+        values = np.linalg.solve(gram - g + penalty, right - r)
         left += energy - 2.0 * np.sum(values * r, axis=0) + np.sum(values * (g @ values), axis=0)
     return left
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.diagnosis.laws.cells import Traces, trace
-from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
+from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.effects import laws
@@ -122,7 +122,9 @@ def described(found: FoundLaws) -> list[dict[str, Any]]:
     """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties."""
     torque = 0.5 * float(np.ptp(found.problem.measured))
     made = []
-    traces = trace(found.problem, found.fit, len(found.problem.vehicle.laws) + len(found.gains) - 1)
+    cells = [_law(candidate.effect).at(values) for candidate, values in found.fit.effects]
+    last = len(found.problem.vehicle.laws) + MOST_LAWS - 1  # a place that is free, or that of the last law itself
+    traces = trace(found.problem, found.fit, last, [cell.axis for cell in cells])
     for index, (entry, (candidate, values)) in enumerate(zip(entries(found), found.fit.effects, strict=True)):
         law = _law(candidate.effect)
         largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, index)), 99.0))
@@ -173,11 +175,10 @@ def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapp
     problem, cell = found.problem, law.at(values)
     residual = problem.measured - found.fit.prediction + contribution(problem, found.fit, index)
     edges = np.linspace(cell.low, cell.high, POINTS + 1)
-    axis = cell.axis if cell.axis in traces.axes else law.cell.axis
     columns = []
     for bag in range(len(problem.runs)):
         parts = []
-        for signal, place in zip(traces.signals[cell.channel][bag], traces.axes[axis][bag], strict=True):
+        for signal, place in zip(traces.signals[cell.channel][bag], traces.axes[cell.axis][bag], strict=True):
             step = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, POINTS - 1)
             parts.append(signal[:, None] * (step[:, None] == np.arange(POINTS)))
         columns.append(np.sum(parts, axis=0))
