@@ -4,13 +4,14 @@
 
 All laws run through the same compiled code. What tells them apart are numbers of the parameter record: the ``cell`` (which
 channel and coordinate, which memory, where the function begins and how fine it is) and the function ``f`` itself, as values
-at ``KNOTS`` equally spaced places of the coordinate, linear between and held beyond.
+at ``KNOTS`` equally spaced places of the coordinate, linear between and held beyond (``reach``).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +37,7 @@ COORDINATES = {
 MEMORIES = {"none": "", "lag": "s", "play": "", "relay": ""}
 """What stands between the coordinate and f: nothing, a first-order lag of so many seconds, a play or a relay of a half width in
 the unit of the coordinate."""
-CELL = ("channel", "coordinate", "memory", "memory_size", "low", "per_unit")
+CELL = ("channel", "coordinate", "memory", "memory_size", "low", "per_unit", "seen_low", "seen_high")
 LEAST_STIFFENING = -0.9
 
 _LEVEL, _STIFFNESS, _TORQUE, _COULOMB, _LOAD, _VISCOUS, _TURBULENT, _GAIN, _INERTIA, _LAG = (float(i + 1) for i in range(10))
@@ -102,7 +103,7 @@ def tangent(
     now = coordinate(cell[1], theta, omega, heading, since, last_torque, slip, work, dwell, time, temperature, air_temperature)
     kept = remembered(cell[2], cell[3], kept, now, dt)
     position = (kept - cell[4]) * cell[5]
-    outside += 0.0 if -1e-6 < position < f.size - 1 + 1e-6 else 1.0
+    outside += 0.0 if cell[6] <= kept <= cell[7] else 1.0
     value = size * looked_up(f, position)
     return (max(value, LEAST_STIFFENING) if cell[0] == _STIFFNESS else 0.0), value, kept, since, slip, work, outside
 
@@ -193,6 +194,8 @@ FORMS: Mapping[str, Form] = {
 }  # fmt: skip
 """Closed forms of f over increasing places of the coordinate; an exponential starts at the first of them."""
 TABLE = "table"
+CONTINUED = ("linear", "hinge", "sinusoid")
+"""Forms that go on beyond the range seen, by half of it to each side, before they are held."""
 POSITIVE = ("scale", "length", "width", "period")
 """Values of forms that must be above zero."""
 
@@ -211,24 +214,40 @@ def sampled(form: str, values: Mapping[str, float], knots: Sequence[float], low:
     return np.asarray(FORMS[form](places, **values), np.float64)
 
 
+def reach(form: str, low: float, high: float) -> tuple[float, float]:
+    """How far f goes on: for some forms half as far again to each side as it was seen."""
+    more = 0.5 * (high - low) if form in CONTINUED else 0.0
+    return low - more, high + more
+
+
 def record(
-    channel: str, coordinate: str, memory: str, memory_size: float, low: float, high: float, f: Array, size: float = 1.0
+    channel: str, coordinate: str, memory: str, memory_size: float, span: tuple[float, float], f: Array, size: float = 1.0,
+    seen: tuple[float, float] | None = None,
 ) -> dict[str, float | Array]:
-    """Fields of a law, without its id: its cell, f (KNOTS,) over the range, and its size."""
+    """Fields of a law, without its id: its cell, f (KNOTS,) over a span of the coordinate, and its size; ``seen``: the part of the
+    span that recordings showed, if not all."""
+    low, high = span
+    edge = 1e-6 * (high - low)
+    seen_low, seen_high = seen or span
     per_unit = (KNOTS - 1) / (high - low)
     codes = [list(CHANNELS).index(channel) + 1, list(COORDINATES).index(coordinate), list(MEMORIES).index(memory)]
-    return {"cell": np.array([*codes, memory_size, low, per_unit], np.float64), "f": f, "size": size}
+    cell = np.array([*codes, memory_size, low, per_unit, seen_low - edge, seen_high + edge], np.float64)
+    return {"cell": cell, "f": f, "size": size}
 
 
-def law_effect(identity: str, title: str, constants: Mapping[str, float | Array]) -> Effect:
-    """A law as an effect: its numbers in ``constants`` (see ``record``), so that all share one compiled code."""
+def law_effect(identity: str, title: str, constants: Mapping[str, float | Array], **told: Any) -> Effect:
+    """A law as an effect: its numbers in ``constants`` (see ``record``), so that all share one compiled code; ``told``: what else
+    an entry says."""
+    said = {
+        "stage": "parallel_torque", "equation": "missing torque = channel x f(coordinate)", "source": "found in recordings",
+        "trace": "as f says", "coordinate": "time", **told,
+    }  # fmt: skip
     return Effect(
-        id=identity, stage="parallel_torque", tier=3, title=title, equation="missing torque = channel x f(coordinate)",
-        source="found in recordings", trace="as f says", coordinate="its own", parameters=(_SIZE,), hooks=_HOOKS, memory=_MEMORY,
-        tables={"cell": len(CELL), "f": KNOTS}, constants=constants, never_late=True, joint_title=title,
+        id=identity, tier=3, title=title, parameters=(_SIZE,), hooks=_HOOKS, memory=_MEMORY, tables={"cell": len(CELL), "f": KNOTS},
+        constants=constants, joint_title=title, **said,
     )  # fmt: skip
 
 
-def slot(index: int) -> Effect:
+def slot(place: int) -> Effect:
     """The effect that runs the law with this place in the vehicle file."""
-    return law_effect(f"law_{index + 1}", f"Law {index + 1}", {})
+    return law_effect(f"law_{place + 1}", f"Law {place + 1}", {})

@@ -350,7 +350,7 @@ class _Run:
         for law, steps in self.estimator.law_left_steps.items():
             if steps:
                 statement = f"{law} of the vehicle file: {steps} steps with its coordinate outside the range on which it was seen"
-                yield Finding("law_left", "", f"{statement}; its last value was held there")
+                yield Finding("law_left", "", f"{statement}; the law is not known there")
 
     def _counted(self, samples: Mapping[str, Mapping[str, Any]], *kinds: Kind) -> str:
         """What came on the inputs of some kinds, in words."""

@@ -6,6 +6,7 @@
 ``save`` writes a file that stands alone (tables embedded) and loads back equal.
 """
 
+from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.vehicle.effects import add_effect, each_once
 from lugre_steering.vehicle.file import SCHEMA, from_mapping, load, save, to_mapping
 from lugre_steering.vehicle.sections import (
@@ -17,7 +18,6 @@ from lugre_steering.vehicle.sections import (
     Friction,
     Hydraulics,
     Initial,
-    LawEntry,
     Levers,
     MasterCurve,
     Rollers,

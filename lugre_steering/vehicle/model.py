@@ -11,10 +11,10 @@ import numpy as np
 
 from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.step import Records, new_parameters
+from lugre_steering.effects.law_entry import law_fields
 from lugre_steering.effects.laws import slot
 from lugre_steering.effects.registry import composed, effect
 from lugre_steering.recording import Array
-from lugre_steering.vehicle.laws import law_fields
 from lugre_steering.vehicle.loads import load_moment, vertical_load
 from lugre_steering.vehicle.rubber import ratio_table
 from lugre_steering.vehicle.sections import Vehicle

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.recording import Channel, Kind
 from lugre_steering.schema import positive, quantity
 
@@ -212,27 +213,6 @@ class EffectEntry:
     """File or package that holds an effect which is not shipped."""
     sha256: str | None = None
     """Of that file, or of the laws of the package: another law under the same name is refused."""
-
-
-@dataclass(frozen=True)
-class LawEntry:
-    """A law that no entry of the catalogue is: channel x f(coordinate), see ``effects.laws``; numbers in SI units.
-
-    ``range``: where the coordinate was seen; f is held beyond. f is a closed ``form`` of ``values``, or a table of equally
-    spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it foretold) tell how sure it is.
-    """
-
-    channel: str
-    coordinate: str
-    form: str
-    range: tuple[float, ...]
-    values: dict[str, float] = field(default_factory=dict)
-    knots: tuple[float, ...] = ()
-    memory: str = "none"
-    memory_size: float = quantity(0.0, 1e12, default=0.0)
-    title: str | None = None
-    intervals: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    heldout_gain: float | None = None
 
 
 @dataclass(frozen=True)

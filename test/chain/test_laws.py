@@ -70,6 +70,11 @@ def test_a_table_is_linear_between_its_knots_and_held_beyond_its_range() -> None
     assert with_law(entry) - with_law() == pytest.approx(expected, abs=1e-6)
 
 
+def test_a_line_goes_on_for_half_its_range_and_is_then_held() -> None:
+    entry = LawEntry("conservative_torque", "angle", "linear", (-0.1, 0.1), {"value": 0.0, "slope": 1e3})
+    assert with_law(entry) - with_law() == pytest.approx(1e3 * np.clip(THETA, -0.2, 0.2), abs=1e-6)
+
+
 def test_a_lagged_rate_follows_its_differential_equation() -> None:
     entry = LawEntry("conservative_torque", "rate", "linear", (-1.0, 1.0), {"value": 0.0, "slope": 1e4}, memory="lag", memory_size=2.0)
     fine = np.arange(0.0, TIME[-1], 1e-3)

@@ -65,7 +65,7 @@ class Cell:
     def fields(self, f: Array, size: float = 1.0) -> dict[str, float | Array]:
         """The law with f (KNOTS,) as ``effects.laws.record`` has it."""
         axis = self.axis
-        return laws.record(self.channel, axis.coordinate, axis.memory, axis.memory_size, self.low, self.high, f, size)
+        return laws.record(self.channel, axis.coordinate, axis.memory, axis.memory_size, (self.low, self.high), f, size)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("at most", f"{words.number(law['largest_Nm'], 3)} {unit}, {words.percent(law['largest_share'])} of the torque"),
         ("foretells on held-out data", f"{words.percent(law['heldout_gain'])} of the missing energy"),
         ("of what any law of this kind could", words.percent(law["share_of_ceiling"])),
-        ("not to be trusted", f"outside {low} to {high}, where it is held constant" if law["coordinate"] != "none" else ""),
+        ("not to be trusted", f"outside {low} to {high}, which nobody saw" if law["coordinate"] != "none" else ""),
         ("fits as well", ties),
     ]
 

@@ -281,7 +281,7 @@ def _next_steps(diagnosis: Diagnosis) -> str:
     if result.get("laws"):
         steps.append(
             "Use the law that was found: <code>augmented.yaml</code> has it under <code>laws</code>, and replay, the live node and the "
-            "next diagnosis run it. It is held constant where its coordinate leaves the range seen (finding <code>law_left</code>)."
+            "next diagnosis run it. Replay tells where its coordinate leaves the range seen (finding <code>law_left</code>)."
         )
         steps.append("To keep it under a name of your own: <code>lugre-steering effects --add augmented.yaml --id NAME</code>.")
     if result["verdict"] == "consistent":

@@ -251,6 +251,6 @@ def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
     text = f"noise floor<br>{words.number(floor, 3)} {html.escape(unit)}"
     note = _note(text, yref="y", x=1.01, y=floor, xanchor="left", yanchor="middle")
     layout = plot_layout(xaxis=plot_axis("", type="category", range=[-0.6, max(len(rows) - 0.4, 1.6)]),
-                     yaxis=plot_axis(f"held-out RMSE [{unit}]", rangemode="tozero"), height=360, shapes=[line], annotations=[note], bargap=0.35,
-                     margin={"l": 78, "r": 100, "t": 34, "b": 48})  # fmt: skip
+                     yaxis=plot_axis(f"held-out RMSE [{unit}]", rangemode="tozero"), height=360,
+                     shapes=[line], annotations=[note], bargap=0.35, margin={"l": 78, "r": 100, "t": 34, "b": 48})  # fmt: skip
     return {"data": data, "layout": layout}
