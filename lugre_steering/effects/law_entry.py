@@ -19,8 +19,8 @@ from lugre_steering.schema import Reader, quantity, suggestion
 class LawEntry:
     """A law that no entry of the catalogue is: channel x f(coordinate), see ``laws``; numbers in SI units.
 
-    ``range``: where the coordinate was seen; beyond, f is held (``laws.reach``). f is a closed ``form`` of ``values``, or a table of equally
-    spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it foretold) tell how sure it is.
+    ``range``: where the coordinate was seen; beyond, f is held (``laws.reach``). f is a closed ``form`` of ``values``, or a
+    table of equally spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it foretold) tell how sure it is.
     """
 
     channel: str

@@ -22,8 +22,8 @@ KEPT = 0.95
 PULL = 0.03
 """How strongly fits pull the free pieces to zero, for those that the data do not show."""
 TRIED_FORMS = 3
-SHARE = 0.03
-"""Size of a law worth seeing, as a share of the torque amplitude."""
+SHARE, MOST = 0.03, 1e4
+"""Size of a law worth seeing, as a share of the torque amplitude, and how many times that it may have."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +69,8 @@ def free_law(problem: Problem, cell: Cell, place: int, pieces: Array) -> tuple[C
     """The cell with f of free pieces, that start as given."""
     scale, names = typical(problem, cell.channel), [f"piece_{i}" for i in range(cell.pieces)]
     basis = cell.basis(np.linspace(cell.low, cell.high, laws.KNOTS))
-    low = 0.0 if cell.channel == "lag" else -np.inf
-    parameters = [Parameter(name, laws.CHANNELS[cell.channel], "of f", scale, low, pull=PULL) for name in names]
+    low = 0.0 if cell.channel == "lag" else -MOST * scale
+    parameters = [Parameter(name, laws.CHANNELS[cell.channel], "of f", scale, low, MOST * scale, pull=PULL) for name in names]
 
     def shape(values: Mapping[str, float]) -> Array:
         return np.asarray(basis @ np.array([values[name] for name in names]))
@@ -150,7 +150,8 @@ def closed_law(
             return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "width", span, 2e-3 * span, 10.0 * span, (span,))
         if name == "exponent":
             return Parameter(name, "1", "exponent", 0.3, 0.1, 6.0)
-        return Parameter(name, laws.CHANNELS[cell.channel], "of f", size / span if name in ("slope", "below", "above") else size)
+        scale = size / span if name in ("slope", "below", "above") else size
+        return Parameter(name, laws.CHANNELS[cell.channel], "of f", scale, -MOST * scale, MOST * scale)
 
     def shape(values: Mapping[str, float]) -> Array:
         given = {name: values[name] for name in start}

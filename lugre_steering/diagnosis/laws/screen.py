@@ -30,7 +30,10 @@ PERMUTED = 16
 
 @dataclass(frozen=True)
 class Rows:
-    """Means of weighted samples over short stretches: ``take`` (n,) gives the row of a sample (-1: not used), ``fold`` (rows,)."""
+    """Means of weighted samples over short stretches: ``take`` (n,) gives the row of a sample (-1: not used), ``fold`` (rows,).
+
+    The beginning of a bag is in no fold that is left out: it alone shows the bristles that the bag starts with.
+    """
 
     take: IntArray
     weight: Array
@@ -50,7 +53,9 @@ class Rows:
         whole[used] = take
         count = np.bincount(take)
         fold = np.zeros(count.size, np.int64)
-        fold[take] = (roles.cluster[used] // FOLD_CLUSTERS) % FOLDS
+        stretch = roles.cluster[used] // FOLD_CLUSTERS
+        first_one = np.isin(stretch, roles.cluster[problem.edges[:-1]] // FOLD_CLUSTERS)
+        fold[take] = np.where(first_one, FOLDS, stretch % FOLDS)
         return Rows(whole, np.where(used, weight / np.sqrt(count[np.maximum(whole, 0)]), 0.0), fold)
 
     def mean(self, columns: Array) -> Array:
@@ -144,12 +149,12 @@ def _penalty(gram: Array, m: int, smoothing: float) -> Array:
 def _left(beside: Array, columns: Array, errors: Array, fold: IntArray, smoothing: float) -> Array:
     """Energy (k,) of errors (n, k) that columns and recalibration, fitted without it, leave of each fold in turn."""
     both = np.column_stack([beside, columns])
-    folds = [_normal(both[fold == k], errors[fold == k]) for k in range(FOLDS)]
+    folds = [_normal(both[fold == k], errors[fold == k]) for k in range(FOLDS + 1)]
     gram = np.sum([g for g, _, _ in folds], axis=0)
     right = np.sum([r for _, r, _ in folds], axis=0)
     penalty = _penalty(gram, beside.shape[1], smoothing)
     left = np.zeros(errors.shape[1])
-    for g, r, energy in folds:
+    for g, r, energy in folds[:FOLDS]:
         values = np.linalg.solve(gram - g + penalty, right - r)
         left += energy - 2.0 * np.sum(values * r, axis=0) + np.sum(values * (g @ values), axis=0)
     return left
