@@ -20,7 +20,8 @@ class LawEntry:
     """A law that no entry of the catalogue is: channel x f(coordinate), see ``laws``; numbers in SI units.
 
     ``range``: where the coordinate was seen; beyond, f is held (``laws.reach``). f is a closed ``form`` of ``values``, or a
-    table of equally spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it foretold) tell how sure it is.
+    table of equally spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it
+    foretold) tell how sure it is.
     """
 
     channel: str

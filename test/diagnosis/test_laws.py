@@ -95,6 +95,7 @@ def test_a_law_is_kept_under_a_name_and_what_stood_in_the_file_stays(tmp_path: P
 
 def test_a_bad_law_in_a_catalogue_is_refused_by_key(tmp_path: Path) -> None:
     file = tmp_path / "own.yaml"
-    file.write_text("{id: bad, title: Bad, law: {channel: gian, coordinate: none, form: constant, range: [0.0, 1.0], values: {value: 0.1}}}\n")
+    law = "{channel: gian, coordinate: none, form: constant, range: [0.0, 1.0], values: {value: 0.1}}"
+    file.write_text(f"{{id: bad, title: Bad, law: {law}}}\n")
     with pytest.raises(EffectError, match=r"own.yaml: key 'law.channel'.*gain"):
         read_effects(file)
