@@ -371,12 +371,25 @@ def effects(
     effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,
     check: Annotated[bool, typer.Option("--check", help="try what every effect owes the chain (exit code 1 if it fails)")] = False,
+    add: Annotated[Path | None, typer.Option(help="keep a law of this vehicle file under the name --id")] = None,
+    name: Annotated[str, typer.Option("--id", help="name of the law that is kept")] = "",
+    title: Annotated[str, typer.Option(help="its title (default: what the law says of itself)")] = "",
+    law: Annotated[int, typer.Option(help="which law of the vehicle file is kept, from 1")] = 1,
+    to: Annotated[Path, typer.Option(help="file of effects of your own that it is kept in, for --effects")] = Path("own_physics.yaml"),
     as_json: Json = False,
 ) -> None:
-    """List the physics that diagnosis knows, or explain one effect: law, source, parameters, how it shows."""
+    """List the physics that diagnosis knows, explain one effect (law, source, parameters, how it shows), or keep a law that was found."""
     from lugre_steering.diagnosis import effect_card as card
     from lugre_steering.effects import registry
 
+    if add is not None:
+        from lugre_steering.vehicle.keep import keep_law
+
+        if not name:
+            raise DataError("effects --add: needs a name for the law: --id NAME")
+        keep_law(add, law, name, title, to)
+        print_json({"id": name, "file": str(to)}) if as_json else print(f"{name} is kept in {to}; use it with --effects {to}")
+        return
     if not effect_id:
         if out is not None:
             raise DataError("effects --out: needs the id of one effect; 'lugre-steering effects' lists them")

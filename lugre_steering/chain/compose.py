@@ -48,6 +48,8 @@ class Physics(Protocol):
     @property
     def hooks(self) -> Mapping[str, Law]: ...
     @property
+    def tables(self) -> Mapping[str, int]: ...
+    @property
     def amplitudes(self) -> Sequence[str]: ...
     @property
     def per_line(self) -> bool: ...
@@ -171,7 +173,11 @@ def _compose(effects: Sequence[Physics]) -> Composition:
     _made[name] = Composition(
         name,
         text,
-        np.dtype([(field, np.float64) for field in (*BASELINE_FIELDS, *_parameter_fields(effects, per_line=False), name)]),
+        np.dtype([
+            *((field, np.float64) for field in (*BASELINE_FIELDS, *_parameter_fields(effects, per_line=False))),
+            *((f"{effect.id}_{table}", np.float64, (size,)) for effect in effects for table, size in effect.tables.items()),
+            (name, np.float64),
+        ]),
         np.dtype([*((field, np.float64) for field in STATE_FIELDS), *_memory_fields(effects)]),
         np.dtype([(field, np.float64) for field in (*_parameter_fields(effects, per_line=True), name)]),
         _starts(effects),
@@ -191,9 +197,9 @@ def check(effect: Physics) -> None:
         for name in _arguments(function):
             _wire(effect, hook, name)
             read.add(name)
-    own = [p.name for p in effect.parameters] + list(effect.memory)
+    own = [p.name for p in effect.parameters] + list(effect.memory) + list(effect.tables)
     if doubled := sorted({name for name in own if own.count(name) > 1}):
-        raise EffectError(f"effect '{effect.id}': {', '.join(doubled)}: expected each name once among parameters and memory")
+        raise EffectError(f"effect '{effect.id}': {', '.join(doubled)}: expected each name once among parameters, memory and tables")
     if effect.hooks and (idle := [name for name in own if name not in read]):
         raise EffectError(f"effect '{effect.id}': {', '.join(idle)}: no law reads it; expected an argument of that name")
 
@@ -230,13 +236,13 @@ def _wire(effect: Physics, hook: str, name: str) -> str:
     known = quantities_of(hook)
     if name in effect.memory:
         return f"s.{effect.id}_{name}"
-    if any(p.name == name for p in effect.parameters):
+    if name in effect.tables or any(p.name == name for p in effect.parameters):
         return f"{record}.{effect.id}_{name}"
     if name in known:
         return known[name]
     if name in BASELINE_FIELDS and hook not in ("line", "delay", "lag"):
         return f"p.{name}"
-    own = [p.name for p in effect.parameters] + list(effect.memory)
+    own = [p.name for p in effect.parameters] + list(effect.memory) + list(effect.tables)
     raise EffectError(
         f"effect '{effect.id}': law '{hook}': got the argument '{name}', expected one of its own ({', '.join(own) or 'none'}), a quantity "
         f"known there ({', '.join(known) or 'none'}) or a parameter of the baseline ({', '.join(BASELINE_FIELDS)})"

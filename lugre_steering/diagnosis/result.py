@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from lugre_steering import units
 from lugre_steering.errors import DataError
@@ -181,6 +181,8 @@ class Diagnosis(Result):
     detection_limits: Mapping[str, Limit]
     data_quality: tuple[BagFinding, ...]
     next_experiment: Experiment | None
+    laws: tuple[Mapping[str, Any], ...] = ()
+    """Found where no entry of the catalogue explains what is left; ``augmented.yaml`` runs them."""
     traces: tuple[BagTrace, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
     evidence: tuple[Evidence, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
     coordinate_of: Mapping[str, str] = field(default_factory=dict, repr=False, metadata=IN_MEMORY)

@@ -40,6 +40,8 @@ class Parameter:
     """Refinement of the shape: zero (or as the vehicle sheet has it) in the screen, fitted only once the effect is accepted."""
     example: float | None = None
     """A value at which it acts in an ordinary double cycle, where ``scale`` would leave it idle."""
+    pull: float = 0.0
+    """Weight with which a fit pulls it to zero, per ``scale`` and noise standard deviation."""
 
     @property
     def typical(self) -> float:
@@ -130,6 +132,10 @@ class Effect:
     """Its shapes as a recording suggests them, in place of the grids."""
     acts_by: tuple[str, ...] = ()
     """Parameters any of which makes it act, where that is more than its plain amplitudes."""
+    tables: Mapping[str, int] = field(default_factory=dict)
+    """Rows of numbers that its laws read beside the parameters, with their lengths."""
+    constants: Mapping[str, float | Array] = field(default_factory=dict)
+    """What stands in its tables, and what its parameters are where nothing is given."""
 
     @property
     def observable(self) -> bool:
@@ -141,6 +147,10 @@ class Effect:
         ends = {name for pair in self.places for name in pair}
         plain = (p.name for p in self.parameters if not p.is_shape and not p.optional and p.name not in ends)
         return self.acts_by or tuple(plain)
+
+    def fields(self, values: Mapping[str, float] | Mapping[str, float | Array]) -> dict[str, float | Array]:
+        """What the parameter record holds of it, by field: its tables, and the given values of its parameters."""
+        return {f"{self.id}_{name}": value for name, value in {**self.constants, **values}.items()}
 
     def law(self, hook: str, values: Mapping[str, float], **quantities: Any) -> Any:
         """A law without memory over arrays: its own parameters from ``values`` (0 where absent)."""

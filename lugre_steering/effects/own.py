@@ -9,18 +9,23 @@ import hashlib
 import importlib.util
 import math
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import yaml
+
 from lugre_steering.chain.compiled import exp, law
 from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
+from lugre_steering.effects.law_entry import LawEntry, check_law, named
 from lugre_steering.errors import EffectError
 from lugre_steering.expression import ExpressionError, parse
+from lugre_steering.files import write_text
 from lugre_steering.schema import Reader
 
 PAIRED = ("wind_up", "contact")
@@ -77,6 +82,16 @@ class _Sheet:
     joint_title: str = ""
 
 
+@dataclass(frozen=True)
+class _Kept:
+    """A law of a vehicle file under a name, see ``law_entry.named``."""
+
+    id: str
+    title: str
+    law: LawEntry
+    source: str = "found in recordings"
+
+
 def read_effects(file: Path) -> tuple[list[Effect], str]:
     """Effects of a user's file, and the SHA-256 of its content, by which vehicle files know it again."""
     try:
@@ -129,7 +144,47 @@ def _of_yaml(file: Path) -> list[Effect]:
     if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise reader.fail("effects", listed, "a list of effects")
     prefixes = [f"effects[{i}]" for i in range(len(listed))] if len(listed) > 1 else [""]
-    return [_of_sheet(reader, reader.build(_Sheet, item, prefix), prefix) for item, prefix in zip(listed, prefixes, strict=True)]
+    return [
+        _of_law(reader, reader.build(_Kept, item, prefix), prefix)
+        if isinstance(item, Mapping) and "law" in item
+        else _of_sheet(reader, reader.build(_Sheet, item, prefix), prefix)
+        for item, prefix in zip(listed, prefixes, strict=True)
+    ]
+
+
+def _of_law(reader: Reader, kept: _Kept, prefix: str) -> Effect:
+    before = f"{prefix}." if prefix else ""
+    if not NAME.fullmatch(kept.id):
+        raise reader.fail(f"{before}id", kept.id, "a name of small letters, digits and _, a letter first")
+    check_law(kept.law, reader, f"{before}law")
+    return named(kept.id, kept.title, kept.source, kept.law)
+
+
+def add_law(catalogue: Path, identity: str, title: str, source: str, law: Mapping[str, Any]) -> None:
+    """Keep a law (plain data) under a name in a YAML file of effects, which is made if there is none; what stands there stays."""
+    if catalogue.suffix not in (".yaml", ".yml"):
+        raise EffectError(f"{catalogue}: got the ending '{catalogue.suffix}', expected .yaml")
+    new = {"id": identity, "title": title, "source": source, "law": law}
+    item = yaml.safe_dump([new], sort_keys=False, allow_unicode=True, width=120)
+    reader = Reader(catalogue, EffectError)
+    before, known = "effects:\n", []
+    if catalogue.exists():
+        if any(effect.id == identity for effect in read_effects(catalogue)[0]):
+            raise EffectError(f"{catalogue}: effect '{identity}': there is one of this name; expected another id")
+        before = reader.text().rstrip("\n") + "\n"
+        content = reader.parse(before)
+        known = list(content["effects"]) if isinstance(content, Mapping) and "effects" in content else []
+    for indent in ("", "  ", "    "):
+        text = before + textwrap.indent(item, indent)
+        try:
+            whole = reader.parse(text)
+        except EffectError:
+            continue
+        if whole == {"effects": [*known, new]}:
+            _of_law(reader, reader.build(_Kept, new, ""), "")
+            write_text(text, catalogue)
+            return
+    raise EffectError(f"{catalogue}: expected a file of one list 'effects', each entry behind a dash, to add '{identity}' to")
 
 
 def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:

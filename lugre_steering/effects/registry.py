@@ -23,6 +23,7 @@ from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.step import new_parameters, run_side
 from lugre_steering.effects import own
 from lugre_steering.effects.entry import STAGES, Effect
+from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
 
 GROUP = "lugre_steering.effects"
@@ -75,10 +76,10 @@ def rivals(effect: Effect) -> list[str]:
     return [other.id for other in CATALOGUE.values() if other.id in effect.rivals or effect.id in other.rivals]
 
 
-def composed(ids: Iterable[str] | None = None) -> Composition:
-    """The step with the effects of these ids in place (default: all that is known)."""
+def composed(ids: Iterable[str] | None = None, laws: int = 0) -> Composition:
+    """The step with the effects of these ids in place (default: all that is known), and so many laws of the vehicle file."""
     chosen = set(CATALOGUE if ids is None else ids)
-    return compose([effect for effect in CATALOGUE.values() if effect.id in chosen])
+    return compose([*(effect for effect in CATALOGUE.values() if effect.id in chosen), *map(slot, range(laws))])
 
 
 def add_files(files: Sequence[Path]) -> None:
@@ -114,8 +115,9 @@ def _try(new: Effect) -> None:
     for field, value in (("static_torque", 1.1), ("coulomb_torque", 1.0), ("sigma_0", 50.0), ("stribeck_speed", 0.05),
                          ("stribeck_exponent", 2.0), ("heat_capacity", 1e4), ("sides", 1.0), ("table_step", 1.0)):  # fmt: skip
         p[field] = value
-    for parameter in new.parameters if not new.per_line else ():
-        p[f"{new.id}_{parameter.name}"] = parameter.typical
+    if not new.per_line:
+        for field, number in new.fields({parameter.name: parameter.typical for parameter in new.parameters}).items():
+            p[field] = number
     try:
         phase = 3.0 * time
         theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))

@@ -15,6 +15,7 @@ from numba import njit
 from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
+from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import JUMPED, REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD
@@ -218,6 +219,13 @@ class Estimator:
         """The feed-forward [N m] of each side was last this; it comes back from there over the recovery ramp."""
         self._core.released[: len(feed_forward)] = feed_forward
         self._core.config["weight"] = 0.0
+
+    @property
+    def law_left_steps(self) -> Mapping[str, int]:
+        """Steps so far with the coordinate of a law outside the range on which it was seen, by the law's place in the file; what
+        was counted before a restart is forgotten."""
+        state = self._core.state
+        return {f"laws[{i}]": int(state[f"{slot(i).id}_outside"].sum()) for i in range(len(self.vehicle.laws))}
 
     def snapshot(self) -> list[np.ndarray[Any, Any]]:
         """A copy of the whole state, for ``restore``."""

@@ -76,7 +76,7 @@ def fit(
     p0 = np.concatenate([x0 / scale, [parameter.scaled(values0[i].get(parameter.name, 0.0)) for i, parameter in free]])
     low = np.concatenate([low / scale, [parameter.scaled(parameter.low) for _, parameter in free]])
     high = np.concatenate([high / scale, [parameter.scaled(parameter.high) for _, parameter in free]])
-    prior = np.concatenate([problem.prior_weights(priors), np.zeros(len(free))])
+    prior = np.concatenate([problem.prior_weights(priors), [parameter.pull for _, parameter in free]])
     n = problem.nuisances
 
     def unpack(p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:

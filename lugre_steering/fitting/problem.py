@@ -176,11 +176,12 @@ class Problem:
     """
 
     def __init__(
-        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None
+        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None, *, more_laws: int = 0
     ) -> None:
+        """``more_laws``: so many laws are tried in place of effects of the catalogue, of which only the vehicle's are there."""
         self.vehicle = vehicle
         self.runs = list(runs)
-        self.model: Model = build_model(vehicle)
+        self.model: Model = build_model(vehicle, lean=more_laws > 0, more_laws=more_laws)
         self.calibrations = tuple(calibrations_for(vehicle) if calibrations is None else calibrations)
         self.measured = np.concatenate([run.measured for run in runs])
         self.valid = np.concatenate([run.valid for run in runs])
@@ -278,9 +279,9 @@ class Problem:
                 if since <= start:
                     acting["air_temperature"] = air + warmer
             for candidate, values in effects:
-                for name, value in values.items() if candidate.start(bag) <= start else ():
-                    if not candidate.effect.per_line:
-                        acting[f"{candidate.effect.id}_{name}"] = value
+                if candidate.start(bag) <= start and not candidate.effect.per_line:
+                    for field, number in candidate.effect.fields(values).items():
+                        acting[field] = number
             phases.append((start, acting))
         total = np.zeros(run.time.size)
         for side in range(run.theta.shape[0]):

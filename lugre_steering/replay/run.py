@@ -435,6 +435,10 @@ class Passage:
         if self.estimator.saturated_steps:
             statement = "steps with a temperature outside the rubber table, whose edge was used"
             yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
+        for law, steps in self.estimator.law_left_steps.items():
+            if steps:
+                statement = f"{law} of the vehicle file: {steps} steps with its coordinate outside the range on which it was seen"
+                yield Finding("law_left", "", f"{statement}; the law is not known there")
 
     def _counted(self, samples: Mapping[str, InputCounts], *kinds: Kind) -> str:
         """What came on the inputs of some kinds, in words."""

@@ -48,8 +48,9 @@ class _Bench:
 
     def parameters(self, **changes: float) -> Records:
         p = self.baseline.copy()
-        for parameter in self.effect.parameters:
-            p[f"{self.effect.id}_{parameter.name}"] = changes.get(parameter.name, parameter.typical)
+        values = {parameter.name: changes.get(parameter.name, parameter.typical) for parameter in self.effect.parameters}
+        for field, number in self.effect.fields(values).items():
+            p[field] = number
         return p
 
     def torque(self, p: Records, motion: Motion | None = None) -> Array:

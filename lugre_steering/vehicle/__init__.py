@@ -6,6 +6,7 @@
 ``save`` writes a file that stands alone (tables embedded) and loads back equal.
 """
 
+from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.vehicle.effects import add_effect, each_once
 from lugre_steering.vehicle.file import SCHEMA, from_mapping, load, save, to_mapping, vehicle_of
 from lugre_steering.vehicle.sections import (
@@ -31,7 +32,7 @@ from lugre_steering.vehicle.sections import (
 from lugre_steering.vehicle.tables import pavements
 
 __all__ = [
-    "SCHEMA", "Axle", "Contact", "Cylinder", "DmaTable", "EffectEntry", "Friction", "Hydraulics", "Initial", "Levers",
+    "SCHEMA", "Axle", "Contact", "Cylinder", "DmaTable", "EffectEntry", "Friction", "Hydraulics", "Initial", "LawEntry", "Levers",
     "MasterCurve", "Rollers", "Rubber", "Sensors", "Topics", "TorqueSensor", "Track", "Vehicle", "Wlf", "add_effect",
     "each_once", "from_mapping", "load", "pavements", "save", "to_mapping", "vehicle_of",
 ]  # fmt: skip

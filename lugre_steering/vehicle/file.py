@@ -18,6 +18,7 @@ from lugre_steering.files import MAKER, VEHICLE_MARK, write_text
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
 from lugre_steering.vehicle.effects import each_once, with_effects
+from lugre_steering.vehicle.laws import check_laws
 from lugre_steering.vehicle.plausible import plausibility
 from lugre_steering.vehicle.sections import Initial, Vehicle
 from lugre_steering.vehicle.tables import embed_tables, with_pavement
@@ -57,6 +58,7 @@ def from_mapping(data: object, file: Path) -> Vehicle:
         raise reader.fail("schema", data.get("schema"), f"'{SCHEMA}'")
     vehicle = _with_initial(reader.build(Vehicle, embed_tables(data, reader), ""))
     check(vehicle, reader)
+    check_laws(vehicle, reader)
     return with_pavement(with_effects(vehicle, reader), reader)
 
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.step import Records, new_parameters
+from lugre_steering.effects.law_entry import law_fields
+from lugre_steering.effects.laws import slot
 from lugre_steering.effects.registry import composed, effect
 from lugre_steering.recording import Array
 from lugre_steering.vehicle.loads import load_moment, vertical_load
@@ -30,27 +32,30 @@ class Model:
     rubber: Array
 
 
-def build_model(vehicle: Vehicle, *, lean: bool = False) -> Model:
-    """Parameter records with the vehicle's effects at their values; the others are in place and neutral, or left out (``lean``)."""
-    composition = composed(entry.id for entry in vehicle.effects) if lean else composed()
+def build_model(vehicle: Vehicle, *, lean: bool = False, more_laws: int = 0) -> Model:
+    """Parameter records with the vehicle's effects and laws at their values; the others are in place and neutral, or left out
+    (``lean``). ``more_laws``: places for laws that the file has not."""
+    ids = [entry.id for entry in vehicle.effects] if lean else None
+    composition = composed(ids, len(vehicle.laws) + more_laws)
     record = new_parameters(composition)
     lines = np.zeros(len(vehicle.hydraulics.lines) if vehicle.hydraulics is not None else 0, composition.lines)
-    values = baseline_parameters(vehicle)
+    values: dict[str, float | Array] = {**baseline_parameters(vehicle)}
     contact = vehicle.friction or vehicle.contact
     assert contact is not None
-    rubber, values["table_low"], values["table_step"] = ratio_table(
-        vehicle.rubber, contact.reference_temperature_degC, contact.temperature_law
-    )
+    rubber, low, step = ratio_table(vehicle.rubber, contact.reference_temperature_degC, contact.temperature_law)
+    values |= {"table_low": low, "table_step": step}
     for entry in vehicle.effects:
         known = effect(entry.id)
+        if not known.per_line:
+            values |= known.fields(entry.parameters)
+            continue
         for name, value in entry.parameters.items():
-            if known.per_line:
-                assert vehicle.hydraulics is not None
-                lines[f"{entry.id}_{known.parameters[0].name}"][vehicle.hydraulics.lines.index(name)] = value
-            else:
-                values[f"{entry.id}_{name}"] = value
-    for field, value in values.items():
-        record[field] = value
+            assert vehicle.hydraulics is not None
+            lines[f"{entry.id}_{known.parameters[0].name}"][vehicle.hydraulics.lines.index(name)] = value
+    for i, law in enumerate(vehicle.laws):
+        values |= slot(i).fields(law_fields(law))
+    for field, number in values.items():
+        record[field] = number
     return Model(composition, tuple(record.copy() for _ in vehicle.sides), lines, rubber)
 
 

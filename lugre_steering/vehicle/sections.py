@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.recording import Channel, Kind
 from lugre_steering.schema import positive, quantity
 
@@ -246,6 +247,7 @@ class Vehicle:
     topics: Topics = field(default_factory=Topics)
     sides: tuple[str, ...] = SIDES
     effects: tuple[EffectEntry, ...] = ()
+    laws: tuple[LawEntry, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @cached_property

@@ -14,8 +14,10 @@ from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.conclude.left_over import left_over
+from lugre_steering.diagnosis.conclude.left_over import beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
+from lugre_steering.diagnosis.laws.find import find
+from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
@@ -44,6 +46,13 @@ def conclude(
         final = whole  # timed by all data
     left = left_over(done, final)
     verdict: Verdict
+    lawful, beside, laws = None, done, []
+    if left.structured and not named:
+        lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress)
+    if lawful is not None:
+        beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
+        laws = described(lawful)
+        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque))
     if named:
         verdict = "missing_physics"
     elif left.structured:
@@ -51,8 +60,11 @@ def conclude(
     else:
         verdict = "consistent"
     effects = named_effects(done, whole, material) if named else []
-    after = judged.after if named else judged.before
-    vehicle = augmented_vehicle(done, whole, effects, after)
+    better = named or lawful is not None
+    after = judged.after if better else judged.before
+    vehicle = augmented_vehicle(beside, whole, effects, after)
+    if lawful is not None:
+        vehicle = vehicle.replace(laws=(*vehicle.laws, *entries(lawful)))
     kept = {entry.id for entry in vehicle.effects}
     ended = [effect.id for effect in effects if effect.id not in kept]
     causal = causal_rmse(vehicle, recordings, problem.runs)
@@ -61,14 +73,14 @@ def conclude(
         schema=SCHEMA,
         bags=tuple(run.name for run in problem.runs),
         verdict=verdict,
-        statement=statement(done, verdict, effects, judged, causal, left.text, ended),
+        statement=statement(done, verdict, effects, judged, causal, left.text, ended, lawful is not None),
         noise_floor_Nm=done.noise.floor,
         baseline=Errors(verify.rmse(problem, found.baseline, problem.valid), judged.before),
         augmented=Augmented(
             rmse_Nm=verify.rmse(problem, final, problem.valid),
             heldout_rmse_Nm=after,
-            improvement=judged.gain if named else 0.0,
-            improvement_ci95=judged.interval if named else (0.0, 0.0),
+            improvement=judged.gain if better else 0.0,
+            improvement_ci95=judged.interval if better else (0.0, 0.0),
             causal_rmse_Nm=causal,
             vehicle=vehicle,
         ),
@@ -77,7 +89,8 @@ def conclude(
         detection_limits=_limits(done, [effect.id for effect in effects]),
         data_quality=tuple(findings),
         next_experiment=next_experiment(done, verdict, whole),
-        traces=traces(done, whole, final, None if judged.rotated else found.final if named else found.baseline),
+        laws=tuple(laws),
+        traces=traces(beside, whole, final, None if judged.rotated else found.final if named else final),
         evidence=evidence(done, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
     ).in_words()

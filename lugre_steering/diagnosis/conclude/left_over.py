@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -83,6 +84,14 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     )
     where = _where(done, axes, axis, residual, shape)
     return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
+
+
+def beside_laws(before: LeftOver, after: LeftOver, law: str) -> LeftOver:
+    """Unlisted structure ``before`` once a law is found for it, said in ``law``; ``after``: what is left beside the law."""
+    formula = f"missing torque: {law}"
+    rest = f"beside the law, {after.text or after.entry.description}"
+    entry = replace(before.entry, description=f"{law}; {rest}", formula=formula)
+    return LeftOver(entry, f"a law that was not listed does: {law}; {rest}", True)
 
 
 def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:

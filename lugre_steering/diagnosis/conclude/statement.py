@@ -44,17 +44,24 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
 
 def statement(
     done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str,
-    ended: Sequence[str],
+    ended: Sequence[str], lawful: bool,
 ) -> str:
     """The verdict for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
     looking ahead, ``left``: what remains,
-    ``ended``: effects that do not act in the last bag."""
+    ``ended``: effects that do not act in the last bag, ``lawful``: a law was found for it."""
     floor, torque = done.torque(done.noise.floor), done.torque
     if verdict == "consistent":
         return (
             f"After recalibration the published model explains the recording: held-out error "
             f"{torque(judged.before)} at a noise floor of {floor}. No missing physics is needed; "
             "see detection_limits for what could have gone unseen."
+        )
+    if verdict == "unlisted_physics" and lawful:
+        return (
+            f"No entry of the catalogue explains what the recalibrated model leaves over, but {left}. With the law the held-out error "
+            f"falls from {torque(judged.before)} to {torque(judged.after)} (improvement {100 * judged.gain:.0f} %, 95 % interval "
+            f"{100 * judged.interval[0]:.0f} to {100 * judged.interval[1]:.0f} %) at a noise floor of {floor}. augmented.yaml has it "
+            "under 'laws'."
         )
     if verdict == "unlisted_physics":
         return (

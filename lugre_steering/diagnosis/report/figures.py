@@ -14,6 +14,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.report import plots, shown
+from lugre_steering.diagnosis.report.laws import draw_law
 from lugre_steering.diagnosis.result import BagTrace, Diagnosis, picture_names
 from lugre_steering.report import words
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, figure
@@ -35,7 +36,10 @@ def draw_all(diagnosis: Diagnosis, folder: Path) -> dict[str, Path]:
     ]
     if diagnosis.evidence:
         wanted.append(("evidence", "evidence", partial(_evidence, diagnosis)))
-    if diagnosis.json["effects"] and plots.heldout_rows(diagnosis):
+    wanted += [
+        (f"law {law['id']}", f"law_{law['id']}", partial(draw_law, diagnosis, law)) for law in diagnosis.json.get("laws", ())
+    ]
+    if plots.colours(diagnosis) and plots.heldout_rows(diagnosis):
         wanted.append(("heldout", "heldout", partial(_heldout, diagnosis)))
     found = {}
     for (key, _, picture), file in zip(wanted, picture_names([name for _, name, _ in wanted]), strict=True):

@@ -18,7 +18,7 @@ from typing import Any
 
 from lugre_steering import units
 from lugre_steering.calibration.calibrate import KEYS
-from lugre_steering.diagnosis.report import plots
+from lugre_steering.diagnosis.report import laws, plots
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError
@@ -167,6 +167,7 @@ def _sections(diagnosis: Diagnosis, drawing: _Drawing) -> list[Section]:
         Section("next", "Next steps", "What to do next", _next_steps(diagnosis)),
         Section("torque", "Torque", "Torque, measured and modelled", _torque(diagnosis, drawing)),
         Section("effects", "Found", "What was found", _effects(diagnosis, drawing)),
+        Section("laws", "Laws", "A law that no entry of the catalogue is", _laws(diagnosis, drawing)),
         Section("heldout", "Held out", "Error on held-out data", _heldout(diagnosis, drawing)),
         Section("evidence", "Evidence", "Evidence for and against each candidate", _evidence(diagnosis)),
         Section("left", "Left over", "What is left", _left(diagnosis)),
@@ -277,6 +278,12 @@ def _next_steps(diagnosis: Diagnosis) -> str:
             "the live node publishes the better torque with <code>vehicle_file:=augmented.yaml</code>."
         )
         steps.append("Check it on the machine: the stretches and ranges below say where and when it acts.")
+    if result.get("laws"):
+        steps.append(
+            "Use the law that was found: <code>augmented.yaml</code> has it under <code>laws</code>, and replay, the live node and the "
+            "next diagnosis run it. Replay tells where its coordinate leaves the range seen (finding <code>law_left</code>)."
+        )
+        steps.append("To keep it under a name of your own: <code>lugre-steering effects --add augmented.yaml --id NAME</code>.")
     if result["verdict"] == "consistent":
         steps.append(
             "Keep the recalibrated baseline (<code>augmented.yaml</code>). What is below the "
@@ -313,6 +320,16 @@ def _torque(diagnosis: Diagnosis, drawing: _Drawing) -> str:
 
 def _effects(diagnosis: Diagnosis, drawing: _Drawing) -> str:
     return "".join(_effect(diagnosis, effect, drawing) for effect in diagnosis.json["effects"])
+
+
+def _laws(diagnosis: Diagnosis, drawing: _Drawing) -> str:
+    vehicle = diagnosis.vehicle
+    return "".join(
+        f'<div class="effect"><h3>{_text(law["title"])}</h3>\n{_pairs([(name, _text(value)) for name, value in laws.facts(vehicle, law)])}'
+        + drawing.place(f"law {law['id']}", laws.plot(vehicle, law), f"f of {law['title']} with its band and the data", "half")
+        + "</div>\n"
+        for law in diagnosis.json.get("laws", ())
+    )
 
 
 def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], drawing: _Drawing) -> str:

@@ -31,7 +31,7 @@ _GRID = {"gridcolor": "#e6e8eb", "zerolinecolor": "#c4c8ce", "linecolor": "#c4c8
          "tickcolor": "#c4c8ce", "ticklen": 4}  # fmt: skip
 
 
-def _layout(**more: Any) -> Spec:
+def plot_layout(**more: Any) -> Spec:
     return {
         "font": {**_FONT, "color": "#1b1f24"}, "paper_bgcolor": "white", "plot_bgcolor": "white",
         "hovermode": "closest", "margin": {"l": 78, "r": 18, "t": 34, "b": 48}, "legend": _legend(1.0), **more,
@@ -47,7 +47,7 @@ def _note(text: str, **place: Any) -> Spec:
     return {"text": text, "xref": "paper", "showarrow": False, "font": {"size": 12, "color": "#5b6169"}, **place}
 
 
-def _axis(title: str, **more: Any) -> Spec:
+def plot_axis(title: str, **more: Any) -> Spec:
     return {**_GRID, "title": {"text": html.escape(title), "standoff": 8}, "automargin": True, **more}
 
 
@@ -60,8 +60,8 @@ def rounded(values: Array, scale: float = 1.0) -> list[float | None]:
 
 
 def colours(diagnosis: Diagnosis) -> dict[str, str]:
-    """Colour of each named effect."""
-    ids = [effect["id"] for effect in diagnosis.json["effects"]]
+    """Colour of each named effect and each law found."""
+    ids = [found["id"] for key in ("effects", "laws") for found in diagnosis.json.get(key, ())]
     return {name: EFFECT_COLOURS[i % len(EFFECT_COLOURS)] for i, name in enumerate(ids)}
 
 
@@ -102,16 +102,16 @@ def torque_plot(diagnosis: Diagnosis, trace: BagTrace) -> Spec:
         shapes += _strip(lane, trace.intervals.get(name, ()), colour[name])
         if shown.is_local(trace, name):
             shapes += [_band(span, colour[name], 0.14) for span in trace.intervals[name]]
-    time = _axis("time since the first stamp [s]", anchor="y3" if parts else "y2", domain=[0, 1])
+    time = plot_axis("time since the first stamp [s]", anchor="y3" if parts else "y2", domain=[0, 1])
     titles = [f"torque [{torque.label}]", f"residual [{left.label}]", f"effect [{added.label}]"]
     axes = {
-        f"yaxis{'' if i == 0 else i + 1}": _axis(title, domain=list(row), fixedrange=False)
+        f"yaxis{'' if i == 0 else i + 1}": plot_axis(title, domain=list(row), fixedrange=False)
         for i, (title, row) in enumerate(zip(titles, rows, strict=False))
     }
     height = 740 if parts else 560
     return {
         "data": data,
-        "layout": _layout(xaxis=time, **axes, shapes=shapes, height=height, hovermode="x unified",
+        "layout": plot_layout(xaxis=time, **axes, shapes=shapes, height=height, hovermode="x unified",
                           legend=_legend(1.03 + 0.016 * len(parts)), margin={"l": 78, "r": 18, "t": 84, "b": 48}),
     }  # fmt: skip
 
@@ -167,11 +167,11 @@ def residual_plot(diagnosis: Diagnosis, effect: dict[str, Any]) -> Spec:
     band = {"type": "rect", "xref": "paper", "yref": "y2", "x0": 0.55, "x1": 1, "y0": -2 * floor, "y1": 2 * floor,
             "fillcolor": QUIET, "opacity": 0.2, "line": {"width": 0}, "layer": "below"}  # fmt: skip
     note = _note("grey band: ± 2 noise floors", yref="paper", x=1, y=1.0, xanchor="right", yanchor="bottom")
-    layout = _layout(
-        xaxis=_axis(cloud.axis.label, domain=[0, 0.46], anchor="y"),
-        xaxis2=_axis(cloud.axis.label, domain=[0.55, 1], anchor="y2", matches="x"),
-        yaxis=_axis(f"before [{cloud.torque.label}]"),
-        yaxis2=_axis(f"after [{cloud.torque.label}]", anchor="x2", matches="y"),
+    layout = plot_layout(
+        xaxis=plot_axis(cloud.axis.label, domain=[0, 0.46], anchor="y"),
+        xaxis2=plot_axis(cloud.axis.label, domain=[0.55, 1], anchor="y2", matches="x"),
+        yaxis=plot_axis(f"before [{cloud.torque.label}]"),
+        yaxis2=plot_axis(f"after [{cloud.torque.label}]", anchor="x2", matches="y"),
         height=430, shapes=[band], annotations=[note], legend=_legend(1.08, itemsizing="constant"),
         margin={"l": 78, "r": 18, "t": 70, "b": 48},
     )  # fmt: skip
@@ -222,7 +222,7 @@ def heldout_rows(diagnosis: Diagnosis) -> list[tuple[str, float, float, tuple[fl
 def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
     """Bars of the held-out error before and after, the noise floor as a line."""
     rows, unit = heldout_rows(diagnosis), diagnosis.vehicle.coordinate.force_unit
-    if not rows or not diagnosis.json["effects"]:
+    if not rows or not colours(diagnosis):
         return None
     names = [html.escape(row[0]) for row in rows]
     reach = [
@@ -250,7 +250,7 @@ def heldout_plot(diagnosis: Diagnosis) -> Spec | None:
             "line": {"color": MEASURED, "width": 1.3, "dash": "dot"}}  # fmt: skip
     text = f"noise floor<br>{words.number(floor, 3)} {html.escape(unit)}"
     note = _note(text, yref="y", x=1.01, y=floor, xanchor="left", yanchor="middle")
-    layout = _layout(xaxis=_axis("", type="category", range=[-0.6, max(len(rows) - 0.4, 1.6)]), yaxis=_axis(f"held-out RMSE [{unit}]",
-                     rangemode="tozero"), height=360, shapes=[line], annotations=[note], bargap=0.35,
-                     margin={"l": 78, "r": 100, "t": 34, "b": 48})  # fmt: skip
+    layout = plot_layout(xaxis=plot_axis("", type="category", range=[-0.6, max(len(rows) - 0.4, 1.6)]),
+                     yaxis=plot_axis(f"held-out RMSE [{unit}]", rangemode="tozero"), height=360,
+                     shapes=[line], annotations=[note], bargap=0.35, margin={"l": 78, "r": 100, "t": 34, "b": 48})  # fmt: skip
     return {"data": data, "layout": layout}

@@ -1,0 +1,160 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Cells of the grammar: what each channel makes of a unit law, and along what it may vary, both traced by the chain itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from lugre_steering.chain.step import Records, run_side, torque_side
+from lugre_steering.effects import laws
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem, in_threads
+from lugre_steering.recording import Array
+
+PIECES, HATS, FINE = 10, 3, 36
+"""Cubic B-splines of a free f; coordinates that only take signs need no more than three hats, and what is made of teeth more."""
+TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
+"""Channels whose f over the angle may be fine."""
+LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
+PLAYS = (0.05, 0.15)
+"""Half widths of play and relay that are tried, as shares of the travel."""
+NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
+"""Sizes of a memory that are tried once one has shown, times its own."""
+SMALL = {"conservative_torque": 1.0, "coulomb_friction": 1.0, "load_friction": 1e-3, "lag": 1e-3}
+SMALLEST = 1e-4
+"""Sizes of the unit laws by which channels are traced, and share of the torque amplitude for the others."""
+TRACER, WIDE = 1e-6, 1e9
+"""Size of the law that carries a coordinate out of the chain, and a range that holds any."""
+REMEMBERING = ("friction_level", "conservative_torque", "gain")
+"""Channels whose laws may remember."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What f depends on: a coordinate, or what a memory makes of it."""
+
+    coordinate: str
+    memory: str = "none"
+    memory_size: float = 0.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Channel x f(axis), with the range [low, high] on which the recordings show the axis."""
+
+    channel: str
+    axis: Axis
+    low: float
+    high: float
+    pieces: int = PIECES
+
+    def basis(self, places: Array) -> Array:
+        """Columns (n, pieces) of a free f at some places, held beyond the range."""
+        if self.pieces == 1:
+            return np.ones((places.size, 1))
+        degree = 1 if self.pieces == HATS else 3
+        inner = np.linspace(self.low, self.high, self.pieces - degree + 1)
+        knots = np.concatenate([[self.low] * degree, inner, [self.high] * degree])
+        return np.asarray(BSpline.design_matrix(np.clip(places, self.low, self.high), knots, degree).toarray())
+
+    def fields(self, f: Array, size: float = 1.0) -> dict[str, float | Array]:
+        """The law with f (KNOTS,) as ``effects.laws.record`` has it."""
+        axis = self.axis
+        return laws.record(self.channel, axis.coordinate, axis.memory, axis.memory_size, (self.low, self.high), f, size)
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Through the chain at a fit, by bag (sides, n): change of the torque per unit of each channel, and the axes."""
+
+    signals: dict[str, list[Array]]
+    axes: dict[Axis, list[Array]]
+
+    def cells(self) -> Iterator[Cell]:
+        """Every cell that the recordings can show."""
+        for axis, values in self.axes.items():
+            low = min(float(bag.min()) for bag in values)
+            high = max(float(bag.max()) for bag in values)
+            if axis.coordinate == "none":
+                low, high = -1.0, 1.0
+            if not high - low > 1e-9 * max(abs(low), abs(high)):
+                continue
+            signs = axis.memory == "relay" or axis == Axis("direction")
+            pieces = 1 if axis.coordinate == "none" else HATS if signs else PIECES
+            for channel in self.signals if axis.memory == "none" else REMEMBERING:
+                yield Cell(channel, axis, low, high, pieces)
+                if axis == Axis("angle") and channel in TOOTHED:
+                    yield Cell(channel, axis, low, high, FINE)
+
+    def columns(self, cell: Cell, bag: int) -> Array:
+        """Change of the torque (n, pieces) of a bag by each piece of a free f."""
+        sides = zip(self.signals[cell.channel][bag], self.axes[cell.axis][bag], strict=True)
+        return np.asarray(np.sum([signal[:, None] * cell.basis(place) for signal, place in sides], axis=0), np.float64)
+
+
+def axes_of(problem: Problem) -> list[Axis]:
+    """All coordinates, and memories of those that may have one."""
+    travel = max(float(np.ptp(run.theta)) for run in problem.runs)
+    torque = float(np.ptp(problem.measured)) / len(problem.vehicle.sides)
+    plain = [Axis(name) for name in laws.COORDINATES if name not in ("rubber_temperature", "air_temperature")]
+    if problem.vehicle.rubber is not None:
+        plain += [Axis("rubber_temperature"), Axis("air_temperature")]
+    lagged = [Axis(name, "lag", tau) for name in ("rate", "direction", "torque", "power") for tau in LAGS_S]
+    widths = [("angle", travel), ("torque", torque)]
+    return plain + lagged + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
+
+
+def nearer(axis: Axis) -> list[Axis]:
+    """The same with other sizes of its memory."""
+    return [replace(axis, memory_size=share * axis.memory_size) for share in NEARER] if axis.memory != "none" else []
+
+
+def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Traces:
+    """Run the chain with a small unit law in each channel, and once per axis with a law that carries it out, in the place
+    ``place`` of the problem's laws and beside the effects of the fit; the air stays as it was at the start."""
+    slot = laws.slot(place)
+    gain, amplitude = problem.gain(fitted.x), float(np.abs(fitted.prediction).max())
+
+    def record(bag: int, values: dict[str, float | Array]) -> Records:
+        p = problem.model.parameters[0].copy()
+        for field, value in problem.fields(fitted.x).items():
+            p[field] = value
+        p["initial_bristle"] = fitted.x[len(problem.calibrations) + bag] * problem.presliding
+        standing = {field: number for known, own in fitted.effects for field, number in known.effect.fields(own).items()}
+        for field, number in {**standing, **slot.fields(values)}.items():
+            p[field] = number
+        return p
+
+    def sides(bag: int, values: dict[str, float | Array], carried: bool) -> Array:
+        run, p = problem.runs[bag], record(bag, values)
+        motions = [(run.theta[i], run.omega[i], run.alpha[i]) for i in range(len(run.theta))]
+        if carried:
+            return np.array([run_side(p, problem.model.rubber, run.time, *motion)["parallel"] for motion in motions])
+        return np.array([torque_side(p, problem.model.rubber, run.time, *motion) for motion in motions])
+
+    bags: Sequence[int] = range(len(problem.runs))
+    nothing = Cell("gain", Axis("none"), -1.0, 1.0, 1).fields(np.zeros(laws.KNOTS))
+    base = {carried: [sides(bag, nothing, carried) for bag in bags] for carried in (False, True)}
+
+    def signal(channel: str) -> list[Array]:
+        rate = max(float(np.abs(run.omega).max()) for run in problem.runs)
+        acceleration = max(float(np.abs(run.alpha).max()) for run in problem.runs)
+        per = {"viscous_loss": rate, "turbulent_loss": rate**2, "inertia": acceleration}.get(channel)
+        small = SMALL.get(channel, 1e-2 if per is None else SMALLEST * amplitude / per)
+        values = Cell(channel, Axis("none"), -1.0, 1.0, 1).fields(np.full(laws.KNOTS, small))
+        return [(sides(bag, values, False) - base[False][bag]) / small / gain for bag in bags]
+
+    def along(axis: Axis) -> list[Array]:
+        cell = Cell("conservative_torque", axis, -WIDE, WIDE)
+        values = cell.fields(np.linspace(-WIDE, WIDE, laws.KNOTS), TRACER)
+        return [(sides(bag, values, True) - base[True][bag]) / TRACER for bag in bags]
+
+    return Traces(
+        dict(zip(laws.CHANNELS, in_threads(signal, list(laws.CHANNELS)), strict=True)),
+        dict(zip(axes, in_threads(along, axes), strict=True)),
+    )

@@ -1,0 +1,147 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The search: screen, refit the leading cells in the chain, simplify, and prove on what neither has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lugre_steering.diagnosis.conclude import verify
+from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
+from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
+from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
+from lugre_steering.diagnosis.search.build_up import OWN_ERROR
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import Split
+from lugre_steering.recording import Array
+
+MOST_LAWS = 2
+SHORTLIST, CLOSE, SIMPLIFIED = 5, 0.75, 2
+"""Cells refitted in the chain, share of the best gain that brings them there, and how many of them are put into closed forms."""
+SECOND = 0.1
+"""Share of the first law's gain that a second one must have."""
+PER_VALUE = 0.01
+"""Share of the gain that one more value of a law must bring to be preferred."""
+TIED = 0.03
+"""Share of the gain within which two laws cannot be told apart."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A cell refitted in the chain: its screen and its fit, which ends with its law."""
+
+    screened: Screened
+    fit: Fit
+
+    @property
+    def law(self) -> Law:
+        effect = self.fit.effects[-1][0].effect
+        assert isinstance(effect, Law)
+        return effect
+
+    @property
+    def values(self) -> int:
+        return len(self.fit.effects[-1][0].free)
+
+
+@dataclass(frozen=True)
+class FoundLaws:
+    """Laws that stand, in ``fit`` (all valid data) of ``problem``, which has places for them; ``judged`` on samples held out.
+
+    ``gains``: energy that each took away when it was added; ``ties``: laws that fit as well as the first; ``bar``: the largest gain
+    in errors that hide nothing; ``ceiling``: energy that the best further law would foretell beside those found.
+    """
+
+    problem: Problem
+    fitted: Fit
+    fit: Fit
+    judged: verify.Judged
+    gains: tuple[float, ...]
+    ties: tuple[Tried, ...]
+    bar: float
+    ceiling: float
+
+
+def find(
+    problem: Problem, noise: Noise, roles: Split, baseline: Fit, seed: int, progress: Callable[[str], None] = lambda _: None
+) -> FoundLaws | None:
+    """Laws in what a fitted baseline without named effects leaves over; None where none stands."""
+    lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS)
+    weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
+    every = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
+    samples = float(roles.fit.sum())
+    gains: list[float] = []
+    ties: tuple[Tried, ...] = ()
+    current, first_bar, ceiling = baseline, 0.0, 0.0
+    for index in range(MOST_LAWS):
+        place = len(problem.vehicle.laws) + index
+        progress("screening laws" if not index else "screening for a second law")
+        screen = Screen(lawful, current, weight, roles, noise.draws, trace(lawful, current, place, axes_of(lawful)), seed)
+        screened = screen.search()
+        least = max(bar(screened), OWN_ERROR * samples, SECOND * gains[0] if gains else 0.0)
+        first_bar = first_bar or bar(screened)
+        if screened[0].gain < least:
+            ceiling = max(screened[0].gain, 0.0)
+            break
+        tried = _tried(lawful, weight, current, screen, screened, place, progress)
+        best, gain = tried[0], current.cost - tried[0].fit.cost
+        if gain < least or _held(problem, best.fit, roles, noise) >= _held(problem, current, roles, noise):
+            ceiling = max(gain, 0.0)
+            break
+        if not index:
+            ties = tuple(other for other in tried[1:] if other.fit.cost < best.fit.cost + TIED * gain)
+        gains.append(gain)
+        current = best.fit
+    if not gains:
+        return None
+    progress("proving the law")
+    judged = verify.verify(lawful, every, baseline, current, roles, seed)
+    if not judged.interval[0] > 0.0:
+        return None
+    whole = fit(lawful, every, current.effects, current.x, linearisations=6)
+    return FoundLaws(lawful, current, whole, judged, tuple(gains), ties, first_bar, ceiling)
+
+
+def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
+    """Energy left of the samples held out, in noise variances."""
+    return float(np.sum(((problem.measured - result.prediction)[roles.held] / noise.sigma[roles.held]) ** 2))
+
+
+def _tried(
+    problem: Problem, weight: Array, current: Fit, screen: Screen, screened: Sequence[Screened], place: int,
+    progress: Callable[[str], None],
+) -> list[Tried]:
+    """The leading cells fitted in the chain, the best of them simplified; best first, a value more must pay."""
+    tried = []
+    for one in shortlist(screened):
+        progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
+        traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
+        best = screen.search(traces, one.cell)[0]
+        start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
+        tried.append(Tried(best, with_law(problem, weight, current, start)))
+    tried.sort(key=lambda each: each.fit.cost)
+    tried = [
+        replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)
+    ]
+    gain = current.cost - min(each.fit.cost for each in tried)
+    return sorted(tried, key=lambda each: each.fit.cost + PER_VALUE * gain * each.values)
+
+
+def shortlist(screened: Sequence[Screened]) -> list[Screened]:
+    """The best cell of each channel and coordinate, as long as they come close to the best of all."""
+    chosen: dict[tuple[str, str], Screened] = {}
+    for one in screened:
+        if one.gain < CLOSE * screened[0].gain:
+            break
+        chosen.setdefault((one.cell.channel, one.cell.axis.coordinate), one)
+    return list(chosen.values())[:SHORTLIST]
+
+
+def cell_of(tried: Tried) -> Cell:
+    """The cell with the memory that was fitted."""
+    return tried.law.at(tried.fit.effects[-1][1])

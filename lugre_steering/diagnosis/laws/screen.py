@@ -1,0 +1,165 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every cell by projected least squares beside a linear recalibration, judged by what it foretells of blocks left out.
+
+Errors are averaged over stretches first: laws are slow. Normal equations per fold hold all that is needed, also for errors
+that hide nothing, which go through the very same search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lugre_steering.diagnosis.laws.cells import HATS, Cell, Traces
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem, in_threads
+from lugre_steering.fitting.split import Split
+from lugre_steering.recording import Array, IntArray
+
+RATE_HZ, MOST_ROWS = 20.0, 8000
+FOLDS, FOLD_CLUSTERS = 5, 2
+"""Folds of the cross-validation, in stretches of so many clusters (``fitting.split``)."""
+SMOOTHING = (1e-4, 1e-2, 1.0)
+"""Weights of the second differences of a free f, as shares of its own energy."""
+RIDGE = 1e-6
+PERMUTED = 16
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Means of weighted samples over short stretches: ``take`` (n,) gives the row of a sample (-1: not used), ``fold`` (rows,).
+
+    The beginning of a bag is in no fold that is left out: it alone shows the bristles that the bag starts with.
+    """
+
+    take: IntArray
+    weight: Array
+    fold: IntArray
+
+    @staticmethod
+    def of(problem: Problem, weight: Array, roles: Split) -> Rows:
+        rates = [1.0 / float(run.time[1] - run.time[0]) for run in problem.runs]
+        size = max(1, round(min(rates) / RATE_HZ), int(np.ceil(np.count_nonzero(weight) / MOST_ROWS)))
+        row, first = np.zeros(problem.valid.size, np.int64), 0
+        for a, b in zip(problem.edges[:-1], problem.edges[1:], strict=True):
+            row[a:b] = first + np.arange(b - a) // size
+            first = int(row[b - 1]) + 1
+        used = weight > 0.0
+        _, take = np.unique(row[used], return_inverse=True)
+        whole = np.full(row.size, -1)
+        whole[used] = take
+        count = np.bincount(take)
+        fold = np.zeros(count.size, np.int64)
+        stretch = roles.cluster[used] // FOLD_CLUSTERS
+        first_one = np.isin(stretch, roles.cluster[problem.edges[:-1]] // FOLD_CLUSTERS)
+        fold[take] = np.where(first_one, FOLDS, stretch % FOLDS)
+        return Rows(whole, np.where(used, weight / np.sqrt(count[np.maximum(whole, 0)]), 0.0), fold)
+
+    def mean(self, columns: Array) -> Array:
+        """Rows of columns (n, k) in noise standard deviations of the row."""
+        used = self.take >= 0
+        summed = np.zeros((self.fold.size, columns.shape[1]))
+        order = self.take[used]
+        starts = np.flatnonzero(np.diff(order, prepend=-1))
+        summed[:] = np.add.reduceat(columns[used] * self.weight[used, None], starts, axis=0)
+        return summed
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A cell (or the second of a pair) with the energy that it foretells of blocks left out, in noise variances; ``null`` (draws,)
+    of errors that hide nothing."""
+
+    cell: Cell
+    gain: float
+    null: Array
+
+
+class Screen:
+    """The search of cells on the samples of a weight: ``errors`` (n, k), the first column the residual, the others nulls."""
+
+    def __init__(self, problem: Problem, fitted: Fit, weight: Array, roles: Split, draws: Array, traces: Traces, seed: int) -> None:
+        self.problem, self.traces = problem, traces
+        self.rows = Rows.of(problem, weight, roles)
+        residual = problem.measured - fitted.prediction
+        scale = problem.scales()
+        self.nuisance = self.rows.mean(fitted.jacobian[:, : problem.nuisances] * scale / np.where(weight > 0.0, weight, 1.0)[:, None])
+        own = self.rows.mean(residual[:, None])
+        self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
+
+    def columns(self, traces: Traces, cell: Cell) -> Array:
+        bags = [traces.columns(cell, bag) for bag in range(len(self.problem.runs))]
+        return self.rows.mean(np.concatenate(bags))
+
+    def pieces(self, traces: Traces, cell: Cell) -> Array:
+        """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
+        columns, m = self.columns(traces, cell), self.nuisance.shape[1]
+        gram, right, _ = _normal(np.column_stack([self.nuisance, columns]), self.errors[:, :1])
+        return np.asarray(np.linalg.solve(gram + _penalty(gram, m, SMOOTHING[0]), right)[m:, 0])
+
+    def search(self, near: Traces | None = None, like: Cell | None = None) -> list[Screened]:
+        """All cells, best first; or of other traces at the same fit those of the channel and the pieces of one."""
+        traces = near or self.traces
+        cells = [cell for cell in traces.cells() if like is None or (cell.channel, cell.pieces) == (like.channel, like.pieces)]
+        base = _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[0])
+
+        def one(cell: Cell) -> Screened:
+            columns = self.columns(traces, cell)
+            norm = float(np.sqrt(np.mean(np.sum(columns**2, axis=0))))
+            if norm < 1e-12:
+                return Screened(cell, 0.0, np.zeros(self.errors.shape[1] - 1))
+            smoothing = SMOOTHING if cell.pieces > HATS else SMOOTHING[:1]
+            left = np.min([_left(self.nuisance, columns / norm, self.errors, self.rows.fold, share) for share in smoothing], axis=0)
+            gains = base - left
+            return Screened(cell, float(gains[0]), gains[1:])
+
+        return sorted(in_threads(one, cells), key=lambda found: -found.gain)
+
+
+def _permuted(errors: Array, fold: IntArray, seed: int) -> Array:
+    """Errors (n,) whose stretches have changed places and signs (n, PERMUTED): as large and as slow, and they mean nothing."""
+    rng = np.random.default_rng(seed)
+    stretches = np.split(errors, np.flatnonzero(np.diff(fold)) + 1)
+    drawn = []
+    for _ in range(PERMUTED):
+        order = rng.permutation(len(stretches))
+        drawn.append(np.concatenate([stretches[i] * rng.choice((-1.0, 1.0)) for i in order]))
+    return np.column_stack(drawn)
+
+
+def _normal(both: Array, errors: Array) -> tuple[Array, Array, Array]:
+    """Normal equations of errors (n, k) on columns (n, p): matrix, right sides, energies."""
+    return both.T @ both, both.T @ errors, np.sum(errors**2, axis=0)
+
+
+def _penalty(gram: Array, m: int, smoothing: float) -> Array:
+    """What is added to normal equations: priors of the first ``m`` columns; for the others second differences, a little ridge."""
+    p = gram.shape[0] - m
+    penalty = 1e-9 * np.eye(m + p)
+    penalty[:m, :m] = np.eye(m)
+    if p:
+        second = np.diff(np.eye(p), 2, axis=0) if p > 2 else np.zeros((0, p))
+        penalty[m:, m:] += (smoothing * second.T @ second + RIDGE * np.eye(p)) * max(float(np.trace(gram[m:, m:])), 1e-30) / p
+    return penalty
+
+
+def _left(beside: Array, columns: Array, errors: Array, fold: IntArray, smoothing: float) -> Array:
+    """Energy (k,) of errors (n, k) that columns and recalibration, fitted without it, leave of each fold in turn."""
+    both = np.column_stack([beside, columns])
+    folds = [_normal(both[fold == k], errors[fold == k]) for k in range(FOLDS + 1)]
+    gram = np.sum([g for g, _, _ in folds], axis=0)
+    right = np.sum([r for _, r, _ in folds], axis=0)
+    penalty = _penalty(gram, beside.shape[1], smoothing)
+    left = np.zeros(errors.shape[1])
+    for g, r, energy in folds[:FOLDS]:
+        values = np.linalg.solve(gram - g + penalty, right - r)
+        left += energy - 2.0 * np.sum(values * r, axis=0) + np.sum(values * (g @ values), axis=0)
+    return left
+
+
+def bar(found: Sequence[Screened]) -> float:
+    """The largest gain that the same search finds in any of the errors that hide nothing."""
+    return float(max(np.max([one.null for one in found]), 0.0))

@@ -1,0 +1,191 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A found law as an entry of the vehicle file and in an engineer's words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.diagnosis.laws.cells import Traces, trace
+from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, Tried, cell_of
+from lugre_steering.diagnosis.laws.refine import Law
+from lugre_steering.diagnosis.search.locate import contribution
+from lugre_steering.effects import laws
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import LawEntry
+
+WRITTEN_KNOTS = 65
+"""Knots of a table in a file; of a fine one more."""
+NORMAL = 1.96
+POINTS = 24
+"""Steps of the coordinate in which the data are shown beside f."""
+CHANNEL_WORDS = {
+    "friction_level": "a change of the friction level", "presliding_stiffness": "a change of the presliding stiffness",
+    "conservative_torque": "a torque beside the contact", "coulomb_friction": "a friction torque against the motion",
+    "load_friction": "friction in proportion to the torque", "viscous_loss": "a loss in proportion to the rate",
+    "turbulent_loss": "a loss that grows with the square of the rate", "gain": "a factor on the torque (arms, sensors)",
+    "inertia": "a torque in proportion to the acceleration", "lag": "a lag of the torque",
+}  # fmt: skip
+COORDINATE_WORDS = {
+    "angle": "angle", "abs_angle": "absolute angle", "rate": "steering rate", "abs_rate": "absolute steering rate",
+    "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "absolute torque",
+    "power": "power", "time": "time", "slip": "accumulated slip", "work": "accumulated work", "dwell": "dwell",
+    "rubber_temperature": "rubber temperature", "air_temperature": "air temperature",
+}  # fmt: skip
+
+
+def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
+    """The laws as a vehicle file has them."""
+    made, first = [], found.problem.nuisances
+    spread = np.sqrt(np.maximum(np.diag(found.fit.covariance), 0.0))
+    gain = 1.0 - (found.judged.after / found.judged.before) ** 2
+    for candidate, values in found.fit.effects:
+        law, deviations = _law(candidate.effect), dict(zip(candidate.free, spread[first:], strict=False))
+        first += len(candidate.free)
+        cell = law.at(values)
+        numbers: dict[str, float] = {}
+        knots: tuple[float, ...] = ()
+        if law.form == laws.TABLE:
+            count = WRITTEN_KNOTS if cell.pieces < WRITTEN_KNOTS // 4 else 2 * WRITTEN_KNOTS - 1
+            knots = tuple(float(f) for f in np.interp(np.linspace(0, 1, count), np.linspace(0, 1, laws.KNOTS), law.shape(values)))
+        else:
+            numbers = {**law.fixed, **{name: float(value) for name, value in values.items() if name != "memory_size"}}
+        intervals: dict[str, tuple[float, ...]] = {
+            name: (float(values[name] - NORMAL * deviations[name]), float(values[name] + NORMAL * deviations[name]))
+            for name in candidate.free
+            if not name.startswith("piece_")
+        }
+        made.append(LawEntry(
+            cell.channel, cell.axis.coordinate, law.form, (cell.low, cell.high), numbers, knots, cell.axis.memory, cell.axis.memory_size,
+            law_words(law, values), intervals, round(gain, 4),
+        ))  # fmt: skip
+    return tuple(made)
+
+
+def _law(effect: object) -> Law:
+    assert isinstance(effect, Law)
+    return effect
+
+
+def shown(coordinate: str, value: float) -> str:
+    """A place on a coordinate as people say it."""
+    unit = laws.COORDINATES[coordinate]
+    if unit.startswith("rad"):
+        return f"{math.degrees(value):.3g} deg{unit[3:]}"
+    return f"{value:.3g} {unit}" if unit != "1" else f"{value:.3g}"
+
+
+def law_words(law: Law, values: Mapping[str, float]) -> str:
+    """What the law is: channel, coordinate with its memory, and shape."""
+    cell = law.at(values)
+    what = CHANNEL_WORDS[cell.channel]
+    if cell.axis.coordinate == "none":
+        return what
+    along = COORDINATE_WORDS[cell.axis.coordinate]
+    if cell.axis.memory == "lag":
+        along += f" as remembered for {cell.axis.memory_size:.2g} s"
+    elif cell.axis.memory != "none":
+        along += f" through a {cell.axis.memory} of {shown(cell.axis.coordinate, cell.axis.memory_size)} to each side"
+    return f"{what}, {_shape_words(law, values, along)}"
+
+
+def _shape_words(law: Law, values: Mapping[str, float], along: str) -> str:
+    known, name = {**law.fixed, **values}, law.cell.axis.coordinate
+
+    def at(key: str) -> str:
+        return shown(name, known[key])
+
+    if law.form == "hinge" and known["below"] == 0.0 and known["value"] == 0.0:
+        return f"only beyond {at('at')} of the {along}, growing with it"
+    if law.form == "hinge" and known["above"] == 0.0 and known["value"] == 0.0:
+        return f"only below {at('at')} of the {along}, growing away from it"
+    if law.form == "step":
+        return f"another one beyond {at('at')} of the {along}"
+    if law.form == "bump":
+        return f"with a bump at {at('at')} of the {along}, {at('width')} wide"
+    if law.form == "window":
+        return f"from {at('start')} to {at('end')} of the {along}"
+    if law.form == "sinusoid":
+        return f"periodic in the {along}, {at('period')} long"
+    if law.form == "exponential":
+        return f"approached exponentially over {at('length')} of the {along}"
+    if law.form == "power":
+        return f"with the {along} to the power {known['exponent']:.2g}"
+    return f"in proportion to the {along}" if law.form == "linear" and known["value"] == 0.0 else f"a function of the {along}"
+
+
+def described(found: FoundLaws) -> list[dict[str, Any]]:
+    """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties."""
+    torque = 0.5 * float(np.ptp(found.problem.measured))
+    made = []
+    cells = [_law(candidate.effect).at(values) for candidate, values in found.fit.effects]
+    last = len(found.problem.vehicle.laws) + MOST_LAWS - 1  # a place that is free, or that of the last law itself
+    traces = trace(found.problem, found.fit, last, [cell.axis for cell in cells])
+    for index, (entry, (candidate, values)) in enumerate(zip(entries(found), found.fit.effects, strict=True)):
+        law = _law(candidate.effect)
+        largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, index)), 99.0))
+        made.append({
+            "id": law.id, "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
+            "memory_size": entry.memory_size, "form": entry.form, "values": entry.values, "intervals": {
+                name: list(span) for name, span in entry.intervals.items()},
+            "range": list(entry.range), "largest_Nm": largest, "largest_share": largest / torque,
+            "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
+            "share_of_ceiling": sum(found.gains) / (sum(found.gains) + found.ceiling),
+            "ties": [_tie(tie) for tie in found.ties] if not index else [],
+            "f": {**_picture(found, index, law, values), **_points(found, index, traces, law, values)},
+        })  # fmt: skip
+    return made
+
+
+def _tie(tie: Tried) -> dict[str, Any]:
+    cell = cell_of(tie)
+    return {"channel": cell.channel, "coordinate": cell.axis.coordinate, "memory": cell.axis.memory, "memory_size": cell.axis.memory_size}
+
+
+def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
+    """f over its range with its 95 % band, from the covariance of the fit."""
+    first = found.problem.nuisances + sum(len(known.free) for known, _ in found.fit.effects[:index])
+    names = [name for name in found.fit.effects[index][0].free if name != "memory_size"]
+    part = slice(first, first + len(names))
+    at, f = np.linspace(law.cell.low, law.cell.high, laws.KNOTS), law.shape(values)
+    covariance, slopes = found.fit.covariance[part, part], []
+    for i, name in enumerate(names):
+        step = float(np.sqrt(max(covariance[i, i], 1e-300)))
+        up, down = ({**values, name: values[name] + sign * 0.5 * step} for sign in (1.0, -1.0))
+        slopes.append((law.shape(up) - law.shape(down)) / step)
+    slope: Array = np.array(slopes)
+    band = NORMAL * np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", slope, covariance, slope), 0.0))
+    keep = slice(None, None, 8)
+    return {"at": at[keep].tolist(), "f": f[keep].tolist(), "band": band[keep].tolist()}
+
+
+def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:
+    """Laws with their sizes; ``torque`` writes a torque with its unit."""
+    return " and ".join(
+        f"{law['title']} (up to {torque(law['largest_Nm'])}, {100 * law['largest_share']:.2g} % of the torque)" for law in described
+    )
+
+
+def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
+    """What the data say of f within steps of its coordinate: fitted to the residual of the rest of the model."""
+    problem, cell = found.problem, law.at(values)
+    residual = problem.measured - found.fit.prediction + contribution(problem, found.fit, index)
+    edges = np.linspace(cell.low, cell.high, POINTS + 1)
+    columns = []
+    for bag in range(len(problem.runs)):
+        parts = []
+        for signal, place in zip(traces.signals[cell.channel][bag], traces.axes[cell.axis][bag], strict=True):
+            step = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, POINTS - 1)
+            parts.append(signal[:, None] * (step[:, None] == np.arange(POINTS)))
+        columns.append(np.sum(parts, axis=0))
+    weighted = np.concatenate(columns)[problem.valid]
+    gram = weighted.T @ weighted
+    size = np.diag(gram)
+    seen = size > 1e-4 * size.max()
+    kept = gram[np.ix_(seen, seen)]
+    f = np.linalg.solve(kept + 1e-9 * np.trace(kept) * np.eye(len(kept)), weighted[:, seen].T @ residual[problem.valid])
+    return {"points_at": (0.5 * (edges[1:] + edges[:-1]))[seen].tolist(), "points": f.tolist()}

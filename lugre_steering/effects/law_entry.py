@@ -1,0 +1,99 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A law as people read and write it: in a vehicle file, or under a name of its own in a file of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lugre_steering.effects import laws
+from lugre_steering.effects.entry import Effect
+from lugre_steering.recording import Array
+from lugre_steering.schema import Reader, quantity, suggestion
+
+
+@dataclass(frozen=True)
+class LawEntry:
+    """A law that no entry of the catalogue is: channel x f(coordinate), see ``laws``; numbers in SI units.
+
+    ``range``: where the coordinate was seen; beyond, f is held (``laws.reach``). f is a closed ``form`` of ``values``, or a
+    table of equally spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it
+    foretold) tell how sure it is.
+    """
+
+    channel: str
+    coordinate: str
+    form: str
+    range: tuple[float, ...]
+    values: dict[str, float] = field(default_factory=dict)
+    knots: tuple[float, ...] = ()
+    memory: str = "none"
+    memory_size: float = quantity(0.0, 1e12, default=0.0)
+    title: str | None = None
+    intervals: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    heldout_gain: float | None = None
+
+
+def law_fields(entry: LawEntry) -> dict[str, float | Array]:
+    """What the parameter record holds of a law, see ``laws.record``."""
+    low, high = entry.range
+    span = laws.reach(entry.form, low, high)
+    f = laws.sampled(entry.form, entry.values, entry.knots, *span)
+    return laws.record(entry.channel, entry.coordinate, entry.memory, entry.memory_size, span, f, seen=(low, high))
+
+
+STAGES: Mapping[str, str] = {
+    "friction_level": "contact", "presliding_stiffness": "contact", "conservative_torque": "parallel_torque", "inertia": "parallel_torque",
+}  # fmt: skip
+"""Where in the chain a channel belongs; all others with losses and sensors."""
+TOLD_BY = {
+    "angle": "steering angle", "abs_angle": "|steering angle|", "rate": "steering rate", "abs_rate": "steering rate",
+    "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "torque", "time": "time",
+    "slip": "accumulated slip", "dwell": "dwell", "rubber_temperature": "rubber temperature",
+}  # fmt: skip
+
+
+def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
+    """A law under a name: an effect whose only parameter is its size, 1 as it was found."""
+    constants = law_fields(entry)
+    del constants["size"]
+    return laws.law_effect(
+        identity, title, constants, stage=STAGES.get(entry.channel, "measurement"), source=source, trace=entry.title or title,
+        equation=f"{entry.channel} x {entry.form} of {entry.coordinate}", coordinate=TOLD_BY.get(entry.coordinate, "time"),
+        counts_from_start=entry.coordinate in ("time", "slip", "work"),
+    )  # fmt: skip
+
+
+def check_law(entry: LawEntry, reader: Reader, key: str) -> None:
+    """Refuse a law that means nothing, by file and key."""
+    forms = (*laws.FORMS, laws.TABLE)
+    for name, known in (("channel", laws.CHANNELS), ("coordinate", laws.COORDINATES), ("memory", laws.MEMORIES), ("form", forms)):
+        value = getattr(entry, name)
+        if value not in known:
+            raise reader.fail(f"{key}.{name}", value, suggestion(value, list(known)))
+    if entry.memory != "none" and not entry.memory_size > 0.0:
+        raise reader.fail(f"{key}.memory_size", entry.memory_size, "a number above 0 for a memory")
+    if len(entry.range) != 2 or not entry.range[0] < entry.range[1]:
+        raise reader.fail(f"{key}.range", list(entry.range), "two ascending numbers: where the coordinate was seen")
+    if entry.form == laws.TABLE:
+        if len(entry.knots) < 2 or entry.values:
+            expected = "at least two values of f, equally spaced over the range, and no 'values'"
+            raise reader.fail(f"{key}.knots", list(entry.knots), expected)
+        return
+    if entry.knots:
+        raise reader.fail(f"{key}.knots", list(entry.knots), f"no knots for a law of the form '{entry.form}'")
+    names = laws.form_values(entry.form)
+    for name, number in entry.values.items():
+        if name not in names:
+            raise reader.fail(f"{key}.values.{name}", number, f"no such value of '{entry.form}'; {suggestion(name, list(names))}")
+        if name in laws.POSITIVE and not number > 0.0:
+            raise reader.fail(f"{key}.values.{name}", number, "a number above 0")
+    if missing := [name for name in names if name not in entry.values]:
+        raise reader.fail(f"{key}.values", entry.values, f"values of {', '.join(missing)}")
+    with np.errstate(all="ignore"):
+        f = laws.sampled(entry.form, entry.values, (), *entry.range)
+    if not np.isfinite(f).all():
+        raise reader.fail(f"{key}.values", entry.values, "numbers with which the law is finite over its range")

@@ -1,0 +1,164 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Laws of the vehicle file: those that the catalogue also has give its numbers, the others those of a plain formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from chain_support import swing, vehicle
+
+from lugre_steering.chain.step import run_side, torque_side
+from lugre_steering.effects import laws
+from lugre_steering.estimator import Estimator
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import EffectEntry, LawEntry, Vehicle
+from lugre_steering.vehicle.model import build_model
+
+TIME, THETA, OMEGA, _ = swing(30.0, 0.01)
+ALPHA = np.gradient(OMEGA, TIME)
+
+
+def torque(changed: Vehicle) -> Array:
+    """Of the left track, with only what the vehicle has in the step."""
+    model = build_model(changed, lean=True)
+    return torque_side(model.parameters[0], model.rubber, TIME, THETA, OMEGA, ALPHA)
+
+
+def with_law(*laws: LawEntry) -> Array:
+    return torque(vehicle().replace(laws=laws))
+
+
+def constant(channel: str, value: float) -> LawEntry:
+    return LawEntry(channel, "none", "constant", (-1.0, 1.0), {"value": value})
+
+
+@pytest.mark.parametrize(
+    ("entry", "effect", "parameters"),
+    [
+        (constant("viscous_loss", 7e3), "line_loss_linear", {"b": 7e3}),
+        (constant("turbulent_loss", 2e4), "line_loss_quadratic", {"c": 2e4}),
+        (constant("inertia", 900.0), "yaw_inertia", {"inertia": 900.0}),
+        (constant("load_friction", 0.06), "cylinder_friction", {"load_share": 0.06}),
+        (LawEntry("friction_level", "slip", "exponential", (0.0, 6.0), {"start": 0.0, "end": -0.2, "length": 1.5}),
+         "wear_polishing", {"amount": 0.2, "slip_scale": 1.5}),
+        (LawEntry("friction_level", "angle", "window", (-0.6, 0.6), {"outside": 0.0, "inside": 0.3, "start": 0.05, "end": 0.2}),
+         "surface_patch", {"change": 0.3, "angle_low": 0.05, "angle_high": 0.2}),
+    ],
+)  # fmt: skip
+def test_a_law_that_the_catalogue_has_gives_the_same_torque(entry: LawEntry, effect: str, parameters: dict[str, float]) -> None:
+    named, base = torque(vehicle().replace(effects=(EffectEntry(effect, parameters),))), with_law()
+    change = np.abs(named - base).max()
+    assert change > 100.0
+    # The windows differ in their edges; wear takes the slip of one step before.
+    allowed = {"window": 0.1, "exponential": 1e-3}.get(entry.form, 1e-9)
+    assert np.sqrt(np.mean((with_law(entry) - named) ** 2)) < allowed * change
+
+
+def smooth_sign(rate: Array) -> Array:
+    return np.tanh(rate / 2e-3)
+
+
+def test_a_torque_of_the_angle_stands_beside_the_contact() -> None:
+    entry = LawEntry("conservative_torque", "angle", "hinge", (-0.5, 0.5), {"value": 0.0, "below": 0.0, "above": 9e3, "at": 0.1})
+    assert with_law(entry) - with_law() == pytest.approx(9e3 * np.maximum(THETA - 0.1, 0.0), abs=10.0)
+
+
+def test_a_table_is_linear_between_its_knots_and_held_beyond_its_range() -> None:
+    entry = LawEntry("coulomb_friction", "angle", "table", (-0.1, 0.1), knots=(100.0, 300.0, 200.0))
+    expected = np.interp(THETA, [-0.1, 0.0, 0.1], [100.0, 300.0, 200.0]) * smooth_sign(OMEGA)
+    assert with_law(entry) - with_law() == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_line_goes_on_for_half_its_range_and_is_then_held() -> None:
+    entry = LawEntry("conservative_torque", "angle", "linear", (-0.1, 0.1), {"value": 0.0, "slope": 1e3})
+    assert with_law(entry) - with_law() == pytest.approx(1e3 * np.clip(THETA, -0.2, 0.2), abs=1e-6)
+
+
+def test_a_lagged_rate_follows_its_differential_equation() -> None:
+    entry = LawEntry("conservative_torque", "rate", "linear", (-1.0, 1.0), {"value": 0.0, "slope": 1e4}, memory="lag", memory_size=2.0)
+    fine = np.arange(0.0, TIME[-1], 1e-3)
+    rate, kept = np.interp(fine, TIME, OMEGA), np.zeros(fine.size)
+    for i in range(1, fine.size):
+        kept[i] = kept[i - 1] + 1e-3 * (0.5 * (rate[i] + rate[i - 1]) - kept[i - 1]) / 2.0
+    expected = 1e4 * np.interp(TIME[:-1], fine, kept)
+    assert (with_law(entry) - with_law())[:-1] == pytest.approx(expected, abs=0.01 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("kind", ["play", "relay"])
+def test_play_and_relay_of_the_angle(kind: str) -> None:
+    entry = LawEntry("conservative_torque", "angle", "linear", (-1.0, 1.0), {"value": 0.0, "slope": 1e3}, memory=kind, memory_size=0.1)
+    kept, expected = 0.0, []
+    for angle in THETA:
+        if kind == "play":
+            kept = np.clip(kept, angle - 0.1, angle + 0.1)
+        elif abs(angle) > 0.1:
+            kept = np.sign(angle)
+        expected.append(1e3 * kept)
+    assert with_law(entry) - with_law() == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_gain_multiplies_and_a_lag_delays_the_torque() -> None:
+    base = with_law()
+    assert with_law(constant("gain", 0.07)) == pytest.approx(1.07 * base, rel=1e-9)
+    late, expected = with_law(constant("lag", 0.3)), [base[0]]
+    for now in base[1:]:
+        expected.append(expected[-1] + (now - expected[-1]) * 0.01 / 0.31)
+    assert late[1:] == pytest.approx(expected[1:], abs=abs(base[0]) + 1e-6)
+
+
+def test_stiffness_of_a_law_shows_only_in_presliding() -> None:
+    """Along one long sweep, longer than any bristle."""
+    theta = np.linspace(0.0, 2.0, TIME.size)
+    rate, zero = np.full(TIME.size, theta[1] / TIME[1]), np.zeros(TIME.size)
+
+    def swept(*laws: LawEntry) -> Array:
+        model = build_model(vehicle().replace(laws=laws), lean=True)
+        p = model.parameters[0].copy()
+        p["heat_capacity"] = np.inf
+        return torque_side(p, model.rubber, TIME, theta, rate, zero)
+
+    softer, base = swept(constant("presliding_stiffness", -0.5)), swept()
+    begun, slid = theta < 0.01, theta > 1.5
+    assert np.diff(softer[begun]) == pytest.approx(0.5 * np.diff(base[begun]), rel=0.1)
+    assert softer[slid] == pytest.approx(base[slid], rel=1e-3)
+
+
+def test_every_coordinate_drives_a_law() -> None:
+    for name in laws.COORDINATES:
+        if name in ("none", "air_temperature"):
+            continue
+        low, high = (10.0, 30.0) if name == "rubber_temperature" else (-1.0, 1.0)
+        entry = LawEntry("coulomb_friction", name, "linear", (low, high), {"value": 0.0, "slope": 100.0})
+        with_it = with_law(entry) - with_law()
+        assert np.abs(with_it).max() > 0.1, name
+
+
+def test_two_laws_add_up_and_all_share_one_compiled_code() -> None:
+    one = constant("viscous_loss", 3e3)
+    other = LawEntry("conservative_torque", "angle", "linear", (-1.0, 1.0), {"value": 5.0, "slope": 40.0})
+    both = with_law(one, other) - with_law()
+    assert both == pytest.approx(with_law(one) + with_law(other) - 2.0 * with_law(), abs=1e-6)
+    names = {build_model(vehicle().replace(laws=(entry,)), lean=True).composition.name for entry in (one, other)}
+    assert len(names) == 1
+
+
+def test_the_whole_catalogue_in_place_changes_nothing() -> None:
+    entry = LawEntry("friction_level", "angle", "step", (-0.5, 0.5), {"before": 0.0, "after": 0.2, "at": 0.1, "width": 0.02})
+    model = build_model(vehicle().replace(laws=(entry,)))
+    full = run_side(model.parameters[0], model.rubber, TIME, THETA, OMEGA, ALPHA)["torque"]
+    assert full == pytest.approx(with_law(entry), rel=1e-12)
+
+
+def test_the_estimator_counts_steps_outside_the_range_and_runs_a_block_like_single_messages() -> None:
+    entry = LawEntry("friction_level", "angle", "linear", (-0.05, 0.05), {"value": 0.0, "slope": 2.0})
+    driven = vehicle().replace(laws=(entry,))
+    block, single = Estimator(driven), Estimator(driven)
+    stamps = (10**18 + np.repeat(np.round(TIME * 1e9).astype(np.int64), 2)).astype(np.int64)
+    channel, value = np.tile([0, 1], TIME.size), np.repeat(THETA, 2)
+    together, _ = block.push_block(channel, stamps, value, np.full(value.size, np.nan))
+    each = [single.push(int(k), int(t), float(v))[0].copy() for k, t, v in zip(channel, stamps, value, strict=True)]
+    assert np.array_equal(np.concatenate(each)["total"], together["total"])
+    outside = int(np.sum(np.abs(together["theta"]) > 0.05 + 1e-6))
+    assert outside > 500
+    assert block.law_left_steps == {"laws[0]": outside}

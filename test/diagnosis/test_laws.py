@@ -1,0 +1,101 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The search of laws: what formulas of this file hide is found again, and where nothing is hidden nothing is. All data are synthetic."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from small_problem import SIGMA, small_problem, weight, with_torque
+from typer.testing import CliRunner
+
+from lugre_steering.cli import app
+from lugre_steering.diagnosis.laws.find import FoundLaws, find
+from lugre_steering.diagnosis.laws.write import described, entries, sentence
+from lugre_steering.effects.law_entry import LawEntry
+from lugre_steering.effects.own import read_effects
+from lugre_steering.errors import EffectError
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.split import split
+from lugre_steering.recording import Array
+from lugre_steering.simulate.command import load_vehicle
+from lugre_steering.vehicle import save
+
+NOTHING = small_problem()
+
+
+def searched(hidden: Array | float) -> tuple[Problem, FoundLaws | None]:
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + hidden)
+    draws = SIGMA * np.random.default_rng(7).standard_normal((16, problem.valid.size))
+    noise = Noise(np.full(problem.valid.size, SIGMA), draws, 0.0)
+    roles = split(problem)
+    baseline = fit(problem, np.where(roles.fit, weight(problem), 0.0))
+    return problem, find(problem, noise, roles, baseline, 1)
+
+
+def by_run(part: object) -> Array:
+    return np.concatenate([part(run) for run in NOTHING.runs])  # type: ignore[operator]
+
+
+def test_a_loss_beyond_an_angle_is_found_with_its_place_and_size_and_runs_from_the_vehicle_file() -> None:
+    beyond = by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0))
+    problem, found = searched(beyond)
+    assert found is not None
+    (entry,) = entries(found)
+    assert (entry.channel, entry.coordinate, entry.form) == ("viscous_loss", "angle", "hinge")
+    assert entry.values["above"] == pytest.approx(2e4, rel=0.15)
+    assert entry.values["at"] == pytest.approx(0.1, abs=0.02)
+    assert "only beyond" in sentence(described(found), "{:.0f} N m".format)
+    # The file that is written foretells the clean torque as well as the fit does.
+    again = Problem(problem.vehicle.replace(laws=(entry,)), problem.runs)
+    x = np.concatenate([found.fit.x[: len(problem.calibrations)], found.fit.x[-len(problem.runs) :]])
+    assert again.predict_all(x) == pytest.approx(found.fit.prediction, abs=1.0)
+    clean = NOTHING.predict_all(NOTHING.start()) + beyond
+    assert np.sqrt(np.mean((again.predict_all(x) - clean) ** 2)) < 0.15 * np.sqrt(np.mean(beyond**2))
+
+
+def test_a_torque_that_remembers_the_rate_is_found_with_its_time_constant() -> None:
+    def lagged(run):  # type: ignore[no-untyped-def]
+        decay = np.exp(-(run.time[1] - run.time[0]) / 1.5)
+        return 6e3 * lfilter([1.0 - decay], [1.0, -decay], run.omega.sum(axis=0))
+
+    _, found = searched(by_run(lagged))
+    assert found is not None
+    entry = entries(found)[0]
+    assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
+    assert entry.memory_size == pytest.approx(1.5, rel=0.2)
+
+
+def test_nothing_hidden_gives_no_law() -> None:
+    assert searched(0.0)[1] is None
+
+
+def test_a_law_is_kept_under_a_name_and_what_stood_in_the_file_stays(tmp_path: Path) -> None:
+    law = LawEntry("gain", "angle", "table", (-0.5, 0.5), knots=(0.0, 0.1, 0.05), title="worn arms")
+    save(load_vehicle(None).replace(laws=(law,)), tmp_path / "augmented.yaml")
+    catalogue = tmp_path / "own.yaml"
+    catalogue.write_text("# mine\neffects:\n  - {id: first, title: First, law: {channel: gain, coordinate: none, form: constant, "
+                         "range: [0.0, 1.0], values: {value: 0.1}}}\n")  # fmt: skip
+    command = ["effects", "--add", str(tmp_path / "augmented.yaml"), "--id", "worn_arms", "--to", str(catalogue)]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert catalogue.read_text().startswith("# mine\n")
+    effects, _ = read_effects(catalogue)
+    assert [effect.id for effect in effects] == ["first", "worn_arms"]
+    f = effects[1].fields({"size": 1.0})["worn_arms_f"]
+    assert np.asarray(f)[[0, 256, 512]] == pytest.approx([0.0, 0.1, 0.05])
+    twice = CliRunner().invoke(app, command)
+    assert twice.exit_code != 0
+    assert "worn_arms" in twice.output
+
+
+def test_a_bad_law_in_a_catalogue_is_refused_by_key(tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    law = "{channel: gian, coordinate: none, form: constant, range: [0.0, 1.0], values: {value: 0.1}}"
+    file.write_text(f"{{id: bad, title: Bad, law: {law}}}\n")
+    with pytest.raises(EffectError, match=r"own.yaml: key 'law.channel'.*gain"):
+        read_effects(file)

@@ -1,0 +1,69 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Laws in vehicle files: kept whole, and every mistake refused by file and key."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from lugre_steering.errors import VehicleFileError
+from lugre_steering.vehicle import from_mapping, load, save
+
+FILE = Path(__file__).resolve().parents[1] / "config" / "single_joint_example.yaml"
+LAW: dict[str, Any] = {
+    "channel": "conservative_torque", "coordinate": "rate", "form": "step", "range": [-1.0, 1.0], "memory": "lag", "memory_size": 2.0,
+    "values": {"before": 0.0, "after": 3.0, "at": 0.2, "width": 0.05}, "title": "a drag that remembers the rate",
+    "intervals": {"after": [2.5, 3.5]}, "heldout_gain": 0.9,
+}  # fmt: skip
+TABLE: dict[str, Any] = {"channel": "gain", "coordinate": "angle", "form": "table", "range": [-1.0, 1.0], "knots": [0.0, 0.1, 0.0]}
+
+
+def made(*laws: dict[str, Any]) -> Any:
+    sheet = yaml.safe_load(FILE.read_text())
+    return from_mapping({**copy.deepcopy(sheet), "laws": list(laws)}, FILE)
+
+
+def test_laws_are_written_and_read_again(tmp_path: Path) -> None:
+    vehicle = made(LAW, TABLE)
+    save(vehicle, tmp_path / "with_laws.yaml")
+    assert load(tmp_path / "with_laws.yaml") == vehicle
+    assert len(vehicle.laws) == 2
+
+
+@pytest.mark.parametrize(
+    ("base", "change", "told"),
+    [
+        (LAW, {"channel": "frction_level"}, ("laws[0].channel", "friction_level")),
+        (LAW, {"coordinate": "angel"}, ("laws[0].coordinate", "angle")),
+        (LAW, {"form": "stepp"}, ("laws[0].form", "step")),
+        (LAW, {"memory": "lagg"}, ("laws[0].memory", "lag")),
+        (LAW, {"memory_size": 0.0}, ("laws[0].memory_size", "above 0")),
+        (LAW, {"coordinate": "rubber_temperature"}, ("laws[0].coordinate", "rubber")),
+        (LAW, {"range": [1.0, -1.0]}, ("laws[0].range", "ascending")),
+        (LAW, {"range": [1.0]}, ("laws[0].range", "ascending")),
+        (LAW, {"values": {"before": 0.0, "after": 3.0, "at": 0.2}}, ("laws[0].values", "width")),
+        (LAW, {"values": {**LAW["values"], "width": 0.0}}, ("laws[0].values.width", "above 0")),
+        (LAW, {"values": {**LAW["values"], "high": 0.0}}, ("laws[0].values.high", "before, after, at, width")),
+        (LAW, {"knots": [1.0, 2.0]}, ("laws[0].knots", "no knots")),
+        (LAW, {"form": "power", "values": {"value": 1.0, "scale": 1e-3, "exponent": 1e4}}, ("laws[0].values", "finite")),
+        (LAW, {"values": {**LAW["values"], "after": float("nan")}}, ("laws[0].values.after", "finite")),
+        (TABLE, {"knots": [1.0]}, ("laws[0].knots", "at least two")),
+        (TABLE, {"values": {"value": 1.0}}, ("laws[0].knots", "values")),
+        (TABLE, {"knotz": [1.0]}, ("laws[0].knotz", "knots")),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_law_is_refused_with_its_key(base: dict[str, Any], change: dict[str, Any], told: tuple[str, ...]) -> None:
+    with pytest.raises(VehicleFileError) as error:
+        made({**base, **change})
+    for text in (FILE.name, *told):
+        assert text in str(error.value)
+
+
+def test_too_many_laws_are_refused() -> None:
+    with pytest.raises(VehicleFileError, match=r"laws.*at most 8"):
+        made(*[LAW] * 9)
