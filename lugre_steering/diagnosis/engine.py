@@ -141,7 +141,7 @@ def _insufficient(
     return Diagnosis(
         schema=SCHEMA, bags=tuple(quality.recording.name for quality in qualities), verdict="insufficient_data",
         statement=statement, noise_floor_Nm=floor, baseline=Errors(0.0, None),
-        augmented=Augmented(0.0, None, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
+        augmented=Augmented(0.0, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
         detection_limits={}, data_quality=tuple(findings), next_experiment=advice,
     ).in_words()  # fmt: skip
 
