@@ -109,8 +109,7 @@ def diagnose_recordings(
     findings += [finding.in_bag(bag) for bag, finding in weather_findings(problem, found.final).items()]
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
-    usable = [quality.recording for quality in qualities]
-    return conclude(done, findings, usable, seed=seed, material=material, progress=progress)
+    return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
 
 
 def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
