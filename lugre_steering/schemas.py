@@ -39,9 +39,10 @@ def schema_of(result: type) -> dict[str, Any]:
 def _object(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
     hints = typing.get_type_hints(cls, include_extras=True)
     names = [item.name for item in written(cls)]
+    required = [item.name for item in written(cls) if item.metadata.get("required", True)]
     properties = {name: _of(hints[name], definitions) for name in names}
     text = " ".join((cls.__doc__ or "").split())
-    return {"type": "object", "description": text, "required": names, "properties": properties}
+    return {"type": "object", "description": text, "required": required, "properties": properties}
 
 
 def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:

@@ -16,6 +16,8 @@ Leaf = Callable[[Any, str], Any]
 
 IN_MEMORY = {"written": False}
 """Metadata of a dataclass field that is no part of the JSON: arrays, vehicles."""
+ADDED = {"required": False}
+"""Metadata of a dataclass field that results of earlier versions lack."""
 
 
 def in_order(*names: str) -> dict[str, Any]:

@@ -98,8 +98,7 @@ def diagnose_recordings(
     findings += [finding.in_bag(bag) for bag, finding in weather_findings(problem, found.final).items()]
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
-    usable = [quality.recording for quality in qualities]
-    return conclude(done, findings, usable, seed=seed, material=material, progress=progress)
+    return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
 
 
 def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
@@ -152,7 +151,7 @@ def _insufficient(
     return Diagnosis(
         schema=SCHEMA, bags=tuple(quality.recording.name for quality in qualities), verdict="insufficient_data",
         statement=statement, noise_floor_Nm=floor, baseline=Errors(0.0, None),
-        augmented=Augmented(0.0, None, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
+        augmented=Augmented(0.0, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
         detection_limits={}, data_quality=tuple(findings), next_experiment=advice,
     ).in_words()  # fmt: skip
 

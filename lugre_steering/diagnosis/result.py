@@ -15,7 +15,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, write_record
 from lugre_steering.recording import Array, BagFinding, unused_name
 from lugre_steering.result import Result, folder_for, frame, html, of_bag
-from lugre_steering.serialise import IN_MEMORY, finite, mapped
+from lugre_steering.serialise import ADDED, IN_MEMORY, finite, mapped
 from lugre_steering.vehicle import Vehicle, save
 
 if TYPE_CHECKING:
@@ -84,10 +84,10 @@ class Augmented(Errors):
 
     improvement: float | None
     improvement_ci95: Interval | None
-    causal_rmse_Nm: float | None
-    """On all valid samples, without looking ahead and with bristles relaxed at the start, as the live node must."""
     vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
     """The vehicle file of it, to replay, simulate or run live."""
+    causal_rmse_Nm: float | None = field(default=None, metadata=ADDED)
+    """On all valid samples, without looking ahead and with bristles relaxed at the start, as the live node must."""
 
     def save(self, path: str | Path) -> None:
         """Write the vehicle file (augmented.yaml of the command)."""
