@@ -204,7 +204,7 @@ def _wind_up(torque: float, width: float, soft: float, compliance: float, stiffe
 @njit(cache=True)
 def _level_factor(t: float, m: Memory, hidden: HiddenContact) -> float:
     """What direction, place, wear and dwell make of the friction level of all patches."""
-    factor = 1.0 + hidden.direction_asymmetry_a * _gate(t, hidden.direction_asymmetry_from) * m.lugs
+    factor: float = 1.0 + hidden.direction_asymmetry_a * _gate(t, hidden.direction_asymmetry_from) * m.lugs
     where = t if hidden.surface_patch_in_time > 0.0 else m.theta
     window = 0.5 * (
         np.tanh((where - hidden.surface_patch_low) / hidden.surface_patch_edge)
@@ -258,7 +258,7 @@ def _speed_up(t: float, m: Memory, hidden: HiddenContact) -> float:
     """How much sooner bristles follow: little moved since the last turning point (Payne), stretched as never before (Mullins)."""
     small = 1.0 / (1.0 + (abs(m.theta - m.turned_at) / hidden.payne_softening_angle) ** 1.2)
     virgin = np.exp(-(m.largest - m.stretch) / hidden.mullins_softening_width)
-    speed_up = 1.0 + hidden.payne_softening_amount * _gate(t, hidden.payne_softening_from) * small
+    speed_up: float = 1.0 + hidden.payne_softening_amount * _gate(t, hidden.payne_softening_from) * small
     speed_up *= 1.0 + hidden.mullins_softening_amount * _gate(t, hidden.mullins_softening_from) * virgin
     return speed_up  # type: ignore[no-any-return]
 
