@@ -17,7 +17,7 @@ import numpy as np
 from lugre_steering.data.dataset import prepare
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Calibration, Candidate, Problem
+from lugre_steering.fitting.problem import Calibration, Candidate, Problem, is_rig
 from lugre_steering.fitting.split import CLUSTER_S
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -51,6 +51,8 @@ def synchronised(
 ) -> tuple[Problem, dict[str, Finding]]:
     """The recordings prepared with one clock, and a finding for each, by its name, whose offset is worth saying."""
     problem = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], calibrations)
+    if is_rig(vehicle):  # its inertia, which the sheet lacks, would pass for an offset
+        return problem, {}
     if any(CATALOGUE[entry.id].hooks.keys() & {"delay", "lag"} for entry in vehicle.effects):
         return problem, {}
     original, start = problem, _baseline(problem, None)

@@ -215,7 +215,7 @@ def _level_factor(t: float, m: Memory, hidden: HiddenContact) -> float:
     factor *= 1.0 - hidden.wear_polishing_amount * worn
     aged = np.log(1.0 + m.rest / hidden.static_ageing_time)
     factor *= 1.0 + hidden.static_ageing_rate * _gate(t, hidden.static_ageing_from) * aged
-    return factor  # type: ignore[no-any-return]
+    return factor
 
 
 @njit(cache=True)
@@ -260,7 +260,7 @@ def _speed_up(t: float, m: Memory, hidden: HiddenContact) -> float:
     virgin = np.exp(-(m.largest - m.stretch) / hidden.mullins_softening_width)
     speed_up: float = 1.0 + hidden.payne_softening_amount * _gate(t, hidden.payne_softening_from) * small
     speed_up *= 1.0 + hidden.mullins_softening_amount * _gate(t, hidden.mullins_softening_from) * virgin
-    return speed_up  # type: ignore[no-any-return]
+    return speed_up
 
 
 @njit(cache=True)
