@@ -85,7 +85,7 @@ class Seen:
 Variant = Mapping[str, float]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Effect:
     """Physics that the baseline leaves out.
 
