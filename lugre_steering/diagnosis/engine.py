@@ -21,7 +21,7 @@ from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import LEVELS, WrongSheet, at_bounds, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import WrongSheet, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import BagFinding, Recording
@@ -92,8 +92,6 @@ def diagnose_recordings(
         problem = Problem(vehicle, runs)
         noise, roles, found = investigate(problem, seed, progress)
     if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
-        return _wrong_sheet(qualities, vehicle, findings, wrong)
-    if found.found and at_bounds(problem, found.final.x, LEVELS) and (wrong := wrong_sheet(problem, insist=True)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
     findings += [finding.in_bag(bag) for bag, finding in weather_findings(problem, found.final).items()]
     progress("verifying on held-out data")

@@ -97,16 +97,13 @@ def torque_ratio(product: float, square: float) -> float:
     return product / square if square > 0.0 else float("nan")
 
 
-def wrong_sheet(problem: Problem, *, insist: bool = False) -> WrongSheet | None:
-    """Whether the recalibrated baseline needs more than nominal values allow; None where it does not.
-
-    ``insist``: the most likely entries even if none of them makes it fit, where values stand at bounds anyhow.
-    """
+def wrong_sheet(problem: Problem) -> WrongSheet | None:
+    """Whether the recalibrated baseline needs more than nominal values allow, and another entry puts that right; else None."""
     thin = thinned(problem)
     baseline = _fitted(thin)
     surprise = _surprise(thin, baseline)
     stuck = at_bounds(thin, baseline.x, LEVELS)
-    if not insist and not stuck and surprise < SURPRISE:
+    if not stuck and surprise < SURPRISE:
         return None
     found = sorted(_off((*_levels(thin), *_geometries(thin, baseline))), key=lambda item: item[0].cost)
     if not found:
@@ -114,7 +111,7 @@ def wrong_sheet(problem: Problem, *, insist: bool = False) -> WrongSheet | None:
     suspect, _ = found[0]
     floor = float(np.count_nonzero(thin.valid))
     fits = suspect.relative_error < PUT_RIGHT or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
-    if not insist and (not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise):
+    if not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise:
         return None
     return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]))
 

@@ -17,12 +17,14 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.laws.find import find
-from lugre_steering.diagnosis.laws.write import described, entries, sentence
+from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import is_rig
+from lugre_steering.fitting.sheet import LEVELS, at_bounds
 from lugre_steering.recording import BagFinding, Recording
 
 CONTRADICTED = 0.02
@@ -39,7 +41,9 @@ def conclude(
     # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
     # and an improvement that may be none is none.
     clock = _clocks_alone(found.final, len(problem.runs))
-    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock
+    # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
+    stuck = not is_rig(problem.vehicle) and bool(at_bounds(problem, found.final.x, LEVELS))
+    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
     final = found.final if named or clock else found.baseline
     whole = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
@@ -52,7 +56,7 @@ def conclude(
     if lawful is not None:
         beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
         laws = described(lawful)
-        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque))
+        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque), formula(laws))
     if named:
         verdict = "missing_physics"
     elif left.structured:

@@ -163,6 +163,27 @@ def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]
     return {"at": at[keep].tolist(), "f": f[keep].tolist(), "band": band[keep].tolist()}
 
 
+_SIGNALS = {
+    "friction_level": "g", "presliding_stiffness": "sigma_0 z", "conservative_torque": "", "coulomb_friction": "sgn(omega)",
+    "load_friction": "|M| sgn(omega)", "viscous_loss": "omega", "turbulent_loss": "omega |omega|", "gain": "M", "inertia": "alpha",
+    "lag": "dM/dt",
+}  # fmt: skip
+_PLACES = {
+    "angle": "theta", "abs_angle": "|theta|", "rate": "omega", "abs_rate": "|omega|", "direction": "sgn(omega)", "torque": "M",
+    "abs_torque": "|M|", "time": "t", "rubber_temperature": "T", "air_temperature": "T_air",
+}  # fmt: skip
+
+
+def formula(described: Sequence[Mapping[str, Any]]) -> str:
+    """The laws in symbols: what each channel's signal is multiplied by, over its coordinate."""
+    parts = []
+    for law in described:
+        place = _PLACES.get(law["coordinate"], law["coordinate"].replace("_", " "))
+        remembered = "" if law["memory"] == "none" else f"; {law['memory']} of {law['memory_size']:.3g}"
+        parts.append(f"{_SIGNALS[law['channel']]} f({place}{remembered})".strip())
+    return "missing torque = " + " + ".join(parts)
+
+
 def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:
     """Laws with their sizes; ``torque`` writes a torque with its unit."""
     return " and ".join(
