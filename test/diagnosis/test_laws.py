@@ -53,7 +53,7 @@ def test_a_loss_beyond_an_angle_is_found_with_its_place_and_size_and_runs_from_t
     assert "only beyond" in sentence(described(found), "{:.0f} N m".format)
     # The file that is written foretells the clean torque as well as the fit does.
     again = Problem(problem.vehicle.replace(laws=(entry,)), problem.runs)
-    x = np.concatenate([found.fit.x[: len(problem.calibrations)], found.fit.x[-len(problem.runs) :]])
+    x = found.fit.x[: again.nuisances]
     assert again.predict_all(x) == pytest.approx(found.fit.prediction, abs=1.0)
     clean = NOTHING.predict_all(NOTHING.start()) + beyond
     assert np.sqrt(np.mean((again.predict_all(x) - clean) ** 2)) < 0.15 * np.sqrt(np.mean(beyond**2))

@@ -74,8 +74,9 @@ def test_a_wrong_pavement_table_fails_the_ranking(prepared: bench.Bench, monkeyp
 
 
 def test_no_stop_no_rise(prepared: bench.Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    parameters = {**double_cycle.END_STOP.parameters, "stiffness": 0.0, "cubic_stiffness": 0.0}
-    monkeypatch.setattr(double_cycle, "END_STOP", dataclasses.replace(double_cycle.END_STOP, parameters=parameters))
+    stop = double_cycle.limit_device()
+    soft = dataclasses.replace(stop, parameters={**stop.parameters, "stiffness": 0.0, "cubic_stiffness": 0.0})
+    monkeypatch.setattr(double_cycle, "limit_device", lambda: soft)
     assert not double_cycle.limit_stop(prepared).passed
 
 

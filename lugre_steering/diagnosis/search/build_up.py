@@ -272,14 +272,15 @@ def _confirmed(
 
 
 def _foreign(with_pattern: float, named: Sequence[float], start: float) -> bool:
-    """Whether one pattern outside the catalogue explains the recording better than a name, or as well as several.
+    """Whether one pattern outside the catalogue explains the recording clearly better than a name (which wins a draw), and as well
+    as several.
 
     ``named``: cost with the only name, or with the first of several and with all of them.
     """
     margin = PATTERN_MARGIN * (start - named[-1])
     if len(named) == 1:
         return with_pattern < named[0] - margin
-    return with_pattern < min(named[0], named[-1] + margin)
+    return with_pattern < min(named[0] - margin, named[-1] + margin)
 
 
 def _confront(
