@@ -10,10 +10,6 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 OPEN = (
-    "test_rooms.py::test_an_effect_is_named_in_its_own_file_only[viscous_friction]",
-    "test_rooms.py::test_an_effect_is_named_in_its_own_file_only[kingpin_jacking]",
-    "test_rooms.py::test_an_effect_is_named_in_its_own_file_only[slope_bias]",
-    "test_rooms.py::test_an_effect_is_named_in_its_own_file_only[yaw_inertia]",
     "test_readme.py::test_the_sentence_of_the_bundled_pair",
     "test_readme.py::test_the_shipped_pictures_are_those_of_today",
     "test_sensor_effects.py::test_the_recorded_air_is_followed_as_by_replay",

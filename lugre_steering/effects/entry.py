@@ -122,6 +122,8 @@ class Effect:
     """It has its own window in time, or acts at the start only."""
     play: str = ""
     """Its parameter that is a free play [rad], by which a torque looks as if it were stamped late."""
+    of_every_joint: bool = False
+    """Every joint or axis may have it beside friction; such terms are fitted together before anything is looked for."""
     one_sided: bool = False
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
     of_angle: bool = False

@@ -37,4 +37,5 @@ EFFECT = Effect(
     joint_title="Gravity or another conservative torque of the angle",
     one_sided=True,
     of_angle=True,
+    of_every_joint=True,
 )

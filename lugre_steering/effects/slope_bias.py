@@ -29,4 +29,5 @@ EFFECT = Effect(
     hooks={"torque": bias},
     joint_title="Constant offset",
     one_sided=True,
+    of_every_joint=True,
 )

@@ -29,4 +29,5 @@ EFFECT = Effect(
     ),
     hooks={"viscous": viscous},
     joint_title="Viscous friction",
+    of_every_joint=True,
 )

@@ -28,4 +28,5 @@ EFFECT = Effect(
     ),
     hooks={"torque": torque},
     joint_title="Inertia of the moving parts",
+    of_every_joint=True,
 )

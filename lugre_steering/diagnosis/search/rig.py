@@ -17,8 +17,6 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.recording import Array
 
-TERMS = ("yaw_inertia", "viscous_friction", "slope_bias", "kingpin_jacking")
-
 
 def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit, least: float) -> list[tuple[Fit, Score]]:
     """The terms without which the energy left over would rise by at least ``least``, what matters most first.
@@ -26,7 +24,7 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit, least:
     Each with the fit that has it and those before it, and its score against what the others leave.
     """
     known = {candidate.effect.id for candidate, _ in problem.standing}
-    terms = [c for c in candidates(problem, sorted(known)) if c.effect.id in TERMS]
+    terms = [c for c in candidates(problem, sorted(known)) if c.effect.of_every_joint]
     full = _fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
     order: list[Candidate] = []  # what can be spared first comes last
     while full.effects:
