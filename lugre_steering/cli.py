@@ -10,7 +10,7 @@ import inspect
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -51,9 +51,14 @@ def _options(
     """Options of the program itself."""
 
 
-Bags = Annotated[list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not)")]
+Bags = Annotated[
+    list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not), folders of them, or patterns")
+]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML)")]
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="recordings at a time, each in a process of its own")]
+Threads = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="threads of the computation [all processors]")]
+FailOn = Annotated[list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so (any wrong word tells all); repeatable")]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
 
 OwnEffects = Annotated[
@@ -135,6 +140,26 @@ def print_json(result: Any) -> None:
     print(serialise.as_json(result))
 
 
+def say_skipped(skipped: Iterable[Mapping[str, Any]]) -> None:
+    """What was left out, a line each on stderr."""
+    for one in skipped:
+        print(f"lugre-steering: skipped: {one['bag']}: {one['reason']}", file=sys.stderr)
+
+
+def use_threads(count: int | None) -> None:
+    """Limit what a fit takes for itself."""
+    if count is not None:
+        os.environ["LUGRE_STEERING_THREADS"] = str(count)
+
+
+def leave_if(failures: Sequence[str]) -> None:
+    """Exit code 1, with the reasons on stderr, where there are any."""
+    for failure in failures:
+        print(f"lugre-steering: --fail-on: {failure}", file=sys.stderr)
+    if failures:
+        raise typer.Exit(1)
+
+
 def command(name: str | None = None) -> Callable[[F], F]:
     """Register a command whose expected errors end as one line on stderr and exit code 2."""
 
@@ -181,25 +206,34 @@ def replay(
     initial_temperature: Annotated[
         str | None, typer.Option(help="of the rubber at the start of each bag [degC], or 'air': the first recorded air")
     ] = None,
+    jobs: Jobs = 1,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
     """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
+    from lugre_steering.bag.find import find
     from lugre_steering.estimator import Options
     from lugre_steering.live.table import read_options
-    from lugre_steering.replay.run import describe
+    from lugre_steering.replay.result import facts, gate
     from lugre_steering.replay.run import replay as run
+    from lugre_steering.replay.table import show_replay
 
+    wanted = gate(fail_on or ())
     options = read_options(parameters) if parameters is not None else Options()
     if horizon is not None:
         options = replace(options, feed_forward_horizon_s=horizon)
+    found = find(bags, out)
     with progress_bar() as progress:
-        result = run(bags, vehicle, out, options, progress, initial_temperature)
+        result = run(found.bags, vehicle, out, options, progress, initial_temperature, jobs=jobs, skipped=found.skipped)
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:
+        say_skipped(result["skipped"])
         print_json(result)
     else:
-        print("\n".join([*describe(result), f"results in {out}"]))
+        show_replay(output(), result)
+        print(f"results in {out}")
+    leave_if(wanted.failures(facts(result)))
 
 
 @command()
