@@ -10,7 +10,7 @@ import inspect
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -140,10 +140,10 @@ def print_json(result: Any) -> None:
     print(serialise.as_json(result))
 
 
-def say_skipped(skipped: Iterable[Mapping[str, Any]]) -> None:
-    """What was left out, a line each on stderr."""
-    for one in skipped:
-        print(f"lugre-steering: skipped: {one['bag']}: {one['reason']}", file=sys.stderr)
+def say_skipped(skipped: Iterable[tuple[str, str]]) -> None:
+    """What was left out and why, a line each on stderr."""
+    for bag, reason in skipped:
+        print(f"lugre-steering: skipped: {bag}: {reason}", file=sys.stderr)
 
 
 def use_threads(count: int | None) -> None:
@@ -228,7 +228,7 @@ def replay(
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:
-        say_skipped(result["skipped"])
+        say_skipped((one["bag"], one["reason"]) for one in result["skipped"])
         print_json(result)
     else:
         show_replay(output(), result)
@@ -350,18 +350,24 @@ def calibrate(
         list[str] | None, typer.Option(help="NAME=SHARE: relative standard deviation of the sheet [0.15]; repeatable")
     ] = None,
     no_prior: Annotated[bool, typer.Option("--no-prior", help="let the data alone decide")] = False,
+    jobs: Threads = None,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
     """Fit the baseline parameters that a vehicle sheet may have wrong, all bags together: a vehicle file, intervals,
     and what the data cannot tell."""
+    from lugre_steering.bag.find import find
     from lugre_steering.calibration import calibrate as run
+    from lugre_steering.calibration.result import facts, gate
     from lugre_steering.calibration.table import parse_priors, show_calibration
 
     if no_prior and prior:
         raise DataError("--no-prior: leaves no use for --prior; expected one of them")
+    wanted, found = gate(fail_on or ()), find(bags, out)
+    use_threads(jobs)
     with spinner() as progress:
         result = run(
-            bags,
+            found.bags,
             vehicle,
             out,
             free=free or (),
@@ -369,12 +375,14 @@ def calibrate(
             prior=parse_priors(prior or ()),
             priors=not no_prior,
             progress=progress,
+            skipped=found.skipped,
         )
     if as_json:
         print_json(result)
     else:
         show_calibration(output(), result)
         print(f"results in {out}")
+    leave_if(wanted.failures(facts(result)))
 
 
 @command()
@@ -387,17 +395,27 @@ def diagnose(
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,
     report: Annotated[bool, typer.Option(help="write report.html and pictures")] = True,
+    jobs: Threads = None,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
     """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
+    from lugre_steering.bag.find import SKIPPED, find
     from lugre_steering.diagnosis.command import STEPS, run
+    from lugre_steering.diagnosis.result import facts, gate
 
+    wanted, found = gate(fail_on or ()), find(bags, out)
+    use_threads(jobs)
     with step_bar(STEPS) as progress:
-        result = run(bags, vehicle, out, seed=seed, material=material, report=report, progress=progress)
+        result = run(
+            found.bags, vehicle, out, seed=seed, material=material, report=report, progress=progress, skipped=found.skipped
+        )  # fmt: skip
+    say_skipped((one["bag"], one["statement"]) for one in result["data_quality"] if one["finding"] == SKIPPED)
     if as_json:
         print_json(result)
     else:
         print(f"{result['verdict']}: {result['statement']}\nresults in {out}")
+    leave_if(wanted.failures(facts(result)))
 
 
 @command()

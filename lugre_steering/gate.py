@@ -6,10 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from lugre_steering.bag.find import SKIPPED
 from lugre_steering.errors import DataError
 
 Facts = Mapping[str, "str | float | None"]
 """By word: what is so, as a sentence, or a number; None where it is not so, or there is no number."""
+
+
+def quality_facts(findings: Sequence[Mapping[str, str]]) -> dict[str, str | None]:
+    """``skipped`` and ``finding`` of the findings about the data."""
+    told: dict[bool, list[str]] = {True: [], False: []}
+    for found in findings:
+        told[found["finding"] == SKIPPED].append(f"{found['bag']}: {found['finding']}")
+    return {"skipped": ", ".join(told[True]) or None, "finding": ", ".join(told[False]) or None}
 
 
 class Gate:

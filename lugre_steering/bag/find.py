@@ -21,6 +21,8 @@ from lugre_steering.recording import BagFinding
 
 REPLAYED = {"lugre_steering": "replay"}
 """In metadata.yaml of every bag that a replay wrote: a result, no measurement of its own."""
+SKIPPED = "skipped_recording"
+"""How what was left out is called among the findings about the data."""
 _METADATA = "metadata.yaml"
 
 
@@ -33,7 +35,7 @@ class Skipped:
 
     def finding(self) -> BagFinding:
         """The same among the findings about the data."""
-        return BagFinding("skipped_recording", "", self.bag, (), self.reason)
+        return BagFinding(SKIPPED, "", self.bag, (), self.reason)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def is_recording(path: Path) -> bool:
     """Whether it looks like a bag, by names alone: a file of one, or a folder that rosbag2 made."""
     if path.is_file():
         return path.name.endswith(SUFFIXES)
-    return path.is_dir() and ((path / _METADATA).is_file() or _is_split(_files(path)))
+    return path.is_dir() and ((path / _METADATA).is_file() or (_is_split(_files(path)) and not _folders(path)))
 
 
 def is_folder_of_recordings(path: Path) -> bool:
@@ -108,9 +110,13 @@ def _inside(path: Path, out: Path | None) -> Iterator[Path]:
     if out is not None and out.exists() and path.samefile(out):
         return
     yield from _files(path)
-    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
-        if not folder.is_symlink() and not folder.name.startswith("."):
-            yield from _inside(folder, out)
+    for folder in _folders(path):
+        yield from _inside(folder, out)
+
+
+def _folders(folder: Path) -> list[Path]:
+    entries = (entry for entry in folder.iterdir() if entry.is_dir() and not entry.is_symlink())
+    return sorted(entry for entry in entries if not entry.name.startswith("."))
 
 
 def _files(folder: Path) -> list[Path]:

@@ -6,10 +6,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
+from lugre_steering.bag.batch import read_of_machine
+from lugre_steering.bag.find import Skipped
+from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import SCHEMA, picture_names
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder, write_record
@@ -34,10 +37,12 @@ def run(
     material: float = MATERIAL_SHARE,
     report: bool = True,
     progress: Callable[[str], None] = lambda _: None,
+    skipped: Sequence[Skipped] = (),
 ) -> dict[str, Any]:
     """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the JSON.
 
-    The report of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
+    ``skipped``: what has been left out before; of several bags, those of other machines are left out too. Both are told among the
+    findings about the data. The report of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
     """
     vehicle = load(vehicle_file)
     if not 0.0 <= material <= 1.0:
@@ -48,7 +53,10 @@ def run(
     with output_folder(out):
         pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
         old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
-        result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
+        recordings, others = read_of_machine(bags, vehicle.channels, progress)
+        result = diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
+        left = tuple(one.finding() for one in (*skipped, *others))
+        result = replace(result, data_quality=(*left, *result.data_quality))
         try:
             if old is not None:
                 _take_away_report(out, old)

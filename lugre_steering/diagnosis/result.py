@@ -8,11 +8,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from lugre_steering import units
 from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, write_record
+from lugre_steering.gate import Facts, Gate, quality_facts
 from lugre_steering.recording import Array, BagFinding, unused_name
 from lugre_steering.result import Result, folder_for, frame, html, of_bag
 from lugre_steering.serialise import ADDED, IN_MEMORY, finite, mapped
@@ -159,6 +160,17 @@ class Experiment:
     manoeuvre: str
     separates: tuple[str, ...]
     why: str
+
+
+def gate(wanted: Sequence[str]) -> Gate:
+    """What a diagnosis can be made to fail for."""
+    return Gate(wanted, ("skipped", "finding", *get_args(Verdict)))
+
+
+def facts(result: Mapping[str, Any]) -> Facts:
+    """What of it is so."""
+    verdicts = {verdict: f"verdict {verdict}" if verdict == result["verdict"] else None for verdict in get_args(Verdict)}
+    return {**quality_facts(result["data_quality"]), **verdicts}
 
 
 @dataclass(frozen=True)
