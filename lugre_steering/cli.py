@@ -419,6 +419,39 @@ def diagnose(
 
 
 @command()
+def fleet(
+    bags: Bags,
+    vehicle: Annotated[Path, typer.Option("--vehicle", help="vehicle file, or map of vehicles to patterns of their bags (YAML)")],
+    out: OutFolder,
+    diagnose: Annotated[bool, typer.Option(help="diagnose each recording, beside check and replay")] = True,
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="local processes [one per processor]")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler whose workers do it, e.g. tcp://host:8786")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the noise draws, bootstraps and permutations")] = 1,
+    fail_on: FailOn = None,
+    as_json: Json = False,
+) -> None:
+    """Check, replay and diagnose many recordings of many vehicles, and judge them together. Killed, it goes on where it was."""
+    from lugre_steering.bag.find import find
+    from lugre_steering.fleet.command import show_fleet
+    from lugre_steering.fleet.result import facts, gate
+    from lugre_steering.fleet.run import run
+    from lugre_steering.fleet.work import Options
+
+    wanted, found = gate(fail_on or ()), find(bags, out)
+    with progress_bar() as progress:
+        done = run(
+            found.bags, vehicle, out, options=Options(diagnose, seed), jobs=jobs, scheduler=scheduler, skipped=found.skipped,
+            progress=progress,
+        )  # fmt: skip
+    if as_json:
+        print_json(done.json)
+    else:
+        show_fleet(output(), done.json, out)
+        print(f"results in {out}, report: {out / 'report.html'}")
+    leave_if(wanted.failures(facts(done.json)))
+
+
+@command()
 def effects(
     effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,

@@ -182,7 +182,7 @@ def test_a_worker_that_dies_takes_down_its_own_task_only() -> None:
     assert answers == {0: 9, 2: 25, 3: 36}
 
 
-def test_a_replayed_bag_is_hardly_larger_than_what_is_in_it(runs: Path, tmp_path: Path) -> None:
+def test_a_replayed_bag_is_hardly_larger_than_what_is_in_it(tmp_path: Path) -> None:
     """The results have four times the messages of the angles, so twice the packed input is what may be expected."""
     bag = Path(__file__).parents[1] / "bags" / "synthetic_double_cycle"
     assert command("replay", bag, "--vehicle", VEHICLE, "--out", tmp_path / "out").exit_code == 0
