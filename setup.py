@@ -24,7 +24,7 @@ setup(
     packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
     package_dir={f"{PACKAGE}.config": "config"},
     package_data={
-        PACKAGE: ["py.typed", "diagnosis/report/*.html"],
+        PACKAGE: ["py.typed", "diagnosis/report/*.html", "report/static/*"],
         f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*"],
     },
     data_files=[
@@ -50,6 +50,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "import": ["pyarrow>=14.0", "h5py>=3.8"],
         "frame": ["pandas>=2.0"],
+        "fleet": ["pyarrow>=14.0", "distributed>=2023.9"],
         "report": ["matplotlib>=3.6", "plotly>=5.18"],
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
@@ -57,6 +58,8 @@ setup(
             "hypothesis>=6.80",
             "jsonschema>=4.17",
             "mcap>=1.1",
+            "pyarrow>=14.0",
+            "distributed>=2023.9",
             "ruff>=0.6",
             "mypy>=1.10",
             "types-PyYAML",

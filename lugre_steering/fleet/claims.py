@@ -19,6 +19,7 @@ import numpy as np
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fleet.statistics import Combined, budgeted, change, combined, outliers, trend
 from lugre_steering.fleet.work import Record
+from lugre_steering.recording import Array
 
 BUDGET = 0.05
 """Share of false ones among all that is claimed."""
@@ -102,9 +103,19 @@ def claims(records: Sequence[Record], seed: int = 1) -> list[Claim]:
         tried += sum(len(CATALOGUE) for record in rows if record["verdict"] is not None) - len(named)
         joint = list(_joint(vehicle, rows))
         found += [*named, *joint, *_since(vehicle, rows, seed), *_trends(vehicle, rows)]
-    q = budgeted([*(claim.p_value for claim in found), *[1.0] * max(tried, 0)])[: len(found)]
+    p = [*(claim.p_value for claim in found), *[1.0] * max(tried, 0)]
+    q = budgeted(p, _weights([claim.kind == "recording" for claim in found] + [True] * max(tried, 0)))[: len(found)]
     judged = [replace(claim, q_value=float(value)) for claim, value in zip(found, q, strict=True)]
     return sorted(_with_leaders(judged), key=lambda claim: (claim.q_value, claim.p_value, claim.vehicle, claim.effect, claim.kind))
+
+
+def _weights(single: Sequence[bool]) -> Array:
+    """Half of the budget for what single recordings claim, of which there are many, half for what all together do."""
+    of_one = np.array(single, np.bool_)
+    counts = of_one.sum(), (~of_one).sum()
+    if not all(counts):
+        return np.ones(of_one.size)
+    return np.asarray(0.5 * of_one.size / np.where(of_one, *counts), np.float64)
 
 
 def _named(vehicle: str, record: Record) -> Iterator[Claim]:
@@ -200,7 +211,7 @@ def shared(records: Sequence[Record], found: Sequence[Claim]) -> list[Shared]:
         if len(of) < 2:
             continue
         whole = combined([claim.value or 0.0 for claim in of.values()], [claim.error or np.inf for claim in of.values()])
-        having = tuple(vehicle for vehicle, claim in of.items() if claim.stands)
+        having = tuple(sorted(vehicle for vehicle, claim in of.items() if claim.stands))
         result.append(Shared(effect, whole.alike_p > BUDGET, having, whole.between, whole.alike_p, next(iter(of.values())).unit))
     return result
 
