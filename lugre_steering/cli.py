@@ -452,6 +452,58 @@ def fleet(
 
 
 @command()
+def play(
+    bag: Annotated[Path, typer.Argument(help="rosbag2 folder or file")],
+    rate: Annotated[float, typer.Option(min=0.01, max=1000.0, help="times as fast as it was recorded")] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="again and again, until interrupted")] = False,
+    recorded_stamps: Annotated[bool, typer.Option("--recorded-stamps", help="leave the header stamps as they are")] = False,
+    as_json: Json = False,
+) -> None:
+    """Publish a bag on ROS topics in its own timing, its stamps moved to now; what an estimator had published is left out."""
+    from lugre_steering.live.available import need_ros
+
+    need_ros("play")
+    from lugre_steering.live.play import play as run
+
+    with progress_bar() as progress:
+        done = run(bag, rate=rate, loop=loop, recorded_stamps=recorded_stamps, progress=progress)
+    for topic, reason in done.left_out.items():
+        print(f"lugre-steering: not published: {topic}: {reason}", file=sys.stderr)
+    print_json(done) if as_json else print(f"{done.messages.total()} messages on {len(done.messages)} topics")
+
+
+@command()
+def watch(
+    node_name: Annotated[str, typer.Option("--node", help="name of the node, with its namespace")] = "/steering_torque_estimator",
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="leave after this time [until interrupted]")] = None,
+) -> None:
+    """Show a live estimator in the terminal: torque, residual, temperatures, their last minute, and its health."""
+    from lugre_steering.live.available import need_ros
+
+    need_ros("watch")
+    from lugre_steering.live.watch import watch as run
+
+    run(output(), node_name, float("inf") if seconds is None else seconds)
+
+
+@command()
+def node(
+    vehicle: VehicleFile,
+    parameters: Annotated[Path | None, typer.Option(help="parameter file (YAML)")] = None,
+    setting: Annotated[list[str] | None, typer.Option("--set", "-p", help="NAME:=VALUE of a parameter; repeatable")] = None,
+    remap: Annotated[list[str] | None, typer.Option("--remap", "-r", help="FROM:=TO of a topic; repeatable")] = None,
+) -> None:
+    """Start the live estimator, as 'ros2 run lugre_steering estimator' does; Ctrl-C ends it."""
+    from lugre_steering.live.available import need_ros
+
+    need_ros("node")
+    from lugre_steering.node import arguments_of
+    from lugre_steering.node import main as run
+
+    raise typer.Exit(run(arguments_of(vehicle, parameters, setting or (), remap or ())))
+
+
+@command()
 def effects(
     effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,

