@@ -25,13 +25,14 @@ setup(
     package_dir={f"{PACKAGE}.config": "config"},
     package_data={
         PACKAGE: ["py.typed", "diagnosis/report/*.html", "report/static/*"],
-        f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*"],
+        f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*", "layouts/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
         (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if Path(path).is_file())),
         (f"share/{PACKAGE}/config/own_physics", sorted(path for path in glob("config/own_physics/*") if Path(path).is_file())),
+        (f"share/{PACKAGE}/config/layouts", sorted(glob("config/layouts/*"))),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     zip_safe=False,

@@ -454,7 +454,9 @@ def fleet(
 @command()
 def play(
     bag: Annotated[Path, typer.Argument(help="rosbag2 folder or file")],
-    rate: Annotated[float, typer.Option(min=0.01, max=1000.0, help="times as fast as it was recorded")] = 1.0,
+    rate: Annotated[
+        float, typer.Option(min=0.01, max=1000.0, help="times as fast as recorded; stamps keep their distances, and the node says so")
+    ] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="again and again, until interrupted")] = False,
     recorded_stamps: Annotated[bool, typer.Option("--recorded-stamps", help="leave the header stamps as they are")] = False,
     as_json: Json = False,
@@ -482,8 +484,10 @@ def watch(
 
     need_ros("watch")
     from lugre_steering.live.watch import watch as run
+    from lugre_steering.live_view import showing
 
-    run(output(), node_name, float("inf") if seconds is None else seconds)
+    with showing(output()) as show:
+        run(show, node_name, float("inf") if seconds is None else seconds)
 
 
 @command()
