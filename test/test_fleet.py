@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import jsonschema
 import pyarrow.parquet as pq
 import pytest
 from test_batch import of_another_machine
@@ -25,11 +26,13 @@ import lugre_steering
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError, LugreSteeringError, VehicleFileError
+from lugre_steering.fleet.result import Fleet
 from lugre_steering.fleet.run import run
 from lugre_steering.fleet.tables import KINDS
 from lugre_steering.fleet.vehicles import member_of, read_members
 from lugre_steering.fleet.work import Options
 from lugre_steering.resources import config_folder
+from lugre_steering.schemas import schema_of
 
 VEHICLE = config_folder() / "test_vehicle.yaml"
 BAGS = Path(__file__).parents[1] / "bags"
@@ -71,6 +74,10 @@ def test_bad_bags_are_in_quarantine_and_stop_nobody(done: Path) -> None:
     assert {Path(one["bag"]).name for one in result["quarantine"]} == {"robot", "corrupt"}
     assert all(one["reason"] for one in result["quarantine"])
     assert [(one["recordings"], one["quarantined"]) for one in result["vehicles"]] == [(4, 2)]
+
+
+def test_the_record_keeps_to_its_schema(done: Path) -> None:
+    jsonschema.validate(json.loads((done / "fleet.json").read_text()), schema_of(Fleet))
 
 
 def test_tables_are_what_they_say(done: Path, runs: Path) -> None:

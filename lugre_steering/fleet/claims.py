@@ -35,9 +35,9 @@ Kind = Literal["recording", "joint", "since", "trend over time", "trend over air
 class Claim:
     """One statement that may be false: about ``effect`` (or 'rmse', 'bias') of a vehicle, or of one of its bags.
 
-    ``value`` with its 95 % interval and standard error in ``unit``; ``since``: date (ISO) of the first recording after a change;
-    ``leads``: the strongest of the effects that its vehicle shows jointly; ``named_in``: recordings of ``recordings`` whose own
-    diagnosis names the effect.
+    ``value`` with its 95 % interval and standard error in ``unit``; ``since``: date (ISO) of the recording, or of the first one
+    after a change; ``leads``: the strongest of the effects that its vehicle shows jointly; ``named_in``: how many of ``recordings``
+    have a diagnosis of their own that names the effect.
     """
 
     kind: Kind
@@ -124,7 +124,8 @@ def _named(vehicle: str, record: Record) -> Iterator[Claim]:
         name, fitted = next(iter(effect["parameters"].items()), ("", _NO_VALUE))
         low, high = fitted["ci95"]
         value, unit, p = fitted["value"], fitted["unit"], effect["p_value"]
-        yield Claim("recording", vehicle, record["bag"], effect["id"], name, value, low, high, unit, p, named_in=1)
+        when = record["recorded"]
+        yield Claim("recording", vehicle, record["bag"], effect["id"], name, value, low, high, unit, p, named_in=1, since=when)
 
 
 Estimates = Mapping[tuple[str, int], list[tuple[Record, Mapping[str, Any]]]]

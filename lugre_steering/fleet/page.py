@@ -41,7 +41,7 @@ def write_page(fleet: Fleet, records: Sequence[Record], file: Path) -> None:
         Section("reading", "Reading", "How to read this", _reading(fleet)),
     ]
     head = (
-        f'<header id="verdict"><p class="over">{len(fleet.vehicles)} vehicles &middot; {fleet.recordings} recordings &middot; '
+        f'<header id="verdict"><p class="over">vehicles: {len(fleet.vehicles)} &middot; recordings: {fleet.recordings} &middot; '
         f'{text(fleet.date[:10])}</p>\n<h1>{text(title)}</h1>\n<div class="verdict"><p>{text(first)}</p></div>\n'
         f"{facts(_numbers(fleet))}</header>"
     )
@@ -51,13 +51,14 @@ def write_page(fleet: Fleet, records: Sequence[Record], file: Path) -> None:
 
 def _verdict(fleet: Fleet) -> tuple[Tone, str, str]:
     """Tone, headline and first sentence."""
-    having = {claim.vehicle for claim in fleet.claims if claim.kind in ("recording", "joint")}
-    alone = [claim for claim in fleet.claims if claim.kind == "joint" and claim.leads and not claim.named_in]
+    having = {claim.vehicle: claim for claim in reversed(fleet.claims) if claim.leads or claim.kind == "recording"}
+    alone = [claim for claim in fleet.claims if claim.leads and not claim.named_in]
     if having:
-        weak = ", ".join(f"{_title(claim)} on {claim.vehicle}" for claim in alone)
-        more = f" Too weak for any single recording, and seen in all of them together: {weak}." if weak else ""
-        shown = f"{len(having)} of {len(fleet.vehicles)} vehicles show more than their model."
-        return "found", "Physics is missing from the model", shown + more
+        what = [f"{_title(claim)} on {vehicle}" for vehicle, claim in sorted(having.items())]
+        more = f", and {len(what) - MOST_VEHICLES} vehicles more" if len(what) > MOST_VEHICLES else ""
+        weak = ", ".join(sorted({_title(claim) for claim in alone}))
+        joint = f" Too weak for any single recording, and seen in all together: {weak}." if weak else ""
+        return "found", "Physics is missing from the model", f"{', '.join(what[:MOST_VEHICLES])}{more}.{joint}"
     if not any(vehicle.recordings for vehicle in fleet.vehicles):
         return "unsure", "No recording tells anything", "All of them are in quarantine; the reasons stand below."
     if not fleet.options.diagnose:
@@ -91,19 +92,37 @@ def _limited(header: Sequence[str], rows: Sequence[Row | Sequence[str]], numeric
 
 
 def _effects(fleet: Fleet) -> str:
+    """A row for every effect of every vehicle: those that lead or are named first."""
+    total = {vehicle.name: vehicle.recordings for vehicle in fleet.vehicles}
     rows: list[Row | Sequence[str]] = []
+    for (vehicle, effect), claims in sorted(_acting(fleet).items(), key=lambda item: (item[0][0], _rank(item[1]))):
+        named = [claim for claim in claims if claim.kind == "recording"]
+        shown = next((claim for claim in claims if claim.kind == "joint"), named[0] if named else claims[0])
+        first = min((claim.since or "" for claim in named), default="")[:10] or "-"
+        value, ends = words.estimate(shown.value, None if shown.low is None else (shown.low, shown.high))
+        size = f"{code(shown.parameter)} {text(value)} {text(shown.unit)}"
+        leads, role = any(claim.leads for claim in claims), "fits too" if not named else "named"
+        cells = (
+            text(vehicle), f"{text(_title(shown))} ({code(effect)})", "leads" if leads else role, f"{len(named)} of {total[vehicle]}",
+            text(first), size, text(ends), text(words.chance(min(claim.q_value for claim in claims))),
+        )  # fmt: skip
+        rows.append(Row(cells, LEADS if leads or named else None))
+    header = ("vehicle", "effect", "", "named in", "first on", "size", "95 % interval", "q")
+    return _limited(header, rows, (3, 7), "claims.parquet")
+
+
+def _acting(fleet: Fleet) -> dict[tuple[str, str], list[Claim]]:
+    """Names and joint evidence by vehicle and effect, the surest first."""
+    found: dict[tuple[str, str], list[Claim]] = {}
     for claim in fleet.claims:
-        if claim.kind not in ("recording", "joint"):
-            continue
-        where = f"{claim.recordings} recordings together, named in {claim.named_in}" if claim.kind == "joint" else Path(claim.bag).name
-        value, ends = words.estimate(claim.value, None if claim.low is None else (claim.low, claim.high))
-        role = "leads" if claim.leads else "fits too" if claim.kind == "joint" else "named"
-        size = f"{code(claim.parameter)} {text(value)} {text(claim.unit)}"
-        name = f"{text(_title(claim))} ({code(claim.effect)})"
-        cells = (text(claim.vehicle), name, text(where), role, size, text(ends), text(words.chance(claim.q_value)))
-        rows.append(Row(cells, LEADS if claim.leads else None))
-    header = ("vehicle", "effect", "seen in", "role", "size", "95 % interval", "q")
-    return _limited(header, rows, (6,), "claims.parquet")
+        if claim.kind in ("recording", "joint"):
+            found.setdefault((claim.vehicle, claim.effect), []).append(claim)
+    return found
+
+
+def _rank(claims: Sequence[Claim]) -> tuple[bool, int, float]:
+    named = sum(claim.kind == "recording" for claim in claims)
+    return not any(claim.leads for claim in claims), -named, claims[0].p_value
 
 
 def _since(fleet: Fleet) -> str:
