@@ -3,7 +3,8 @@
 """Joint fit of calibration, initial bristles and effect parameters: Levenberg-Marquardt within bounds, few linearisations.
 
 A linearisation costs a run of the chain per parameter, a step only one. Between linearisations the Jacobian is kept up to date by
-the steps themselves (Broyden, Math. Comp. 19 (1965) 577), as long as they do what it foretells.
+the steps themselves (Broyden, Math. Comp. 19 (1965) 577), as long as they do what it foretells. The calibration is many columns and
+nearly linear, so on the way only those of effects are made anew; an end is believed of a whole linearisation alone.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ from lugre_steering.recording import Array
 
 ROBUST = 3.0
 """Standard deviations beyond which the robust fit counts an error linearly."""
-STEPS, FORETOLD = 6, 0.5
-"""Most steps per linearisation, and the share of the foretold fall that a step must bring for another one."""
+STEPS, FORETOLD, FAR = 6, 0.5, 0.03
+"""Most steps per linearisation, the share of the foretold fall that a step must bring for another one, and the relative fall of the
+cost per linearisation from which the next one is of effects alone."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +62,14 @@ def fit(
     robust: bool = False,
     priors: bool = True,
     tolerance: float = 1e-6,
+    worth: float = np.inf,
 ) -> Fit:
     """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
     ``tolerance``: relative fall of the cost per step below which the fit ends; ``linearisations``: how often it may linearise
-    anew before it ends anyhow. ``robust`` bounds the influence of samples
-    beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
+    anew before it ends anyhow; ``worth``: cost that must still be in reach at the present pace. ``robust`` bounds the influence of
+    samples beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
     x0 = problem.start() if start is None else start
     low, high = problem.bounds()
@@ -88,8 +91,8 @@ def fit(
     def prediction(p: Array) -> Array:
         return problem.predict_all(*unpack(p))
 
-    def jacobian(p: Array, base: Array) -> Array:
-        columns = in_threads(lambda j: _column(problem, unpack, p, j, n, high, base), range(p.size))
+    def jacobian(p: Array, base: Array, first: int = 0) -> Array:
+        columns = in_threads(lambda j: _column(problem, unpack, p, j, n, high, base), range(first, p.size))
         return np.column_stack(columns) * weight[:, None]
 
     def cost(p: Array, predicted: Array) -> float:
@@ -97,9 +100,10 @@ def fit(
 
     p = np.clip(p0, low, high)
     base = prediction(p)
-    left, slope, settled = cost(p, base), jacobian(p, base), False
+    left, slope, settled, whole = cost(p, base), jacobian(p, base), False, True
     damping = 1e-3
-    for _ in range(linearisations):
+    for done in range(linearisations):
+        before = left
         for age in range(STEPS):
             error = (base - problem.measured) * weight
             influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2) if robust else np.ones_like(error)
@@ -114,18 +118,22 @@ def fit(
                     break
                 damping *= 8.0
             if not fall > 0.0:
-                settled = age == 0
+                settled = whole and age == 0
                 break
             change, secant = trial - p, (moved - base) * weight
             foretold = -(2.0 * gradient @ change + change @ normal @ change)
             p, base, left, damping = trial, moved, left - fall, max(damping / 6.0, 1e-9)
-            settled = age == 0 and fall < tolerance * left
+            settled = whole and age == 0 and fall < tolerance * left
             if fall < max(tolerance * left, FORETOLD * foretold):
                 break
             slope += np.outer(secant - slope @ change, change / (change @ change))
-        if settled:
+        if settled or left - (linearisations - 1 - done) * (before - left) > worth:
             break
-        slope = jacobian(p, base)
+        whole = p.size == n or before - left < FAR * left
+        if whole:
+            slope = jacobian(p, base)
+        else:
+            slope[:, n:] = jacobian(p, base, n)
     x, fitted = unpack(p)
     natural = np.concatenate([scale, [parameter.slope(float(number)) for (_, parameter), number in zip(free, p[n:], strict=True)]])
     covariance = np.asarray(np.linalg.pinv(slope.T @ slope + np.diag(prior**2), rcond=1e-12) * np.outer(natural, natural), float)
