@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The same single BLAS thread that the command line asks for, and one for fits where tests run side by side; set before NumPy is imported."""
+"""One BLAS thread, as the command line asks for, and one for fits where tests run side by side; set before NumPy is imported."""
 import os
 
 import pytest
