@@ -56,7 +56,7 @@ def conclude(
     if lawful is not None:
         beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
         laws = described(lawful)
-        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque), formula(laws))
+        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque), formula(laws, problem.vehicle))
     if named:
         verdict = "missing_physics"
     elif left.structured:
