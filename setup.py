@@ -24,7 +24,7 @@ setup(
     packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
     package_dir={f"{PACKAGE}.config": "config"},
     package_data={
-        PACKAGE: ["py.typed", "diagnosis/report/*.html"],
+        PACKAGE: ["py.typed", "report/static/*"],
         f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*"],
     },
     data_files=[
@@ -50,7 +50,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "import": ["pyarrow>=14.0", "h5py>=3.8"],
         "frame": ["pandas>=2.0"],
-        "report": ["matplotlib>=3.6", "plotly>=5.18"],
+        "report": ["matplotlib>=3.6"],
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
             "pytest>=7.4",

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from lugre_steering.calibration.identify import Assumed, Combination
 from lugre_steering.files import earlier_result, write_record
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import BagFinding
 from lugre_steering.result import Result, folder_for, frame, html
-from lugre_steering.serialise import IN_MEMORY, in_order
+from lugre_steering.serialise import ADDED, IN_MEMORY, in_order
 from lugre_steering.vehicle import Vehicle, save
 
 if TYPE_CHECKING:
@@ -99,6 +100,8 @@ class Calibration(Result):
     """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``."""
     picture: str | None = None
     picture_note: str | None = None
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    """Options, and hashes of the files."""
 
     def with_provenance(self) -> Vehicle:
         """The calibrated vehicle with a note of how its values came about."""
@@ -119,7 +122,11 @@ class Calibration(Result):
         folder = folder_for(out)
         earlier_result(folder, RECORD, SCHEMA, (VEHICLE,))
         write_record(self.json, folder / RECORD)
-        save(self.with_provenance(), folder / VEHICLE)
+        self.write_vehicle(folder)
+
+    def write_vehicle(self, folder: Path) -> None:
+        """The vehicle file into a folder where it may stand."""
+        save(self.with_provenance(), folder / VEHICLE, self.provenance.lines() if self.provenance is not None else ())
 
     def to_frame(self) -> DataFrame:
         """One row per fitted key, as a pandas table."""

@@ -6,14 +6,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
 from lugre_steering.diagnosis.result import SCHEMA, picture_names
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError
-from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder, write_record
-from lugre_steering.vehicle import load, save
+from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder
+from lugre_steering.vehicle import load
 
 STEPS = (
     "reading", "checking the data", "estimating the motion", "recalibrating", "fingerprints", "rivals", "verifying",
@@ -48,12 +50,12 @@ def run(
     with output_folder(out):
         pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
         old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
-        result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
+        found = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
+        result = replace(found, provenance=made("diagnose", {"seed": seed, "material": material}, vehicle_file, bags))
         try:
             if old is not None:
                 _take_away_report(out, old)
-            write_record(result.json, out / "diagnosis.json")
-            save(result.vehicle, out / "augmented.yaml")
+            result.write(out)
         except OSError as error:
             raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
         if report:

@@ -15,9 +15,10 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator import Options
 from lugre_steering.files import earlier_result, write_record
 from lugre_steering.online import Agreement
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Finding
 from lugre_steering.result import Result, folder_for, frame, html, of_bag
-from lugre_steering.serialise import IN_MEMORY
+from lugre_steering.serialise import ADDED, IN_MEMORY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,6 +74,8 @@ class ReplayedBag:
     findings: tuple[Finding, ...]
     picture: str | None = None
     picture_note: str | None = None
+    page: str | None = field(default=None, metadata=ADDED)
+    """File of the page beside the record."""
     series: Series | None = field(default=None, repr=False, metadata=IN_MEMORY)
 
     def kept(self) -> Series:
@@ -105,6 +108,7 @@ class Replay(Result):
     options: Options
     bags: tuple[ReplayedBag, ...]
     overall: Agreement | None
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
 
     def save(self, out: str | Path) -> None:
         """Write summary.json into a folder; replaces only an earlier one there."""

@@ -11,7 +11,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -28,12 +28,15 @@ from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
 from lugre_steering.live.plan import planned_angles
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, r2_words, sheet_words
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import AIR_LIMIT_DEGC, NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
+from lugre_steering.replay.page import write_page
 from lugre_steering.replay.result import RECORD, SCHEMA, InputCounts, Replay, ReplayedBag, Series
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
@@ -70,13 +73,14 @@ def replay(
     vehicle = load(vehicle_file)
     names = _names(bags, out)  # before anything is made
     options = options or Options()
-    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None)
+    origin = made("replay", {**asdict(options), "initial_temperature": initial_temperature}, vehicle_file, bags)
+    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None, origin)
     overall = Comparison()
     try:
         with output_folder(out):
             for path, name in zip(bags, names, strict=True):
                 run = Passage(path, name, vehicle, options, initial_temperature)
-                written = run.write(out, progress)
+                written = run.write(out, origin, progress)
                 overall.merge(run.fit)
                 summary = replace(summary, bags=(*summary.bags, written), overall=overall.result())
                 write_record(summary.json, out / RECORD)
@@ -121,9 +125,9 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
             if source == result or source in result.parents or result in source.parents:
                 raise BagError(f"{path}: the result {out / name} would touch this bag; choose another --out")
         _refuse_foreign(out / name)
-        picture = out / f"{name}.png"
-        if picture.exists() and not is_ours(picture):
-            raise _not_ours(picture)
+        for beside in (out / f"{name}.png", out / f"{name}.html"):
+            if beside.exists() and not is_ours(beside):
+                raise _not_ours(beside)
     if (out / RECORD).exists() and read_record(out / RECORD, SCHEMA) is None:
         raise _not_ours(out / RECORD)
     return names
@@ -174,8 +178,8 @@ class Passage:
         self._log_ns: tuple[int, int] | None = None
         self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
-    def write(self, out: Path, progress: Progress | None) -> ReplayedBag:
-        """Write the bag and the picture; returns the summary of this bag."""
+    def write(self, out: Path, origin: Provenance, progress: Progress | None) -> ReplayedBag:
+        """Write the bag, the page and the picture; returns the summary of this bag."""
         with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
             topics = self._topics(bag, channels)
@@ -186,8 +190,10 @@ class Passage:
             _refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
             findings = [*bag.findings, *self._found, *self._last_findings()]
         summary = self._summary(samples, findings)
-        picture, note = self._picture(out / f"{self.name}.png", summary.fit)
-        return replace(summary, picture=picture, picture_note=note)
+        page = out / f"{self.name}.html"
+        write_page(summary, self.vehicle, self.motion, self.check, origin, page)
+        picture, note = self._picture(out / f"{self.name}.png", summary.fit, origin)
+        return replace(summary, picture=picture, picture_note=note, page=page.name)
 
     def remember(self) -> ReplayedBag:
         """Write nothing, keep the torques in memory; returns the summary of this bag with them."""
@@ -455,13 +461,13 @@ class Passage:
             words.append(", ".join([f"{label}: {counts.used} samples used", *reasons]))
         return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
-    def _picture(self, file: Path, fit: Agreement | None) -> tuple[str | None, str | None]:
+    def _picture(self, file: Path, fit: Agreement | None, origin: Provenance) -> tuple[str | None, str | None]:
         if note := no_pictures():
             file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
             return None, note
         from lugre_steering.replay.figure import draw_replay
 
-        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
+        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, origin, file)
         return file.name, None
 
 

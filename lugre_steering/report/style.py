@@ -13,6 +13,7 @@ from typing import Any
 
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.files import MAKER, refuse_foreign, replacing
+from lugre_steering.provenance import Provenance, provenance
 
 try:
     import matplotlib as mpl
@@ -66,13 +67,15 @@ def figure(
     row_inches: float = 3.0,
     width: float = 10.0,
     words: Callable[[str], str] = str,
+    made: Provenance | None = None,
 ) -> Iterator[Any]:
     """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to
     ``file``.
 
     The caption is also the description inside the file, which says who made it: a picture of anybody else is never
     replaced (``DataError``). ``words`` is applied to all text (a linear axis has forces where
-    others have torques). The figure grows with its caption, so no line of it is ever cut off.
+    others have torques); ``made``, how the result came about, goes into the file. The figure grows with its caption, so no
+    line of it is ever cut off.
     """
     refuse_foreign([file])
     lines = [
@@ -91,4 +94,6 @@ def figure(
         fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
         fig.text(0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333")
         with replacing(file) as stream:
-            fig.savefig(stream, format="png", metadata={"Software": MAKER, "Description": words(caption)})
+            origin = "\n".join((made or provenance("figure", {})).lines())
+            metadata = {"Software": MAKER, "Description": words(caption), "Comment": origin}
+            fig.savefig(stream, format="png", metadata=metadata)

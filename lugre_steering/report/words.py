@@ -61,8 +61,16 @@ def number(value: float | None, digits: int = 4) -> str:
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
     if not -4 <= decimals <= 6:
         return f"{value:.{digits - 1}e}"
-    text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u2009")
+    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    if abs(value) >= 1e4:  # four digits read well without a gap
+        text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u2009")
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def torque(vehicle: Vehicle, value: float) -> str:
+    """A torque (or force) as in every sentence and table: three digits with its unit, large ones in thousands."""
+    unit = vehicle.coordinate.force_unit
+    return f"{number(1e-3 * value, 3)} k{unit}" if abs(value) >= 9995.0 else f"{number(value, 3)} {unit}"
 
 
 def estimate(value: float | None, ends: Sequence[float | None] | None) -> tuple[str, str]:
