@@ -87,7 +87,7 @@ def _where(done: Finished, effect: NamedEffect) -> list[str]:
     label, _, unit = axis.label.rstrip("]").partition(" [")
     from_, to = (words.number(axis.scale * end, 3) for end in (low, high))
     if name.startswith("|"):
-        return [f"beyond {from_} {unit} of {label.strip('|')} to either side ({often})"]
+        return [f"mostly beyond {from_} {unit} of {label.strip('|')} to either side ({often})"]
     return [f"at a {label} of {from_} to {to} {unit}".rstrip() + f" ({often})"]
 
 

@@ -23,6 +23,7 @@ PAGE_POINTS = 150_000
 CURVE_POINTS = 12_000
 """Of one curve: two minutes at 100 Hz undecimated."""
 CLOUD_POINTS = 3_000
+"""Of one effect; those of all together are at most three times as many."""
 
 
 def styles(diagnosis: Diagnosis) -> dict[str, str]:
@@ -105,7 +106,8 @@ class Cloud:
         traces = [trace for trace in diagnosis.traces if key in trace.contributions]
         told_by = diagnosis.coordinate_of.get(key, "")
         name = shown.law_coordinate(effect, told_by, traces[0].coordinates)
-        stride = max(1, math.ceil(sum(trace.time.size for trace in traces) / CLOUD_POINTS))
+        points = min(CLOUD_POINTS, 3 * CLOUD_POINTS // len(diagnosis.json["effects"]))
+        stride = max(1, math.ceil(sum(trace.time.size for trace in traces) / points))
         columns = np.concatenate(
             [
                 np.stack([t.coordinates[name], t.measured - t.baseline, t.measured - t.augmented + t.contributions[key],
