@@ -14,15 +14,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from lugre_steering import serialise
+from lugre_steering import defaults, serialise
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
+from lugre_steering.terminal import forgive_letters
 from lugre_steering.version import __version__
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
@@ -32,10 +33,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 app = typer.Typer(
     help="Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,  # it would take the brackets of units for its own
     pretty_exceptions_enable=False,
 )
-
 
 
 def _tell_version(wanted: bool) -> None:
@@ -46,9 +47,34 @@ def _tell_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     _: Annotated[bool, typer.Option("--version", help="print the version and leave", callback=_tell_version, is_eager=True)] = False,
 ) -> None:
-    """Options of the program itself."""
+    """Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out."""
+    if context.invoked_subcommand == "config":  # which must work with any content
+        return
+    try:
+        context.default_map = {**defaults.of_commands(defaults.load(), _options_of_commands())}
+    except LugreSteeringError as error:
+        print(f"lugre-steering: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+
+
+def _options_of_commands() -> dict[str, dict[str, defaults.Option]]:
+    """The options of every command by the name as it is typed, without its dashes."""
+    found: dict[str, dict[str, defaults.Option]] = {}
+    for registered in app.registered_commands:
+        function = registered.callback
+        assert function is not None
+        name = registered.name or function.__name__
+        for parameter in inspect.signature(function, eval_str=True).parameters.values():
+            hint, *info = get_args(parameter.annotation) or (None,)
+            if info and isinstance(info[0], typer.models.OptionInfo):
+                # Typer holds the first name where other uses have a default.
+                names = [text for text in (info[0].default, *(info[0].param_decls or ())) if str(text).startswith("--")]
+                typed = str(names[0])[2:] if names else parameter.name.replace("_", "-")
+                found.setdefault(name, {})[typed] = defaults.Option(parameter.name, hint)
+    return found
 
 
 Bags = Annotated[list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not)")]
@@ -353,17 +379,24 @@ def diagnose(
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,
     report: Annotated[bool, typer.Option(help="write report.html and pictures")] = True,
+    exit_code: Annotated[
+        bool, typer.Option("--exit-code", help="leave with 3 for missing, 4 for unlisted physics, 5 for insufficient data")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
     from lugre_steering.diagnosis.command import STEPS, run
+    from lugre_steering.diagnosis.show import EXIT_CODES, show_diagnosis
 
     with step_bar(STEPS) as progress:
         result = run(bags, vehicle, out, seed=seed, material=material, report=report, progress=progress)
     if as_json:
-        print_json(result)
+        print_json(result.json)
     else:
-        print(f"{result['verdict']}: {result['statement']}\nresults in {out}")
+        show_diagnosis(output(), result)
+        print(f"results in {out}" + (", for people in report.html" if report else ""))
+    if exit_code:
+        raise typer.Exit(EXIT_CODES[result.verdict])
 
 
 @command()
@@ -434,9 +467,32 @@ def prove(
         print(f"results in {out}")
 
 
+@command()
+def config(
+    option: Annotated[str, typer.Argument(help="name of an option (vehicle), or of that of one command (diagnose.seed)")] = "",
+    value: Annotated[str, typer.Argument(help="what it shall be where it is not given")] = "",
+    unset: Annotated[bool, typer.Option("--unset", help="forget this default")] = False,
+    as_json: Json = False,
+) -> None:
+    """Show, save or forget defaults of options, such as the vehicle file."""
+    saved = defaults.load()
+    if unset:
+        saved.pop(option, None)
+        defaults.save(saved)
+    elif option:
+        saved[option] = defaults.checked(option, value, _options_of_commands())
+        defaults.save(saved)
+    if as_json:
+        print_json({"file": defaults.file(), "defaults": saved})
+    else:
+        lines = [f"{defaults.file()}:", *(f"  {key} = {kept}" for key, kept in saved.items())]
+        print("\n".join(lines) if saved else "no defaults are saved")
+
+
 def main() -> None:
     """Entry point of ``lugre-steering``."""
-    app()
+    forgive_letters()
+    app(prog_name="lugre-steering")
 
 
 if __name__ == "__main__":

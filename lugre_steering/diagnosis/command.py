@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
-from lugre_steering.diagnosis.result import SCHEMA, picture_names
+from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, picture_names
 from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder
@@ -36,8 +36,8 @@ def run(
     material: float = MATERIAL_SHARE,
     report: bool = True,
     progress: Callable[[str], None] = lambda _: None,
-) -> dict[str, Any]:
-    """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the JSON.
+) -> Diagnosis:
+    """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the result.
 
     The report of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
     """
@@ -65,7 +65,7 @@ def run(
             note = write_report(result, out).note
             if note:
                 print(f"lugre-steering: {note}", file=sys.stderr)
-    return result.json
+    return result
 
 
 def _take_away_report(out: Path, old: Mapping[str, Any]) -> None:
