@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
+import io
 import json
 import re
 import shutil
@@ -21,6 +22,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from rich.console import Console
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
@@ -41,6 +43,7 @@ from lugre_steering.diagnosis.result import (
     Place,
     Unexplained,
 )
+from lugre_steering.diagnosis.show import show_diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import BagFinding
 from lugre_steering.report import words
@@ -331,8 +334,8 @@ def test_linear_axes_have_their_own_units(vehicle: Vehicle) -> None:
     page = page_of(missing(vehicle.replace(coordinate=coordinate)))
     assert "N/m" in page.text
     assert "N m" not in page.text.replace("\u00a0", " ")
-    assert "position [mm]" in page.text
-    assert "position [mm]" in page.scripts[0]
+    assert "position (mm)" in page.text
+    assert "position (mm)" in page.scripts[0]
 
 
 # ----------------------------------------------------------------- the plots
@@ -354,7 +357,7 @@ def test_drawn_curves_are_the_data(vehicle: Vehicle) -> None:
         (2, stop, one.contributions["end_stop"]),
     ):  # fmt: skip
         (curve,) = (series for series in chart["panels"][panel]["series"] if series["name"] == name)
-        assert "[kN m]" in chart["panels"][panel]["label"]
+        assert "(kN m)" in chart["panels"][panel]["label"]
         np.testing.assert_allclose(curve["y"], values * 1e-3, atol=1.1e-4 * np.abs(values).max() * 1e-3)
         assert (curve["x0"], curve["dx"]) == (0.0, pytest.approx(0.01))
     (acts,) = (span for span in chart["spans"] if span["name"] == stop)
@@ -560,3 +563,32 @@ def test_logarithmic_axes_carry_plain_numbers(tmp_path: Path) -> None:
     shown = [label.get_text() for labels in ("xticklabels", "yticklabels") for label in plt.getp(axes[0, 0], labels)]
     assert {"0.01", "1", "10", "1000"} <= set(shown)
     assert not [text for text in shown if "$" in text]
+
+
+# ----------------------------------------------------------------- the verdict on a terminal
+
+
+def test_the_verdict_on_a_terminal_is_a_table_of_80_columns_with_the_first_sentence_first(vehicle: Vehicle) -> None:
+    headline = "Missing from the model: X, beyond 23 deg, up to 9750 N m (17 % of the torque). Use augmented.yaml."
+    statement = f"{headline} With it the held-out error falls. Look here."
+    diagnosis = dataclasses.replace(missing(vehicle), headline=headline, statement=statement)
+    console = Console(width=80, file=io.StringIO(), markup=False)
+    show_diagnosis(console, diagnosis)
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    text = " ".join(" ".join(lines).split())
+    assert max(map(len, lines)) <= 80
+    assert text.startswith(f"MISSING PHYSICS {headline} what was found")
+    assert "unit Elastic end stop of the steering engage angle 0.4 0.3996 … 0.4004 rad" in text
+    assert "held-out data 2100 N m 84 N m 80 N m" in text
+    assert "improvement 96 % 94 % to 97 %" in text
+    assert "- Look here." in text
+
+
+@pytest.mark.parametrize(("make", "code"), [(consistent, 0), (missing, 3), (unlisted, 4), (insufficient, 5)])
+def test_the_verdict_is_the_exit_code_on_request(
+    vehicle: Vehicle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Callable[[Vehicle], Diagnosis], code: int
+) -> None:
+    monkeypatch.setattr("lugre_steering.diagnosis.command.run", lambda *_, **__: make(vehicle))
+    arguments = ["diagnose", "bag", "--vehicle", str(VEHICLE_FILE), "--out", str(tmp_path)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert CliRunner().invoke(app, [*arguments, "--exit-code"]).exit_code == code

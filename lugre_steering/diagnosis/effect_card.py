@@ -165,7 +165,7 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
         top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label=f"with {effect.id}")
         middle.plot(run.time, best.difference * change.scale, color=SERIES[0], label="difference")
         middle.plot(run.time, best.visible * change.scale, color=SERIES[1], linewidth=0.9, label="after recalibration")
-        for ax, title, unit in ((top, "torque", torque.label), (middle, "what the effect changes", change.label)):
+        for ax, title, unit in ((top, "torque", torque.unit), (middle, "what the effect changes", change.unit)):
             ax.set_title(title)
             ax.set_ylabel(unit)
             ax.set_xlabel("time (s)")
@@ -177,7 +177,7 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
             axes[2, 0].plot(x, y, color=SERIES[0], linewidth=1.1)
             axes[2, 0].set_title("difference along the coordinate that tells it")
             axes[2, 0].set_xlabel(axis.label)
-            axes[2, 0].set_ylabel(change.label)
+            axes[2, 0].set_ylabel(change.unit)
     return file
 
 

@@ -23,12 +23,12 @@ def show_diagnosis(console: Console, diagnosis: Diagnosis) -> None:
     """Verdict, findings, errors, remarks, next experiment."""
     result = diagnosis.json
     first = result["headline"] or result["statement"]
-    console.print(Text(result["verdict"].replace("_", " "), "bold"))
-    console.print(first, highlight=False)
+    console.print(Text(f"{result['verdict'].replace('_', ' ').upper()}\n", "bold"))
+    console.print(f"{first}\n", highlight=False)
     if result["effects"]:
-        console.print(_found(diagnosis))
+        console.print(_found(diagnosis), "")
     if result["baseline"]["heldout_rmse_Nm"] is not None:
-        console.print(_errors(diagnosis))
+        console.print(_errors(diagnosis), "")
     # The numbers of the first sentence stand in the table.
     remarks = re.split(r"(?<=\.) (?=[A-Z])", result["statement"].removeprefix(first).strip())
     for remark in remarks:
@@ -48,17 +48,16 @@ def _point(said: str) -> Table:
 
 def _found(diagnosis: Diagnosis) -> Table:
     vehicle = diagnosis.vehicle
-    table = Table("found", "parameter", box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table = Table("what was found", box=None, padding=(0, 2, 0, 0), header_style="bold")
     for column in ("value", "95 % interval"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     for effect in diagnosis.json["effects"]:
-        title = units.title(vehicle, CATALOGUE[effect["id"]])
+        table.add_row(units.title(vehicle, CATALOGUE[effect["id"]]))
         for name, parameter in effect["parameters"].items():
             value, between = words.estimate(parameter["value"], parameter["ci95"])
             unit = units.label(vehicle, parameter["unit"])
-            table.add_row(title, name.replace("_", " "), value, between, "" if unit == "1" else unit)
-            title = ""
+            table.add_row(f"  {name.replace('_', ' ')}", value, between, "" if unit == "1" else unit)
     return table
 
 

@@ -83,7 +83,6 @@ def _chart(vehicle: Vehicle, motion: Curves, check: Curves) -> Chart:
     check_time, checked = check.lines()
     sides = vehicle.sides
     angle = words.coordinate_axis(vehicle, "steering angle")
-    name, _, unit = angle.label.rstrip("]").partition(" [")
     torque, left = words.torque_axis(vehicle, lines[-1], *checked[:1]), words.torque_axis(vehicle, *checked[1:])
 
     def of_sides(rows: Array, scale: float) -> list[Series]:
@@ -91,13 +90,13 @@ def _chart(vehicle: Vehicle, motion: Curves, check: Curves) -> Chart:
 
     estimate = Series("estimate", "augmented", torque.scale * lines[-1], time)
     panels = [
-        Panel("torque that the actuators deliver", torque.label, [estimate], size=3.0),
-        Panel(name, unit, of_sides(lines[: len(sides)], angle.scale), size=1.2),
+        Panel("torque that the actuators deliver", torque.unit, [estimate], size=3.0),
+        Panel(angle.name, angle.unit, of_sides(lines[: len(sides)], angle.scale), size=1.2),
     ]
     if check_time.size:
         panels[0].series.insert(0, Series("measured", "measured", torque.scale * checked[0], check_time))
         residual = Series("measured minus estimate", "before", left.scale * checked[1], check_time)
-        panels.insert(1, Panel("residual", left.label, [residual], size=1.6))
+        panels.insert(1, Panel("residual", left.unit, [residual], size=1.6))
     if vehicle.rubber is not None:
         panels.append(Panel("tread rubber temperature", "degC", of_sides(lines[len(sides) : 2 * len(sides)], 1.0), size=1.2))
-    return Chart("time since the first stamp [s]", panels)
+    return Chart("time since the first stamp (s)", panels)

@@ -52,10 +52,9 @@ class Panel:
     like: int | None = None
 
     def plain(self) -> dict[str, Any]:
-        label = f"{self.title} [{self.unit}]" if self.unit not in ("", "1") else self.title
         extra = {"band": self.band, "like": self.like}
-        return {"label": label, "unit": self.unit, "size": self.size, "series": [s.plain() for s in self.series],
-                **{key: value for key, value in extra.items() if value is not None}}  # fmt: skip
+        return {"label": words.labelled(self.title, self.unit), "unit": self.unit, "size": self.size,
+                "series": [s.plain() for s in self.series], **{key: value for key, value in extra.items() if value is not None}}  # fmt: skip
 
 
 @dataclass(frozen=True)

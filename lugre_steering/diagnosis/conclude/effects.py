@@ -103,7 +103,7 @@ def _lines(done: Finished, whole: Fit, index: int, item: Found) -> str:
     equal = tied(problem, done.weight, done.roles, own, others, before, float(problem.valid.sum()), law=0.0)
     key = candidate.free[0]
     unit = done.unit(candidate.parameter(key).unit)
-    named = [f"{trial.candidate.line} ({trial.fit.effects[-1][1][key]:.3g} {unit})" for trial in equal]
+    named = [f"{trial.candidate.line} ({words.quantity(trial.fit.effects[-1][1][key], unit)})" for trial in equal]
     return f"; line {candidate.line} cannot be told from {', '.join(named)}" if named else ""
 
 

@@ -84,11 +84,10 @@ def _where(done: Finished, effect: NamedEffect) -> list[str]:
     if others or name in NOT_A_PLACE or not low < high:
         return [often]
     axis = words.coordinate_axis(done.problem.vehicle, name)
-    label, _, unit = axis.label.rstrip("]").partition(" [")
     from_, to = (words.number(axis.scale * end, 3) for end in (low, high))
     if name.startswith("|"):
-        return [f"mostly beyond {from_} {unit} of {label.strip('|')} to either side ({often})"]
-    return [f"at a {label} of {from_} to {to} {unit}".rstrip() + f" ({often})"]
+        return [f"mostly beyond {from_} {axis.unit} of {axis.name.strip('|')} to either side ({often})"]
+    return [f"at {words.with_article(axis.name)} of {from_} to {to} {axis.unit}".rstrip() + f" ({often})"]
 
 
 def _numbers(ends: Sequence[float | None]) -> list[float]:

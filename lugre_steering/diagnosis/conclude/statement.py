@@ -15,6 +15,7 @@ from lugre_steering.diagnosis.conclude.verify import Judged
 from lugre_steering.diagnosis.result import Experiment, NamedEffect, Verdict
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.problem import STATIC, resized
+from lugre_steering.report import words
 from lugre_steering.vehicle.size import VEHICLE, Size
 
 
@@ -86,7 +87,7 @@ def _remarks(
     if ties:
         remarks.append(f"With these data {'; '.join(ties)}.")
     size = done.problem.size
-    ends = [f"{effect.id} with {name} = {value:.3g} {unit}" for effect in effects for name, value, unit in at_end(effect, size)]
+    ends = [f"{effect.id} with {name} = {words.quantity(value, unit)}" for effect in effects for name, value, unit in at_end(effect, size)]
     if ends:
         remarks.append(f"At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another.")
     if bounds := calibrations_at_bounds(done):

@@ -80,17 +80,17 @@ def _before_after(diagnosis: Diagnosis, trace: BagTrace, file: Path) -> None:
             line(top, trace.augmented, torque.scale, **IMPROVED, label="with the effects found")
             after = trace.measured - trace.augmented
             line(middle, after, left.scale, **{**IMPROVED, "linestyle": "-", "linewidth": 0.9}, label="after")
-        for ax, title, unit in ((top, "torque", torque.label), (middle, "residual", left.label)):
+        for ax, title, unit in ((top, "torque", torque.unit), (middle, "residual", left.unit)):
             ax.set_title(title)
             ax.set_ylabel(unit)
         for name, part in parts.items():
-            line(axes[2, 0], part, added.scale, color=colour[name], label=name)
+            line(axes[2, 0], part, added.scale, color=colour[name], label=plots.titles(diagnosis)[name])
             for ax in axes[:, 0] if shown.is_local(trace, name) else ():
                 for start, end in trace.intervals[name]:
                     ax.axvspan(start, end, color=colour[name], alpha=0.13, linewidth=0)
         if parts:
             axes[2, 0].set_title("what each effect adds")
-            axes[2, 0].set_ylabel(added.label)
+            axes[2, 0].set_ylabel(added.unit)
         for ax in axes[:, 0]:
             ax.set_xlim(float(trace.time[0]), float(trace.time[-1]))
             ax.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
@@ -115,10 +115,10 @@ def _residual(diagnosis: Diagnosis, effect: dict[str, Any], file: Path) -> None:
         floor = 2.0 * diagnosis.json["noise_floor_Nm"] * scale
         after.axhspan(-floor, floor, color=shown.QUIET, alpha=0.25, linewidth=0)
         after.set_ylim(before.get_ylim())
-        for ax, title in ((before, f"before, with the law of {effect['id']}"), (after, "after")):
+        for ax, title in ((before, "before, with the fitted law"), (after, "after")):
             ax.set_title(title)
             ax.set_xlabel(cloud.axis.label)
-            ax.set_ylabel(cloud.torque.label)
+            ax.set_ylabel(cloud.torque.unit)
 
 
 def _evidence(diagnosis: Diagnosis, file: Path) -> None:
@@ -128,14 +128,14 @@ def _evidence(diagnosis: Diagnosis, file: Path) -> None:
         "Share of the residual's energy that each candidate's fingerprint could explain before any fit (bar), and by "
         "how much the fit that tried it lowered the held-out error (diamond; none: not tried)."
     )
-    with figure(1, 1, caption, file, row_inches=0.7 + 0.3 * len(rows), made=diagnosis.provenance) as axes:
+    with figure(1, 1, caption, file, row_inches=0.7 + 0.42 * len(rows), made=diagnosis.provenance) as axes:
         ax = axes[0, 0]
         for i, row in enumerate(rows):
             shade = colour.get(row.label.split("[")[0], "#c4c8ce") if row.verdict == "named" else "#c4c8ce"
             ax.barh(i, 100.0 * row.energy_share, color=shade, height=0.6)
             if row.heldout_gain is not None:
                 ax.plot(100.0 * max(row.heldout_gain, 0.0), i, "D", color="black", markersize=5)
-        ax.set_yticks(range(len(rows)), [f"{row.label} ({row.verdict})" for row in rows])
+        ax.set_yticks(range(len(rows)), [f"{row.title}{''.join(row.label.partition('[')[1:])}\n({row.verdict})" for row in rows])
         ax.set_ylim(len(rows) - 0.4, -0.6)
         ax.set_xlim(left=0.0)
         ax.set_xlabel("%")

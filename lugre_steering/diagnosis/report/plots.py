@@ -51,21 +51,21 @@ def torque_chart(diagnosis: Diagnosis, trace: BagTrace) -> Chart:
         return curve(name, look, trace.time, values, axis.scale, limit)
 
     panels = [
-        Panel("torque", torque.label, [
+        Panel("torque", torque.unit, [
             over_time("measured", "measured", trace.measured, torque),
             over_time("recalibrated baseline", "baseline", trace.baseline, torque),
         ], size=3.0),
-        Panel("residual", left.label, [over_time("recalibrated baseline", "before", before, left)], size=1.6),
+        Panel("residual", left.unit, [over_time("recalibrated baseline", "before", before, left)], size=1.6),
     ]  # fmt: skip
     if parts:
         panels[0].series.append(over_time("with what was found", "augmented", trace.augmented, torque))
         panels[1].series.append(over_time("with what was found", "after", after, left))
-        panels.append(Panel("what each finding adds", added.label, [
+        panels.append(Panel("what each finding adds", added.unit, [
             over_time(title[name], style[name], part, added) for name, part in parts.items()
         ], size=1.4))  # fmt: skip
     spans = [Spans("held out from search and fit", "held", stretches(trace.time, trace.held))]
     spans += [Spans(title[name], style[name], trace.intervals.get(name, ()), shown.is_local(trace, name)) for name in parts]
-    return Chart("time since the first stamp [s]", panels, spans)
+    return Chart("time since the first stamp (s)", panels, spans)
 
 
 def stretches(time: Array, mask: Array) -> list[tuple[float, float]]:
@@ -87,8 +87,8 @@ def residual_chart(diagnosis: Diagnosis, effect: Mapping[str, Any]) -> Chart:
     after = [Series("residual with everything found", "after", cloud.after * scale, along, dots=True)]
     floor = 2.0 * diagnosis.json["noise_floor_Nm"] * scale
     return Chart(cloud.axis.label, [
-        Panel("before", cloud.torque.label, before, size=2.4),
-        Panel("after; grey: two noise floors", cloud.torque.label, after, size=2.4, band=floor, like=0),
+        Panel("before", cloud.torque.unit, before, size=2.4),
+        Panel("after; grey: two noise floors", cloud.torque.unit, after, size=2.4, band=floor, like=0),
     ])  # fmt: skip
 
 
