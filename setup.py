@@ -32,6 +32,7 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
         (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if Path(path).is_file())),
         (f"share/{PACKAGE}/config/own_physics", sorted(path for path in glob("config/own_physics/*") if Path(path).is_file())),
+        (f"lib/{PACKAGE}", ["scripts/estimator"]),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     zip_safe=False,
@@ -68,7 +69,6 @@ setup(
     entry_points={
         "console_scripts": [
             "lugre-steering = lugre_steering.cli:main",
-            "estimator = lugre_steering.node:main",
         ],
     },
 )

@@ -135,7 +135,7 @@ def _evidence(diagnosis: Diagnosis, file: Path) -> None:
             ax.barh(i, 100.0 * row.energy_share, color=shade, height=0.6)
             if row.heldout_gain is not None:
                 ax.plot(100.0 * max(row.heldout_gain, 0.0), i, "D", color="black", markersize=5)
-        ax.set_yticks(range(len(rows)), [f"{row.title}{''.join(row.label.partition('[')[1:])}\n({row.verdict})" for row in rows])
+        ax.set_yticks(range(len(rows)), [f"{row.title} {''.join(row.label.partition('[')[1:])}\n({row.verdict})" for row in rows])
         ax.set_ylim(len(rows) - 0.4, -0.6)
         ax.set_xlim(left=0.0)
         ax.set_xlabel("%")
