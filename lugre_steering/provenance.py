@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -15,6 +16,8 @@ from lugre_steering.serialise import plain
 from lugre_steering.version import __version__
 
 _CHUNK = 1 << 20
+EPOCH = "SOURCE_DATE_EPOCH"
+"""Environment variable, see reproducible-builds.org."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +55,15 @@ def provenance(
     command: str, options: Mapping[str, Any], vehicle: Path | None = None, bags: Sequence[Path] = ()
 ) -> Provenance:
     """Of a result that ``command`` makes now from these files."""
-    date = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    date = _now().isoformat(timespec="seconds")
     sheet = source(vehicle) if vehicle is not None else None
     return Provenance(f"lugre_steering {__version__}", command, date, plain(options), sheet, tuple(map(source, bags)))
+
+
+def _now() -> datetime:
+    """Now, or the time that SOURCE_DATE_EPOCH gives [s since 1970] to those who want the same bytes again."""
+    given = os.environ.get(EPOCH, "")
+    return datetime.fromtimestamp(int(given), timezone.utc) if given.isdecimal() else datetime.now(timezone.utc)
 
 
 def source(path: Path) -> Source:
