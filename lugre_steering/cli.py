@@ -209,7 +209,9 @@ def replay(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
+    """Run the estimator over recorded bags.
+
+    Writes a bag with the output topics beside the inputs, a page, a picture and a summary."""
     from lugre_steering.estimator import Options
     from lugre_steering.live.table import read_options
     from lugre_steering.replay.run import describe
@@ -252,8 +254,9 @@ def simulate(
     seed: Annotated[int | None, typer.Option(help="seed of noise and jitter [0]")] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a manoeuvre into a bag labelled synthetic, or reproduce the published experiments (exit code 1 if one
-    fails)."""
+    """Simulate a manoeuvre, or the published experiments.
+
+    A manoeuvre becomes a bag labelled synthetic; experiments leave with exit code 1 if one fails."""
     from lugre_steering.simulate import command as simulation
 
     if show_list:
@@ -292,7 +295,9 @@ def vehicle_(
     out: Annotated[Path | None, typer.Option(help="folder for a picture of the footprint of one track")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a vehicle file, and say what it amounts to: loads, friction, heat, inputs and effects."""
+    """Check a vehicle file and say what it amounts to.
+
+    Loads, friction, heat, inputs and effects."""
     from lugre_steering.sheet.derived import derive
     from lugre_steering.sheet.show import draw_footprint, show_vehicle
     from lugre_steering.vehicle import load
@@ -316,7 +321,9 @@ def import_(
     storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
     as_json: Json = False,
 ) -> None:
-    """Turn a table into a bag with the standard topics; counts rates, gaps and outliers, repairs nothing."""
+    """Turn a table of any logger into a bag.
+
+    The bag has the standard topics; rates, gaps and outliers are counted, nothing is repaired."""
     from lugre_steering.importing.propose import propose as write_map
     from lugre_steering.importing.show import show_import, show_proposal
     from lugre_steering.importing.write import import_table
@@ -344,8 +351,9 @@ def calibrate(
     no_prior: Annotated[bool, typer.Option("--no-prior", help="let the data alone decide")] = False,
     as_json: Json = False,
 ) -> None:
-    """Fit the baseline parameters that a vehicle sheet may have wrong, all bags together: a vehicle file, intervals,
-    and what the data cannot tell."""
+    """Fit the parameters of a vehicle file to bags.
+
+    All bags together: a new vehicle file, intervals, and what the data cannot tell."""
     from lugre_steering.calibration import calibrate as run
     from lugre_steering.calibration.table import parse_priors, show_calibration
 
@@ -384,7 +392,9 @@ def diagnose(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
+    """Say which physics the model leaves out.
+
+    Locates, names and models it, and shows the gain on held-out data."""
     from lugre_steering.diagnosis.command import STEPS, run
     from lugre_steering.diagnosis.show import EXIT_CODES, show_diagnosis
 
@@ -411,7 +421,9 @@ def effects(
     to: Annotated[Path, typer.Option(help="file of effects of your own that it is kept in, for --effects")] = Path("own_physics.yaml"),
     as_json: Json = False,
 ) -> None:
-    """List the physics that diagnosis knows, explain one effect (law, source, parameters, how it shows), or keep a law that was found."""
+    """List or explain the physics that diagnosis knows.
+
+    One effect: law, source, parameters, how it shows. With --add a law that was found is kept under a name."""
     from lugre_steering.diagnosis import effect_card as card
     from lugre_steering.effects import registry
 
@@ -451,7 +463,9 @@ def prove(
     peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hide physics in recordings of two other simulators, diagnose them blind, and score the answers."""
+    """Score diagnosis on physics hidden from it.
+
+    Hides effects in recordings of two other simulators, diagnoses them blind and scores the answers."""
     from lugre_steering.proof.command import run
     from lugre_steering.proof.table import show_board
 
@@ -474,7 +488,9 @@ def config(
     unset: Annotated[bool, typer.Option("--unset", help="forget this default")] = False,
     as_json: Json = False,
 ) -> None:
-    """Show, save or forget defaults of options, such as the vehicle file."""
+    """Show, save or forget defaults of options.
+
+    Such as the vehicle file: lugre-steering config vehicle truck.yaml; --unset forgets it."""
     saved = defaults.load()
     if unset:
         saved.pop(option, None)

@@ -1,11 +1,14 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Terminals that know fewer letters than we use: what they cannot show is written as near as they can, never as a traceback."""
+"""Words on a terminal: letters that it does not know are written as near as it can, never as a traceback; remarks as points."""
 
 from __future__ import annotations
 
 import codecs
 import sys
+
+from rich.table import Table
+from rich.text import Text
 
 NEAREST = {
     "…": "...", "→": "->", "–": "-", "—": "-", "−": "-", "·": ".", "±": "+-", "²": "2", "³": "3", "°": " deg", "µ": "u", "\u2009": " ",
@@ -28,3 +31,10 @@ def forgive_letters() -> None:
     for stream in (sys.stdout, sys.stderr):
         if (reconfigure := getattr(stream, "reconfigure", None)) is not None:
             reconfigure(errors="lugre_steering.nearest")
+
+
+def point(said: str) -> Table:
+    """A remark of one or more lines behind a dash."""
+    grid = Table.grid(padding=(0, 1))
+    grid.add_row("-", Text(said, overflow="fold"))
+    return grid

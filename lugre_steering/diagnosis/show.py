@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import re
-
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -14,9 +12,14 @@ from lugre_steering import units
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
+from lugre_steering.terminal import point
 
 EXIT_CODES = {"consistent": 0, "missing_physics": 3, "unlisted_physics": 4, "insufficient_data": 5}
 """Of ``diagnose --exit-code``; 1 and 2 are those of failures and bad input."""
+
+
+IN_TABLE = ("With it the held-out", "With them the held-out", "With the law the held-out", "Noise alone")
+"""How sentences begin whose numbers stand in the table."""
 
 
 def show_diagnosis(console: Console, diagnosis: Diagnosis) -> None:
@@ -29,21 +32,13 @@ def show_diagnosis(console: Console, diagnosis: Diagnosis) -> None:
         console.print(_found(diagnosis), "")
     if result["baseline"]["heldout_rmse_Nm"] is not None:
         console.print(_errors(diagnosis), "")
-    # The numbers of the first sentence stand in the table.
-    remarks = re.split(r"(?<=\.) (?=[A-Z])", result["statement"].removeprefix(first).strip())
-    for remark in remarks:
-        if remark and not remark.startswith(("With it the held-out", "With them the held-out", "With the law the held-out", "Noise alone")):
-            console.print(_point(remark))
+    for remark in words.sentences(result["statement"].removeprefix(first).strip()):
+        if not remark.startswith(IN_TABLE):
+            console.print(point(remark))
     for finding in result["data_quality"]:
-        console.print(_point(f"{finding['bag']}: {finding['finding'].replace('_', ' ')}: {finding['statement']}"))
+        console.print(point(f"{finding['bag']}: {finding['finding'].replace('_', ' ')}: {finding['statement']}"))
     if result["next_experiment"]:
-        console.print(_point(f"Next experiment: {result['next_experiment']['manoeuvre']}"))
-
-
-def _point(said: str) -> Table:
-    grid = Table.grid(padding=(0, 1))
-    grid.add_row("-", Text(said, overflow="fold"))
-    return grid
+        console.print(point(f"Next experiment: {result['next_experiment']['manoeuvre']}"))
 
 
 def _found(diagnosis: Diagnosis) -> Table:

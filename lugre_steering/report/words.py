@@ -136,6 +136,11 @@ def thin(values: Array, limit: int) -> tuple[Array, int]:
     return np.stack([rows[at, first], rows[at, last]], axis=1).ravel(), width // 2
 
 
+def sentences(text: str) -> list[str]:
+    """A paragraph sentence by sentence."""
+    return [sentence for sentence in re.split(r"(?<=[.)]) (?=[A-Z]|[a-z]+[._][a-z_]+\b)", text) if sentence]
+
+
 def broken(x: Array, y: Array) -> tuple[Array, Array]:
     """A line with gaps where x jumps, so that no stroke joins what time does not join."""
     jumps = np.flatnonzero(np.abs(np.diff(x)) > 0.05 * float(np.ptp(x))) + 1

@@ -53,12 +53,13 @@ def statement(
     ``advice``: the next experiment."""
     floor = f"Noise alone makes {done.torque(done.noise.floor)}."
     if verdict == "consistent":
-        return headline.consistent(done, judged.before), f"{floor} What could have gone unseen: detection_limits."
+        unseen = "From what size on an effect would have shown: detection_limits of diagnosis.json."
+        return headline.consistent(done, judged.before), f"{floor} {unseen}"
     if verdict == "unlisted_physics":
         if law:
             rest = f"{left[:1].upper()}{left[1:]}."
             return headline.lawful(law), f"{_gain(done, judged, 'the law')} {floor} {rest}"
-        return headline.unlisted(done, judged.before, left), f"{floor} Where it lives: unexplained."
+        return headline.unlisted(done, judged.before, left), f"{floor} Where it lives: unexplained in diagnosis.json."
     told = headline.missing(done, effects, advice, not ended)
     them = "it" if len(effects) == 1 else "them"
     return told, " ".join([_gain(done, judged, them), floor, *_remarks(done, effects, judged, causal, left, ended)])
