@@ -24,7 +24,7 @@ setup(
     packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
     package_dir={f"{PACKAGE}.config": "config"},
     package_data={
-        PACKAGE: ["py.typed", "diagnosis/report/*.html", "report/static/*"],
+        PACKAGE: ["py.typed", "report/static/*"],
         f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*", "layouts/*"],
     },
     data_files=[
@@ -33,6 +33,7 @@ setup(
         (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if Path(path).is_file())),
         (f"share/{PACKAGE}/config/own_physics", sorted(path for path in glob("config/own_physics/*") if Path(path).is_file())),
         (f"share/{PACKAGE}/config/layouts", sorted(glob("config/layouts/*"))),
+        (f"lib/{PACKAGE}", ["scripts/estimator"]),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     zip_safe=False,
@@ -52,7 +53,7 @@ setup(
         "import": ["pyarrow>=14.0", "h5py>=3.8"],
         "frame": ["pandas>=2.0"],
         "fleet": ["pyarrow>=14.0", "distributed>=2023.9"],
-        "report": ["matplotlib>=3.6", "plotly>=5.18"],
+        "report": ["matplotlib>=3.6"],
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
             "pytest>=7.4",
@@ -73,7 +74,6 @@ setup(
     entry_points={
         "console_scripts": [
             "lugre-steering = lugre_steering.cli:main",
-            "estimator = lugre_steering.node:main",
         ],
     },
 )

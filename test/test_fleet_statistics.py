@@ -194,7 +194,7 @@ def of_recordings(effects: list[str], count: int) -> list[dict]:
     rows = []
     for k in range(count):
         recording = simulation("double-cycle", vehicle, {"seed": 100 + k, "angle_rate_Hz": 50, "pressure_rate_Hz": 50}).recording
-        problem, _ = synchronised([inspect(recording, SHEET).recording], SHEET)
+        problem = synchronised([inspect(recording, SHEET).recording], SHEET).problem
         rows.append({**record("A", k + 1, {}, verdict=None), "estimates": plain(signed(problem, k))})
     return rows
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from lugre_steering.calibration.identify import Assumed, Combination
 from lugre_steering.files import earlier_result, write_record
 from lugre_steering.gate import Facts, Gate, quality_facts
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import BagFinding
 from lugre_steering.result import Result, folder_for, frame, html
 from lugre_steering.serialise import ADDED, IN_MEMORY, in_order
@@ -130,6 +131,8 @@ class Calibration(Result):
     picture: str | None = None
     picture_note: str | None = None
     per_bag: tuple[BagErrors, ...] = field(default=(), metadata=ADDED)
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    """Options, and hashes of the files."""
 
     def with_provenance(self) -> Vehicle:
         """The calibrated vehicle with a note of how its values came about."""
@@ -150,7 +153,11 @@ class Calibration(Result):
         folder = folder_for(out)
         earlier_result(folder, RECORD, SCHEMA, (VEHICLE,))
         write_record(self.json, folder / RECORD)
-        save(self.with_provenance(), folder / VEHICLE)
+        self.write_vehicle(folder)
+
+    def write_vehicle(self, folder: Path) -> None:
+        """The vehicle file into a folder where it may stand."""
+        save(self.with_provenance(), folder / VEHICLE, self.provenance.lines() if self.provenance is not None else ())
 
     def to_frame(self) -> DataFrame:
         """One row per fitted key, as a pandas table."""

@@ -12,6 +12,8 @@ from rich.table import Table
 
 from lugre_steering.bag.find import SKIPPED
 from lugre_steering.errors import DataError
+from lugre_steering.report import words
+from lugre_steering.terminal import point
 
 
 def parse_priors(texts: Sequence[str]) -> dict[str, float]:
@@ -41,8 +43,11 @@ def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
             console.print(f"skipped: {found['bag']}: {found['statement']}", highlight=False, soft_wrap=True)
     for row in result["parameters"]:
         if remark := _remark(row):
-            console.print(f"{row['key']}: {remark}", highlight=False)
-    console.print(result["statement"], soft_wrap=True)
+            console.print(point(f"{row['key']}: {remark}"))
+    said = {row["key"] for row in result["parameters"] if _remark(row)}
+    for sentence in words.sentences(result["statement"]):
+        if sentence.split(" ")[0] not in said:
+            console.print(point(sentence))
     if result["picture_note"]:
         console.print(result["picture_note"])
 
@@ -59,7 +64,7 @@ def _per_bag(result: Mapping[str, Any]) -> Table:
 
 
 def _remark(row: Mapping[str, Any]) -> str:
-    remarks = [f"at the {row['at_bound']} bound"] if row["at_bound"] else []
+    remarks = [f"at the {row['at_bound']} end of its range"] if row["at_bound"] else []
     if row["prior_dominated"]:
-        remarks.append("hardly determined")
+        remarks.append(f"hardly determined by these recordings; drive '{row['advice']}'")
     return ", ".join(remarks)

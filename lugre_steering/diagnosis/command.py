@@ -13,10 +13,11 @@ from typing import Any
 from lugre_steering.bag.batch import read_of_machine
 from lugre_steering.bag.find import Skipped
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
-from lugre_steering.diagnosis.result import SCHEMA, picture_names
+from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, picture_names
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError
-from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder, write_record
-from lugre_steering.vehicle import load, save
+from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder
+from lugre_steering.vehicle import load
 
 STEPS = (
     "reading", "checking the data", "estimating the motion", "recalibrating", "fingerprints", "rivals", "verifying",
@@ -38,8 +39,8 @@ def run(
     report: bool = True,
     progress: Callable[[str], None] = lambda _: None,
     skipped: Sequence[Skipped] = (),
-) -> dict[str, Any]:
-    """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the JSON.
+) -> Diagnosis:
+    """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the result.
 
     ``skipped``: what has been left out before; of several bags, those of other machines are left out too. Both are told among the
     findings about the data. The report of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
@@ -54,14 +55,18 @@ def run(
         pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
         old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
         recordings, others = read_of_machine(bags, vehicle.channels, progress)
-        result = diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
-        left = tuple(one.finding() for one in (*skipped, *others))
-        result = replace(result, data_quality=(*left, *result.data_quality))
+        found = diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
+        left = {one.bag for one in others}
+        used = [bag for bag in bags if str(bag) not in left]
+        result = replace(
+            found,
+            data_quality=(*(one.finding() for one in (*skipped, *others)), *found.data_quality),
+            provenance=made("diagnose", {"seed": seed, "material": material}, vehicle_file, used),
+        )
         try:
             if old is not None:
                 _take_away_report(out, old)
-            write_record(result.json, out / "diagnosis.json")
-            save(result.vehicle, out / "augmented.yaml")
+            result.write(out)
         except OSError as error:
             raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
         if report:
@@ -71,7 +76,7 @@ def run(
             note = write_report(result, out).note
             if note:
                 print(f"lugre-steering: {note}", file=sys.stderr)
-    return result.json
+    return result
 
 
 def _take_away_report(out: Path, old: Mapping[str, Any]) -> None:

@@ -150,7 +150,7 @@ def _estimates(quality: Quality, vehicle: Vehicle, seed: int) -> Sequence[Signed
     if quality.blocking:
         return ()
     try:
-        problem, _ = synchronised(in_pieces([quality.recording])[0], vehicle)
+        problem = synchronised(in_pieces([quality.recording])[0], vehicle).problem
         check_motion(problem)
     except DataError:
         return ()

@@ -17,6 +17,7 @@ from lugre_steering.estimator import Options
 from lugre_steering.files import earlier_result, write_record
 from lugre_steering.gate import Facts, Gate
 from lugre_steering.online import Agreement
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Finding
 from lugre_steering.result import Result, folder_for, frame, html, of_bag
 from lugre_steering.serialise import ADDED, IN_MEMORY
@@ -92,6 +93,8 @@ class ReplayedBag:
     findings: tuple[Finding, ...]
     picture: str | None = None
     picture_note: str | None = None
+    page: str | None = field(default=None, metadata=ADDED)
+    """File of the page beside the record."""
     series: Series | None = field(default=None, repr=False, metadata=IN_MEMORY)
 
     def kept(self) -> Series:
@@ -125,6 +128,7 @@ class Replay(Result):
     options: Options
     bags: tuple[ReplayedBag, ...]
     overall: Agreement | None
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
     skipped: tuple[Skipped, ...] = field(default=(), metadata=ADDED)
 
     def save(self, out: str | Path) -> None:

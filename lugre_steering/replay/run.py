@@ -12,7 +12,7 @@ import os
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -30,13 +30,16 @@ from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name, shortened
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError, ImplausibleWarning
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
 from lugre_steering.live.plan import planned_angles
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
 from lugre_steering.pool import WorkerDiedError, in_processes
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import AIR_LIMIT_DEGC, NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
+from lugre_steering.replay.page import write_page
 from lugre_steering.replay.result import RECORD, SCHEMA, InputCounts, Replay, ReplayedBag, Series
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
@@ -77,10 +80,13 @@ def replay(
     options = options or Options()
     if initial_temperature not in (None, AIR):
         _degrees(initial_temperature)
-    tasks = [_Task(path, name, vehicle_file, out, options, initial_temperature) for path, name in zip(bags, names, strict=True)]
+    origin = made("replay", {**asdict(options), "initial_temperature": initial_temperature}, vehicle_file, bags)
+    tasks = [
+        _Task(path, name, vehicle_file, out, options, initial_temperature, origin) for path, name in zip(bags, names, strict=True)
+    ]
     done: dict[int, ReplayedBag | Skipped] = {}
     overall = Comparison()
-    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None, tuple(skipped))
+    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None, origin, tuple(skipped))
     try:
         with output_folder(out):
             for number, (result, fit) in _results(tasks, vehicle, jobs, progress):
@@ -109,6 +115,7 @@ class _Task:
     out: Path
     options: Options
     initial_temperature: str | None
+    origin: Provenance
 
 
 _Answer = tuple["ReplayedBag | Skipped", Comparison]
@@ -141,7 +148,7 @@ def _passed(task: _Task, vehicle: Vehicle, progress: Progress | None) -> _Answer
     """One bag written, or why not."""
     run = Passage(task.path, task.name, vehicle, task.options, task.initial_temperature)
     try:
-        return run.write(task.out, progress), run.fit
+        return run.write(task.out, task.origin, progress), run.fit
     except BagError as error:
         return Skipped(str(task.path), str(error).removeprefix(f"{task.path}: ")), Comparison()
 
@@ -171,9 +178,9 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
             if source == result or source in result.parents or result in source.parents:
                 raise BagError(f"{path}: the result {out / name} would touch this bag; choose another --out")
         _refuse_foreign(out / name)
-        picture = out / f"{name}.png"
-        if picture.exists() and not is_ours(picture):
-            raise _not_ours(picture)
+        for beside in (out / f"{name}.png", out / f"{name}.html"):
+            if beside.exists() and not is_ours(beside):
+                raise _not_ours(beside)
     if (out / RECORD).exists() and read_record(out / RECORD, SCHEMA) is None:
         raise _not_ours(out / RECORD)
     return names
@@ -224,8 +231,8 @@ class Passage:
         self._log_ns: tuple[int, int] | None = None
         self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
-    def write(self, out: Path, progress: Progress | None) -> ReplayedBag:
-        """Write the bag and the picture; returns the summary of this bag."""
+    def write(self, out: Path, origin: Provenance, progress: Progress | None) -> ReplayedBag:
+        """Write the bag, the page and the picture; returns the summary of this bag."""
         with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
             topics = self._topics(bag, channels)
@@ -236,8 +243,10 @@ class Passage:
             _refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
             findings = [*bag.findings, *self._found, *self._last_findings()]
         summary = self._summary(samples, findings)
-        picture, note = self._picture(out / f"{self.name}.png", summary.fit)
-        return replace(summary, picture=picture, picture_note=note)
+        page = out / f"{self.name}.html"
+        write_page(summary, self.vehicle, self.motion, self.check, origin, page)
+        picture, note = self._picture(out / f"{self.name}.png", summary.fit, origin)
+        return replace(summary, picture=picture, picture_note=note, page=page.name)
 
     def remember(self) -> ReplayedBag:
         """Write nothing, keep the torques in memory; returns the summary of this bag with them."""
@@ -505,13 +514,13 @@ class Passage:
             words.append(", ".join([f"{label}: {counts.used} samples used", *reasons]))
         return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
-    def _picture(self, file: Path, fit: Agreement | None) -> tuple[str | None, str | None]:
+    def _picture(self, file: Path, fit: Agreement | None, origin: Provenance) -> tuple[str | None, str | None]:
         if note := no_pictures():
             file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
             return None, note
         from lugre_steering.replay.figure import draw_replay
 
-        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
+        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, origin, file)
         return file.name, None
 
 

@@ -52,10 +52,9 @@ class Panel:
     like: int | None = None
 
     def plain(self) -> dict[str, Any]:
-        label = f"{self.title} [{self.unit}]" if self.unit not in ("", "1") else self.title
-        extra = {"band": self.band, "like": self.like}
-        return {"label": label, "unit": self.unit, "size": self.size, "series": [s.plain() for s in self.series],
-                **{key: value for key, value in extra.items() if value is not None}}  # fmt: skip
+        extra = {key: value for key, value in (("band", self.band), ("like", self.like)) if value is not None}
+        series = [series.plain() for series in self.series]
+        return {"label": words.labelled(self.title, self.unit), "size": self.size, "series": series, **extra}
 
 
 @dataclass(frozen=True)

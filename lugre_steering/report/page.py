@@ -87,5 +87,5 @@ def in_words_of(vehicle: Vehicle, own: Sequence[str]) -> Callable[[str], str]:
 def _named(tree: Any, said: Callable[[str], str]) -> Any:
     """Charts with their labels and names in other words."""
     if isinstance(tree, Mapping):
-        return {key: said(item) if key in ("name", "label", "unit") else _named(item, said) for key, item in tree.items()}
+        return {key: said(item) if key in ("name", "label") else _named(item, said) for key, item in tree.items()}
     return [_named(item, said) for item in tree] if isinstance(tree, list) and tree and isinstance(tree[0], dict) else tree
