@@ -21,10 +21,14 @@ RECORD, PAGE = "fleet.json", "report.html"
 
 @dataclass(frozen=True)
 class VehicleSummary:
-    """One vehicle: sound recordings and those in quarantine, hours [h], first and last date, median RMSE of the replay [N m], verdicts."""
+    """One vehicle: sound recordings and those in quarantine, hours [h], first and last date, median RMSE of the replay [N m], verdicts.
+
+    ``sha256``: of what its file and tables say, not of how they are written.
+    """
 
     name: str
     file: str
+    sha256: str
     recordings: int
     quarantined: int
     hours: float

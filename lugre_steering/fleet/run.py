@@ -150,6 +150,7 @@ def _vehicle(member: Member, records: Sequence[Record]) -> VehicleSummary:
     return VehicleSummary(
         name=member.name,
         file=str(member.file),
+        sha256=member.sha256,
         recordings=len(own),
         quarantined=sum(record["member"] == member.name and record["quarantine"] is not None for record in records),
         hours=sum(record["duration_s"] for record in own) / 3600.0,
