@@ -186,7 +186,7 @@ class Diagnosis(Result):
     detection_limits: Mapping[str, Limit]
     data_quality: tuple[BagFinding, ...]
     next_experiment: Experiment | None
-    laws: tuple[Mapping[str, Any], ...] = ()
+    laws: tuple[Mapping[str, Any], ...] = field(default=(), metadata=ADDED)
     """Found where no entry of the catalogue explains what is left; ``augmented.yaml`` runs them."""
     headline: str = field(default="", metadata=ADDED)
     """How the statement begins: what, where, how much of the torque, what to do."""
