@@ -18,6 +18,7 @@ heldout_rmse_Nm     of ``sheet`` and ``calibrated`` on stretches that this extra
 undetermined        combinations that the data leave open: ``parts``, ``data_over_sheet``, ``statement``
 assumed             sheet values taken as exact: relative change of each parameter per relative error of it
 data_quality        findings of the reader and of the checks of the sensors, per bag
+provenance          version, date, options, and the SHA-256 of the vehicle file and of every file of the bags
 statement           one paragraph
 ==================  ===============================================================================================
 """
