@@ -55,6 +55,7 @@ setup(
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
             "pytest>=7.4",
+            "pytest-xdist>=3.3",
             "hypothesis>=6.80",
             "jsonschema>=4.17",
             "mcap>=1.1",

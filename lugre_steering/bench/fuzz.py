@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 import multiprocessing
 import resource
 import tempfile
@@ -21,6 +20,8 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, cast
+
+from lugre_steering.serialise import as_json
 
 TARGETS = {name: f"lugre_steering.bench.fuzz_{name}" for name in ("bag", "vehicle", "parameters", "effects", "import")}
 TIME_LIMIT_S, MEMORY_LIMIT_MB = 10.0, 1024.0
@@ -151,7 +152,7 @@ def run(argv: Sequence[str]) -> None:
     numbers = range(options.first, options.first + options.cases)
     results = {name: scoreboard(list(fuzz(name, numbers, options.seconds))) for name in options.targets or TARGETS}
     if options.json:
-        print(json.dumps(results, indent=2))
+        print(as_json(results))
         return
     for name, result in results.items():
         verdicts = ", ".join(f"{result[verdict]} {verdict}" for verdict in (*GOOD, *FAULTS))

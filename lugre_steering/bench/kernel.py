@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Callable, Mapping
 from time import perf_counter
@@ -19,6 +18,7 @@ from lugre_steering.chain.step import Records, torque_side
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import as_json
 from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.vehicle.model import build_model
 from lugre_steering.vehicle.tables import limit_device
@@ -259,7 +259,7 @@ def run(arguments: list[str]) -> None:
     options = parser.parse_args(arguments)
     rows = measure()
     if options.json:
-        print(json.dumps({"kernel": [{k: None if v != v else v for k, v in row.items()} for row in rows]}, indent=2))
+        print(as_json({"kernel": rows}))
         return
     print("one step of one track; error: the largest, as a share of the torque range")
     print(f"{'way':<46} {'ns/step':>11} {'/ kernel':>9} {'error':>8}")

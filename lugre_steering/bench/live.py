@@ -13,12 +13,10 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import math
 import multiprocessing
 import os
 import signal
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -30,6 +28,7 @@ import numpy as np
 
 from lugre_steering.recording import Array, Kind
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import as_json
 from lugre_steering.vehicle import Cylinder, Hydraulics, Vehicle, load, save
 
 LEGEND = """\
@@ -286,5 +285,4 @@ def run(argv: list[str]) -> None:
                     )
                 print(f"{'':>16} {'p99 ratio':>10} {'':>7} {result['p99_node_over_echo']:7.2f}", flush=True)
     if options.json:
-        json.dump({"live": results}, sys.stdout, indent=2)
-        print()
+        print(as_json({"live": results}))

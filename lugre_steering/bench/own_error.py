@@ -10,7 +10,6 @@ lines, then the motion as the sensors show it. The torque itself is free of nois
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,6 +30,7 @@ from lugre_steering.proof.sensors import PERIOD_S
 from lugre_steering.proof.simulator import BagData, Case, CaseData, load_sheet, simulate_case, write_case
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import as_json
 from lugre_steering.vehicle import Vehicle, load
 
 ROWS = ("one patch", "patches", "cylinders and lines", "measured motion")
@@ -99,7 +99,7 @@ def run(argv: Sequence[str]) -> None:
             "rms_Nm": float(np.median([np.sqrt(case[row]) for case in found])), "of_noise": float(np.median(shares)), "worst": max(shares),
         }  # fmt: skip
     if options.json:
-        print(json.dumps({"vehicles": options.vehicles, "allowed": OWN_ERROR, "rows": table}, indent=2))
+        print(as_json({"vehicles": options.vehicles, "allowed": OWN_ERROR, "rows": table}))
         return
     print(f"left over by recalibration with nothing hidden, {options.vehicles} vehicles; the engine allows itself {OWN_ERROR} of the noise")
     print(f"{'torque of':22s}{'median rms N m':>16s}{'over noise (mean square): median, worst':>42s}")

@@ -9,7 +9,6 @@ only reads and deserialises. Both have run once before they are timed.
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import tempfile
 import time
@@ -25,6 +24,7 @@ from lugre_steering.bag import BagWriter, Part, cdr
 from lugre_steering.recording import Kind
 from lugre_steering.replay.run import replay
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import as_json
 from lugre_steering.vehicle import load
 
 VEHICLE = config_folder() / "test_vehicle.yaml"
@@ -104,7 +104,7 @@ def run(argv: Sequence[str]) -> None:
             write_cycle(bag, options.seconds, storage)
             results[storage] = measure(bag, VEHICLE, options.rounds)
     if options.json:
-        print(json.dumps(results, indent=2))
+        print(as_json(results))
         return
     for storage, result in results.items():
         print(

@@ -182,14 +182,15 @@ def calibrate_recordings(
             raise DataError(f"{quality.recording.name}: the data must be put right first: {finding.statement}")
     progress("preparing")
     pieces, cut = in_pieces([quality.recording for quality in qualities])
-    problem, apart = synchronised(pieces, vehicle, chosen(vehicle) if calibrations is None else calibrations)
+    clocks = synchronised(pieces, vehicle, chosen(vehicle) if calibrations is None else calibrations)
+    problem = clocks.problem
     check_motion(problem)
     progress("comparing with the vehicle file")
     wrong = wrong_sheet(problem)
     progress("fitting")
     fitted = estimate(problem, priors=priors)
     found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
-    further = [*cut.items(), *apart.items(), *weather_findings(problem, fitted.fit).items()]
+    further = [*cut.items(), *clocks.findings.items(), *weather_findings(problem, fitted.fit).items()]
     found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])
     first = f"The vehicle file seems wrong: {wrong.statement}. " if wrong else ""
     names = tuple(recording.name for recording in recordings)

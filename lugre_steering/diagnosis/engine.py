@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +19,13 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.errors import DataError
-from lugre_steering.fitting.clocks import synchronised
+from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
+from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import WrongSheet, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
-from lugre_steering.recording import BagFinding, Recording
+from lugre_steering.recording import BagFinding, Finding, Recording
 from lugre_steering.vehicle import Vehicle
 
 MIN_SLIDING, MIN_SAMPLES = 2.0, 500
@@ -71,36 +72,53 @@ def diagnose_recordings(
     progress("estimating the motion")
     try:
         pieces, cut = in_pieces([quality.recording for quality in qualities])
-        findings += [finding.in_bag(bag) for bag, finding in cut.items()]
-        problem, apart = synchronised(pieces, vehicle)
+        findings += _by_bag(cut)
+        clocks = synchronised(pieces, vehicle)
     except DataError as error:
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
-    findings += [finding.in_bag(bag) for bag, finding in apart.items()]
-    roles = split(problem)
+    problem, roles = clocks.problem, split(clocks.problem)
     progress("comparing with the vehicle file")
     if roles.fit.sum() >= MIN_SAMPLES and (wrong := wrong_sheet(problem)) is not None:
-        return _wrong_sheet(qualities, vehicle, findings, wrong)
+        return _wrong_sheet(qualities, vehicle, [*findings, *_by_bag(clocks.findings)], wrong)
     if lacking := _lacking(problem, int(roles.fit.sum())):
         return _undetermined(qualities, vehicle, findings, problem, lacking)
     progress("recalibrating the baseline")
     noise, roles, found = investigate(problem, seed, progress)
+    if (again := _other_clocks(pieces, clocks, found.final)) is not None:
+        clocks = again
+        problem = clocks.problem
+        noise, roles, found = investigate(problem, seed, progress)
+    findings += _by_bag(clocks.findings)
     left = problem.measured - found.final.prediction
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
-        findings += [finding.in_bag(bag) for bag, finding in disturbed.items()]
+        findings += _by_bag(disturbed)
         problem = Problem(vehicle, runs)
         noise, roles, found = investigate(problem, seed, progress)
     if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
-    findings += [finding.in_bag(bag) for bag, finding in weather_findings(problem, found.final).items()]
+    findings += _by_bag(weather_findings(problem, found.final))
     progress("verifying on held-out data")
     done = Finished(problem, noise, roles, found)
     return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
 
 
+def _other_clocks(pieces: Sequence[Recording], clocks: Synchronised, final: Fit) -> Synchronised | None:
+    """Clocks set anew beside what was found, where physics had passed for an offset or an offset for physics."""
+    beside = [entry for entry in final.effects if not slows(entry[0].effect)]
+    if not final.effects or (not clocks.late.any() and len(beside) == len(final.effects)):
+        return None
+    again = synchronised(pieces, clocks.problem.vehicle, effects=beside)
+    return again if np.abs(again.late - clocks.late).max() > WORTH_SAYING_S else None
+
+
 def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
     return [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
+
+
+def _by_bag(findings: Mapping[str, Finding]) -> list[BagFinding]:
+    return [finding.in_bag(bag) for bag, finding in findings.items()]
 
 
 def _lacking(problem: Problem, samples: int) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -205,8 +205,9 @@ class Diagnosis(Result):
 
     def in_words(self) -> Diagnosis:
         """The same in the words of the vehicle's coordinate, with None for every number that does not exist."""
-        told: Diagnosis = units.in_words(self.vehicle, mapped(self, lambda value, _: finite(value)))
-        return told
+        finished: Diagnosis = mapped(self, lambda value, _: finite(value))
+        told: Diagnosis = units.in_words(self.vehicle, finished)
+        return replace(told, laws=finished.laws)  # whose coordinates are keys, as in the vehicle file
 
     def save(self, out: str | Path) -> None:
         """Write diagnosis.json and augmented.yaml into a folder; replaces only an earlier diagnosis there."""

@@ -99,12 +99,13 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
 class Estimator:
     """Steering-torque estimator of one vehicle; a thin owner of the compiled core."""
 
-    def __init__(self, vehicle: Vehicle, options: Options | None = None) -> None:
-        self.vehicle = vehicle
+    def __init__(self, vehicle: Vehicle, options: Options | None = None, *, lean: bool = False) -> None:
+        """``lean``: compiled for the effects of this file alone, which is faster in each step and takes seconds once per set of them."""
+        self.vehicle, self.lean = vehicle, lean
         self.options = options or Options()
         self.channels = vehicle.channels
         self._first_line = len(vehicle.sides)
-        self._core = _new_core(vehicle, self.options)
+        self._core = _new_core(vehicle, self.options, lean or not vehicle.effects)
         self._single = (np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1), np.empty(1))
         self._estimates = np.zeros(1, ESTIMATE)
         self._residuals = np.zeros(PENDING_RING, RESIDUAL)
@@ -206,7 +207,7 @@ class Estimator:
         """
         if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
             raise DataError("it has other sides, topics or joints")
-        new = Estimator(vehicle, self.options)
+        new = Estimator(vehicle, self.options, lean=self.lean)
         hand_over(self._core, new._core)
         return new
 
@@ -300,8 +301,8 @@ def _cylinders(vehicle: Vehicle) -> tuple[Array, Array, IntArray]:
     return table.geometry, table.areas, table.lines
 
 
-def _new_core(vehicle: Vehicle, options: Options) -> Core:
-    model = build_model(vehicle, lean=True)
+def _new_core(vehicle: Vehicle, options: Options, lean: bool) -> Core:
+    model = build_model(vehicle, lean=lean)
     sides = len(vehicle.sides)
     config, parameters = _config(vehicle, model), np.concatenate(model.parameters)
     _set_options(config, parameters, options)

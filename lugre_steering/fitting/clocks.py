@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.data.dataset import prepare
+from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Calibration, Candidate, Problem, is_rig
+from lugre_steering.fitting.problem import Calibration, Candidate, Problem, Values, is_rig
 from lugre_steering.fitting.split import CLUSTER_S
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -30,6 +31,7 @@ ALIKE_S = 1e-3
 """Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
 WORTH_SAYING_S = 2e-3
 ROUNDS = 6
+Effects = Sequence[tuple[Candidate, Values]]
 SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
 
@@ -46,16 +48,29 @@ class Offset:
         return abs(self.late_s) > max(SHORTEST_S, SURE * self.deviation_s)
 
 
+@dataclass(frozen=True)
+class Synchronised:
+    """Recordings prepared with one clock; ``late`` [s]: how late the torque of each was; findings, by name, where that is worth saying."""
+
+    problem: Problem
+    late: Array
+    findings: dict[str, Finding]
+
+
 def synchronised(
-    recordings: Sequence[Recording], vehicle: Vehicle, calibrations: Sequence[Calibration] | None = None
-) -> tuple[Problem, dict[str, Finding]]:
-    """The recordings prepared with one clock, and a finding for each, by its name, whose offset is worth saying."""
+    recordings: Sequence[Recording],
+    vehicle: Vehicle,
+    calibrations: Sequence[Calibration] | None = None,
+    effects: Effects = (),
+) -> Synchronised:
+    """Recordings prepared with one clock; ``effects``: what is known to act beside, as physics left out can pass for an offset."""
     problem = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], calibrations)
+    as_stamped = Synchronised(problem, np.zeros(len(recordings)), {})
     if is_rig(vehicle):  # its inertia, which the sheet lacks, would pass for an offset
-        return problem, {}
-    if any(CATALOGUE[entry.id].hooks.keys() & {"delay", "lag"} for entry in vehicle.effects):
-        return problem, {}
-    original, start = problem, _baseline(problem, None)
+        return as_stamped
+    if any(slows(CATALOGUE[entry.id]) for entry in vehicle.effects):
+        return as_stamped
+    start = _baseline(problem, effects, None)
     baseline, late = start, np.zeros(len(recordings))
     deviation = np.zeros(len(recordings))
     for _ in range(ROUNDS):
@@ -66,17 +81,22 @@ def synchronised(
             break
         late, deviation = late + step, np.array([offset.deviation_s for offset in offsets])
         if np.abs(late).max() > LONGEST_S:
-            return original, {}
+            return as_stamped
         problem = Problem(vehicle, [
             prepare(_earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, late, strict=True)
         ], calibrations)  # fmt: skip
-        baseline = _baseline(problem, baseline)
-    if not late.any() or _alike(late, deviation) or _slow_sensor(original, start, baseline, late):
-        return original, {}
-    return problem, {
+        baseline = _baseline(problem, effects, baseline)
+    if not late.any() or _alike(late, deviation) or _slow_sensor(as_stamped.problem, start, baseline, late):
+        return as_stamped
+    return Synchronised(problem, late, {
         recording.name: _finding(vehicle, float(shift), float(spread))
         for recording, shift, spread in zip(recordings, late, deviation, strict=True) if abs(shift) > WORTH_SAYING_S
-    }  # fmt: skip
+    })  # fmt: skip
+
+
+def slows(effect: Effect) -> bool:
+    """Whether an effect shifts the whole torque in time, as a clock does."""
+    return bool(effect.hooks.keys() & {"delay", "lag"})
 
 
 def _alike(late: Array, deviation: Array) -> bool:
@@ -87,9 +107,10 @@ def _alike(late: Array, deviation: Array) -> bool:
     return bool(np.all(apart <= np.maximum(ALIKE_S, SURE * deviation)))
 
 
-def _baseline(problem: Problem, start: Fit | None) -> Fit:
+def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:
     weight = problem.valid / np.concatenate([run.sigma for run in problem.runs])
-    return fit(problem, weight, start=None if start is None else start.x, linearisations=20, robust=True, tolerance=1e-4)
+    effects, x = (effects, None) if start is None else (start.effects, start.x)
+    return fit(problem, weight, effects, x, linearisations=20, robust=True, tolerance=1e-4)
 
 
 def clock_offsets(problem: Problem, baseline: Fit) -> list[Offset]:
@@ -125,9 +146,9 @@ def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bo
         return False
     slow_sensor = next(effect for effect in CATALOGUE.values() if "lag" in effect.hooks)
     (tau,) = slow_sensor.parameters
-    lag = Candidate(slow_sensor, free=(tau.name,))
+    lag = Candidate(slow_sensor, free=(tau.name,)), {tau.name: float(late.mean())}
     weight = original.valid / np.concatenate([run.sigma for run in original.runs])
-    slow = fit(original, weight, [(lag, {tau.name: float(late.mean())})], start.x, linearisations=10, robust=True, tolerance=1e-4)
+    slow = fit(original, weight, [*start.effects, lag], start.x, linearisations=10, robust=True, tolerance=1e-4)
     used = np.count_nonzero(weight)
     return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
 

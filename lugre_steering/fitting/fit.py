@@ -3,25 +3,28 @@
 """Joint fit of calibration, initial bristles and effect parameters: Levenberg-Marquardt within bounds, few linearisations.
 
 A linearisation costs a run of the chain per parameter, a step only one. Between linearisations the Jacobian is kept up to date by
-the steps themselves (Broyden, Math. Comp. 19 (1965) 577), as long as they do what it foretells.
+the steps themselves (Broyden, Math. Comp. 19 (1965) 577), as long as they do what it foretells. The calibration is many columns and
+nearly linear, so on the way only those of effects are made anew; an end is believed of a whole linearisation alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
+from lugre_steering.effects.entry import Parameter
 from lugre_steering.fitting.problem import Candidate, Problem, in_threads
 from lugre_steering.recording import Array
 
 ROBUST = 3.0
 """Standard deviations beyond which the robust fit counts an error linearly."""
-STEPS, FORETOLD = 6, 0.5
-"""Most steps per linearisation, and the share of the foretold fall that a step must bring for another one."""
+STEPS, FORETOLD, FAR = 6, 0.5, 0.03
+"""Most steps per linearisation, the share of the foretold fall that a step must bring for another one, and the relative fall of the
+cost per linearisation from which the next one is of effects alone."""
 
 
 @dataclass(frozen=True)
@@ -60,78 +63,156 @@ def fit(
     robust: bool = False,
     priors: bool = True,
     tolerance: float = 1e-6,
+    worth: float = np.inf,
 ) -> Fit:
     """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
     ``tolerance``: relative fall of the cost per step below which the fit ends; ``linearisations``: how often it may linearise
-    anew before it ends anyhow. ``robust`` bounds the influence of samples
-    beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
+    anew before it ends anyhow; ``worth``: cost that must still be in reach at the present pace. ``robust`` bounds the influence of
+    samples beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
-    x0 = problem.start() if start is None else start
-    low, high = problem.bounds()
-    free = [(i, effects[i][0].parameter(name)) for i, (candidate, _) in enumerate(effects) for name in candidate.free]
-    scale = problem.scales()
-    values0 = [dict(values) for _, values in effects]
-    p0 = np.concatenate([x0 / scale, [parameter.scaled(values0[i].get(parameter.name, 0.0)) for i, parameter in free]])
-    low = np.concatenate([low / scale, [parameter.scaled(parameter.low) for _, parameter in free]])
-    high = np.concatenate([high / scale, [parameter.scaled(parameter.high) for _, parameter in free]])
-    prior = np.concatenate([problem.prior_weights(priors), [parameter.pull for _, parameter in free]])
-    n = problem.nuisances
-
-    def unpack(p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:
-        values = [dict(v) for v in values0]
-        for (i, parameter), number in zip(free, p[n:], strict=True):
-            values[i][parameter.name] = parameter.unscaled(float(number))
-        return p[:n] * scale, [(candidate, v) for (candidate, _), v in zip(effects, values, strict=True)]
-
-    def prediction(p: Array) -> Array:
-        return problem.predict_all(*unpack(p))
-
-    def jacobian(p: Array, base: Array) -> Array:
-        columns = in_threads(lambda j: _column(problem, unpack, p, j, n, high, base), range(p.size))
-        return np.column_stack(columns) * weight[:, None]
-
-    def cost(p: Array, predicted: Array) -> float:
-        return _cost((predicted - problem.measured) * weight, p * prior, robust)
-
-    p = np.clip(p0, low, high)
-    base = prediction(p)
-    left, slope, settled = cost(p, base), jacobian(p, base), False
-    damping = 1e-3
-    for _ in range(linearisations):
-        for age in range(STEPS):
-            error = (base - problem.measured) * weight
-            influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2) if robust else np.ones_like(error)
-            normal = slope.T @ (slope * influence[:, None]) + np.diag(prior**2)
-            gradient = slope.T @ (error * influence) + prior**2 * p
-            while True:
-                trial = np.clip(p + _bounded_step(normal, gradient, damping, low - p, high - p), low, high)
-                moved = prediction(trial)
-                fall = left - cost(trial, moved)
-                # Only an exact linearisation is worth ever shorter steps.
-                if fall > 0.0 or age > 0 or damping > 1e6:
-                    break
-                damping *= 8.0
-            if not fall > 0.0:
-                settled = age == 0
-                break
-            change, secant = trial - p, (moved - base) * weight
-            foretold = -(2.0 * gradient @ change + change @ normal @ change)
-            p, base, left, damping = trial, moved, left - fall, max(damping / 6.0, 1e-9)
-            settled = age == 0 and fall < tolerance * left
-            if fall < max(tolerance * left, FORETOLD * foretold):
-                break
-            slope += np.outer(secant - slope @ change, change / (change @ change))
-        if settled:
+    vector = _Vector.of(problem, effects, priors)
+    descent = _Descent(vector, weight, robust, vector.begin(problem.start() if start is None else start))
+    for done in range(linearisations):
+        before = descent.left
+        descent.advance(tolerance)
+        if descent.settled or descent.left - (linearisations - 1 - done) * (before - descent.left) > worth:
             break
-        slope = jacobian(p, base)
-    x, fitted = unpack(p)
-    natural = np.concatenate([scale, [parameter.slope(float(number)) for (_, parameter), number in zip(free, p[n:], strict=True)]])
-    covariance = np.asarray(np.linalg.pinv(slope.T @ slope + np.diag(prior**2), rcond=1e-12) * np.outer(natural, natural), float)
-    return Fit(
-        x, tuple(fitted), base, _cost((base - problem.measured) * weight, p * prior, False), slope / natural, covariance
-    )
+        descent.linearise(whole=before - descent.left < FAR * descent.left)
+    p, slope, natural = descent.p, descent.slope, vector.natural(descent.p)
+    x, fitted = vector.values(p)
+    spread = np.linalg.pinv(slope.T @ slope + np.diag(vector.prior**2), rcond=1e-12)
+    covariance = np.asarray(spread * np.outer(natural, natural), float)
+    error = (descent.base - problem.measured) * weight
+    return Fit(x, tuple(fitted), descent.base, _cost(error, p * vector.prior, False), slope / natural, covariance)
+
+
+@dataclass(frozen=True)
+class _Vector:
+    """What a fit sets free, each value counted in its own scale: nuisances first, then free parameters of effects.
+
+    ``low``, ``high`` (q,): bounds; ``prior`` (q,): weight with which each is pulled to zero.
+    """
+
+    problem: Problem
+    effects: Sequence[tuple[Candidate, Mapping[str, float]]]
+    free: Sequence[tuple[int, Parameter]]
+    scale: Array
+    low: Array
+    high: Array
+    prior: Array
+
+    @staticmethod
+    def of(problem: Problem, effects: Sequence[tuple[Candidate, Mapping[str, float]]], priors: bool) -> _Vector:
+        low, high = problem.bounds()
+        free = [(i, effects[i][0].parameter(name)) for i, (candidate, _) in enumerate(effects) for name in candidate.free]
+        scale = problem.scales()
+        return _Vector(
+            problem, effects, free, scale,
+            np.concatenate([low / scale, [parameter.scaled(parameter.low) for _, parameter in free]]),
+            np.concatenate([high / scale, [parameter.scaled(parameter.high) for _, parameter in free]]),
+            np.concatenate([problem.prior_weights(priors), [parameter.pull for _, parameter in free]]),
+        )  # fmt: skip
+
+    @property
+    def nuisances(self) -> int:
+        return int(self.scale.size)
+
+    def begin(self, x: Array) -> Array:
+        """The vector at some nuisances and the given values of the effects, within bounds."""
+        given = [parameter.scaled(self.effects[i][1].get(parameter.name, 0.0)) for i, parameter in self.free]
+        return np.asarray(np.clip(np.concatenate([x / self.scale, given]), self.low, self.high))
+
+    def values(self, p: Array) -> tuple[Array, list[tuple[Candidate, dict[str, float]]]]:
+        """Nuisances and effects in their own units."""
+        values = [dict(v) for _, v in self.effects]
+        for (i, parameter), number in zip(self.free, p[self.nuisances :], strict=True):
+            values[i][parameter.name] = parameter.unscaled(float(number))
+        return p[: self.nuisances] * self.scale, [(candidate, v) for (candidate, _), v in zip(self.effects, values, strict=True)]
+
+    def natural(self, p: Array) -> Array:
+        """Change of each value in its own unit per unit of the vector."""
+        slopes = [parameter.slope(float(number)) for (_, parameter), number in zip(self.free, p[self.nuisances :], strict=True)]
+        return np.concatenate([self.scale, slopes])
+
+    def predict(self, p: Array) -> Array:
+        return self.problem.predict_all(*self.values(p))
+
+    def jacobian(self, p: Array, base: Array, first: int) -> Array:
+        """Change of the prediction (n, q - first) per unit of the values from ``first`` on, at p where it is ``base``."""
+        return np.asarray(np.column_stack(in_threads(lambda j: self._column(p, j, base), range(first, p.size))))
+
+    def _column(self, p: Array, j: int, base: Array) -> Array:
+        """One column by a forward (or, at the upper bound, backward) difference of 2 % of the scale."""
+        problem, step = self.problem, 0.02 if p[j] + 0.02 <= self.high[j] else -0.02
+        moved = p.copy()
+        moved[j] += step
+        x, effects = self.values(moved)
+        if len(problem.calibrations) <= j < self.nuisances:
+            bag = (j - len(problem.calibrations)) % len(problem.runs)
+            column = np.zeros_like(base)
+            part = slice(problem.edges[bag], problem.edges[bag + 1])
+            column[part] = (problem.predict(bag, x, effects) - base[part]) / step
+            return column
+        moved_prediction = np.concatenate([problem.predict(i, x, effects) for i in range(len(problem.runs))])
+        return np.asarray((moved_prediction - base) / step)
+
+
+class _Descent:
+    """Where a fit stands: vector ``p``, prediction ``base`` (n,), cost ``left``, weighted Jacobian ``slope`` (n, q).
+
+    ``settled``: no further fall is to be had, as a whole linearisation at this very place says.
+    """
+
+    def __init__(self, vector: _Vector, weight: Array, robust: bool, p: Array) -> None:
+        self.vector, self.weight, self.robust, self.p = vector, weight, robust, p
+        self.base, self.damping, self.settled = vector.predict(p), 1e-3, False
+        self.left = self._cost(p, self.base)
+        self.linearise(whole=True)
+
+    def _cost(self, p: Array, predicted: Array) -> float:
+        return _cost((predicted - self.vector.problem.measured) * self.weight, p * self.vector.prior, self.robust)
+
+    def linearise(self, whole: bool) -> None:
+        """The Jacobian anew, or only its columns of effects."""
+        self._whole = whole or self.p.size == self.vector.nuisances
+        if self._whole:
+            self.slope = self.vector.jacobian(self.p, self.base, 0) * self.weight[:, None]
+        else:
+            first = self.vector.nuisances
+            self.slope[:, first:] = self.vector.jacobian(self.p, self.base, first) * self.weight[:, None]
+
+    def advance(self, tolerance: float) -> None:
+        """Steps as long as they do what the linearisation foretells, by more than ``tolerance`` of the cost."""
+        prior = self.vector.prior
+        for age in range(STEPS):
+            error = (self.base - self.vector.problem.measured) * self.weight
+            influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2) if self.robust else np.ones_like(error)
+            normal = self.slope.T @ (self.slope * influence[:, None]) + np.diag(prior**2)
+            gradient = self.slope.T @ (error * influence) + prior**2 * self.p
+            trial, moved, fall = self._step(normal, gradient, exact=age == 0)
+            if not fall > 0.0:
+                self.settled = self._whole and age == 0
+                return
+            change, secant = trial - self.p, (moved - self.base) * self.weight
+            foretold = -(2.0 * gradient @ change + change @ normal @ change)
+            self.p, self.base, self.left, self.damping = trial, moved, self.left - fall, max(self.damping / 6.0, 1e-9)
+            self.settled = self._whole and age == 0 and fall < tolerance * self.left
+            if fall < max(tolerance * self.left, FORETOLD * foretold):
+                return
+            self.slope += np.outer(secant - self.slope @ change, change / (change @ change))
+
+    def _step(self, normal: Array, gradient: Array, exact: bool) -> tuple[Array, Array, float]:
+        """A step within bounds, the prediction there and the fall of the cost; an ``exact`` linearisation is worth ever shorter ones."""
+        low, high = self.vector.low, self.vector.high
+        while True:
+            trial = np.clip(self.p + _bounded_step(normal, gradient, self.damping, low - self.p, high - self.p), low, high)
+            moved = self.vector.predict(trial)
+            fall = self.left - self._cost(trial, moved)
+            if fall > 0.0 or not exact or self.damping > 1e6:
+                return trial, moved, fall
+            self.damping *= 8.0
 
 
 def _cost(error: Array, prior_error: Array, robust: bool) -> float:
@@ -153,27 +234,3 @@ def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, hi
     span = np.maximum(high - low, 1e-12)
     target = solve_triangular(factor, -gradient, lower=True)
     return np.asarray(lsq_linear(factor.T, target, (low, low + span), method="bvls").x)
-
-
-def _column(
-    problem: Problem,
-    unpack: Callable[[Array], tuple[Array, list[tuple[Candidate, dict[str, float]]]]],
-    p: Array,
-    j: int,
-    nuisances: int,
-    high: Array,
-    base: Array,
-) -> Array:
-    """One Jacobian column by a forward (or, at the upper bound, backward) difference of 2 % of the parameter's scale."""
-    step = 0.02 if p[j] + 0.02 <= high[j] else -0.02
-    moved = p.copy()
-    moved[j] += step
-    x, effects = unpack(moved)
-    if len(problem.calibrations) <= j < nuisances:
-        bag = (j - len(problem.calibrations)) % len(problem.runs)
-        column = np.zeros_like(base)
-        part = slice(problem.edges[bag], problem.edges[bag + 1])
-        column[part] = (problem.predict(bag, x, effects) - base[part]) / step
-        return column
-    moved_prediction = np.concatenate([problem.predict(i, x, effects) for i in range(len(problem.runs))])
-    return (moved_prediction - base) / step

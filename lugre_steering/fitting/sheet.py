@@ -125,8 +125,8 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     if not found:
         return None
     floor = float(np.count_nonzero(thin.valid))
-    left = found[0].cost - floor
-    if left > (1.0 - EXPLAINED) * (baseline.cost - floor) or left > BETTER * (named.cost - floor):
+    left, excess, beside_names = found[0].cost - floor, baseline.cost - floor, named.cost - floor
+    if excess <= 0.0 or left > (1.0 - EXPLAINED) * excess or left > BETTER * beside_names:
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 

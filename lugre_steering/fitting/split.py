@@ -15,7 +15,7 @@ from lugre_steering.recording import Array
 Mask = NDArray[np.bool_]
 
 BLOCK_S = 8.0
-GAP_S = 1.0
+SPARED_S = 1.0
 CYCLE = 3
 """One block in so many is held out."""
 CLEARLY = 1.5
@@ -44,7 +44,7 @@ def split(problem: Problem, phase: int = 0) -> Split:
         part = slice(problem.edges[bag], problem.edges[bag + 1])
         elapsed = run.time - run.time[0]
         block = min(BLOCK_S, max(2.0, elapsed[-1] / 9.0))
-        gap = min(GAP_S, 0.15 * block)
+        gap = min(SPARED_S, 0.15 * block)
         index = (elapsed / block).astype(int)
         role = _held(index, bag + phase)
         within = elapsed - index * block

@@ -34,7 +34,7 @@ class Session:
     ) -> None:
         self.settings, self.vehicle, self.active = settings, vehicle, False
         warm_up(vehicle, settings.options)
-        self.estimator = Estimator(vehicle, settings.options)
+        self.estimator = Estimator(vehicle, settings.options, lean=True)
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
         self.outputs = Outputs(node, vehicle, settings)
         self._node = node
@@ -166,7 +166,7 @@ class Session:
 
 def warm_up(vehicle: Vehicle, options: Options) -> None:
     """Compile, or load from the cache, everything that callbacks call, on an estimator that is then thrown away."""
-    estimator = Estimator(vehicle, options)
+    estimator = Estimator(vehicle, options, lean=True)
     for step in range(1, 200):
         stamp_ns = 1_000_000_000 + step * 10_000_000
         if step == 100:

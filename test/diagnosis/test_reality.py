@@ -95,26 +95,29 @@ def shifted(*late_s: float) -> list[Recording]:
 def test_offsets_between_clocks_are_measured_and_taken_out() -> None:
     late_s = (0.02, -0.012)
     apart = shifted(*late_s)
-    problem, findings = synchronised(apart, VEHICLE)
+    clocks = synchronised(apart, VEHICLE)
+    problem, findings = clocks.problem, clocks.findings
+    np.testing.assert_allclose(clocks.late, late_s, atol=1e-3)
     assert len(findings) == len(apart)
     for recording, run, late in zip(apart, problem.runs, late_s, strict=True):
         said = float(findings[recording.name].statement.split("stamped ")[1].split(" ms")[0])
         assert said == pytest.approx(1e3 * abs(late), abs=1.0)
         assert ("too late" in findings[recording.name].statement) == (late > 0.0)
         assert run.time.size > 0
-    assert synchronised(sound(), VEHICLE)[1] == {}
+    assert synchronised(sound(), VEHICLE).findings == {}
 
 
 def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
-    problem, findings = synchronised(shifted(0.02, 0.02), VEHICLE)
-    assert findings == {}
+    clocks = synchronised(shifted(0.02, 0.02), VEHICLE)
+    problem = clocks.problem
+    assert clocks.findings == {}
     np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
 
 
 def test_a_hot_start_is_weather() -> None:
     assert VEHICLE.initial is not None
     hot = VEHICLE.replace(initial=replace(VEHICLE.initial, rubber_temperature_degC=45.0, air_temperature_degC=25.0))
-    problem, _ = synchronised(record(hot, QUICK, 6), VEHICLE)
+    problem = synchronised(record(hot, QUICK, 6), VEHICLE).problem
     assert wrong_sheet(problem) is None
     found = fit(problem, problem.valid / np.concatenate([run.sigma for run in problem.runs]))
     findings = weather_findings(problem, found)
@@ -138,14 +141,14 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
     name, cylinder = next(iter(VEHICLE.hydraulics.cylinders.items()))
     typed = replace(cylinder, bore_m=1.1 * cylinder.bore_m)
     wrong = VEHICLE.replace(hydraulics=replace(VEHICLE.hydraulics, cylinders={**VEHICLE.hydraulics.cylinders, name: typed}))
-    found = wrong_entry(synchronised(sound(), wrong)[0])
+    found = wrong_entry(synchronised(sound(), wrong).problem)
     assert found is not None
     assert found.suspects[0].key == f"hydraulics.cylinders.{name}.bore_m"
     assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
 
 
 def test_the_right_sheet_is_not_suspected() -> None:
-    problem, _ = synchronised(sound(), VEHICLE)
+    problem = synchronised(sound(), VEHICLE).problem
     assert wrong_sheet(problem) is None
     assert wrong_entry(problem) is None
 

@@ -57,7 +57,7 @@ def conclude(
         beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
         laws = described(lawful)
         law = sentence(laws, done.torque)
-        left = beside_laws(left, left_over(beside, final), law, formula(laws))
+        left = beside_laws(left, left_over(beside, final), law, formula(laws, problem.vehicle))
     if named:
         verdict = "missing_physics"
     elif left.structured:

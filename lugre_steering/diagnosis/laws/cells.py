@@ -18,6 +18,8 @@ from lugre_steering.recording import Array
 
 PIECES, HATS, FINE = 10, 3, 36
 """Cubic B-splines of a free f; coordinates that only take signs need no more than three hats, and what is made of teeth more."""
+CYCLES = np.arange(2.0, 40.5, 0.5)
+"""Periods over the visited range that are tried: a sine and a cosine show finer teeth than pieces can."""
 TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
 """Channels whose f over the angle may be fine."""
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
@@ -45,18 +47,22 @@ class Axis:
 
 @dataclass(frozen=True)
 class Cell:
-    """Channel x f(axis), with the range [low, high] on which the recordings show the axis."""
+    """Channel x f(axis), with the range [low, high] on which the recordings show the axis; ``period``: of a free f that repeats."""
 
     channel: str
     axis: Axis
     low: float
     high: float
     pieces: int = PIECES
+    period: float = 0.0
 
     def basis(self, places: Array) -> Array:
         """Columns (n, pieces) of a free f at some places, held beyond the range."""
         if self.pieces == 1:
             return np.ones((places.size, 1))
+        if self.period:
+            phase = 2.0 * np.pi * np.clip(places, self.low, self.high) / self.period
+            return np.column_stack([np.sin(phase), np.cos(phase)])
         degree = 1 if self.pieces == HATS else 3
         inner = np.linspace(self.low, self.high, self.pieces - degree + 1)
         knots = np.concatenate([[self.low] * degree, inner, [self.high] * degree])
@@ -90,6 +96,8 @@ class Traces:
                 yield Cell(channel, axis, low, high, pieces)
                 if axis == Axis("angle") and channel in TOOTHED:
                     yield Cell(channel, axis, low, high, FINE)
+                    for cycles in CYCLES:
+                        yield Cell(channel, axis, low, high, 2, float((high - low) / cycles))
 
     def columns(self, cell: Cell, bag: int) -> Array:
         """Change of the torque (n, pieces) of a bag by each piece of a free f."""

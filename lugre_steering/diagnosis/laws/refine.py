@@ -96,6 +96,8 @@ VARIANTS: tuple[tuple[str, Mapping[str, float], tuple[str, ...]], ...] = (
 
 def _grid(cell: Cell, name: str) -> Array:
     span = cell.high - cell.low
+    if name == "period" and cell.period:
+        return np.array([cell.period])
     if name in ("at", "start", "end"):
         return cell.low + span * np.linspace(0.05, 0.95, 13)
     if name == "exponent":
@@ -121,6 +123,8 @@ def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tup
     root = np.linalg.cholesky(np.linalg.pinv(covariance, rcond=1e-10) + 1e-12 * np.eye(len(coefficients)) / np.mean(np.diag(covariance))).T
     target, found = root @ coefficients, []
     for form, fixed, bends in VARIANTS:
+        if cell.period and form != "sinusoid":
+            continue  # two numbers cannot tell any other apart
         linear = [name for name in laws.form_values(form) if name not in (*fixed, *bends, "scale")]
         always = {**fixed, **({"scale": max(abs(cell.low), abs(cell.high))} if form == "power" else {})}
         best: tuple[float, dict[str, float]] = (np.inf, {})
@@ -146,6 +150,9 @@ def closed_law(
     def parameter(name: str) -> Parameter:
         if name in ("at", "start", "end") and form not in ("exponential",):
             return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "place", 0.1 * span, cell.low, cell.high)
+        if name == "period":  # a turn of a hundredth of a radian at the end of the range is a small step
+            known = start["period"]
+            return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "period", 0.1 * known**2 / span, 0.7 * known, 1.4 * known)
         if name in laws.POSITIVE:
             return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "width", span, 2e-3 * span, 10.0 * span, (span,))
         if name == "exponent":

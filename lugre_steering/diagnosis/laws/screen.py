@@ -103,7 +103,7 @@ class Screen:
     def search(self, near: Traces | None = None, like: Cell | None = None) -> list[Screened]:
         """All cells, best first; or of other traces at the same fit those of the channel and the pieces of one."""
         traces = near or self.traces
-        cells = [cell for cell in traces.cells() if like is None or (cell.channel, cell.pieces) == (like.channel, like.pieces)]
+        cells = [cell for cell in traces.cells() if like is None or _alike(cell, like)]
         base = _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[0])
 
         def one(cell: Cell) -> Screened:
@@ -117,6 +117,10 @@ class Screen:
             return Screened(cell, float(gains[0]), gains[1:])
 
         return sorted(in_threads(one, cells), key=lambda found: -found.gain)
+
+
+def _alike(one: Cell, other: Cell) -> bool:
+    return (one.channel, one.pieces, one.period) == (other.channel, other.pieces, other.period)
 
 
 def _permuted(errors: Array, fold: IntArray, seed: int) -> Array:

@@ -4,19 +4,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from lugre_steering import units
 from lugre_steering.diagnosis.laws.cells import Traces, trace
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.effects import laws
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import LawEntry
+from lugre_steering.vehicle import LawEntry, Vehicle
 
 WRITTEN_KNOTS = 65
 """Knots of a table in a file; of a fine one more."""
@@ -61,7 +61,7 @@ def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
         }
         made.append(LawEntry(
             cell.channel, cell.axis.coordinate, law.form, (cell.low, cell.high), numbers, knots, cell.axis.memory, cell.axis.memory_size,
-            law_words(law, values), intervals, round(gain, 4),
+            law_words(law, values, found.problem.vehicle), intervals, round(gain, 4),
         ))  # fmt: skip
     return tuple(made)
 
@@ -71,33 +71,33 @@ def _law(effect: object) -> Law:
     return effect
 
 
-def shown(coordinate: str, value: float) -> str:
+def shown(coordinate: str, value: float, vehicle: Vehicle) -> str:
     """A place on a coordinate as people say it."""
     unit = laws.COORDINATES[coordinate]
     if unit.startswith("rad"):
-        return f"{math.degrees(value):.3g} deg{unit[3:]}"
-    return f"{value:.3g} {unit}" if unit != "1" else f"{value:.3g}"
+        return units.distance(vehicle, value) + unit[3:]
+    return f"{value:.3g} {units.label(vehicle, unit)}" if unit != "1" else f"{value:.3g}"
 
 
-def law_words(law: Law, values: Mapping[str, float]) -> str:
+def law_words(law: Law, values: Mapping[str, float], vehicle: Vehicle) -> str:
     """What the law is: channel, coordinate with its memory, and shape."""
     cell = law.at(values)
     what = CHANNEL_WORDS[cell.channel]
-    if cell.axis.coordinate == "none":
-        return what
-    along = COORDINATE_WORDS[cell.axis.coordinate]
-    if cell.axis.memory == "lag":
-        along += f" as remembered for {cell.axis.memory_size:.2g} s"
-    elif cell.axis.memory != "none":
-        along += f" through a {cell.axis.memory} of {shown(cell.axis.coordinate, cell.axis.memory_size)} to each side"
-    return f"{what}, {_shape_words(law, values, along)}"
+    if cell.axis.coordinate != "none":
+        along = COORDINATE_WORDS[cell.axis.coordinate]
+        if cell.axis.memory == "lag":
+            along += f" as remembered for {cell.axis.memory_size:.2g} s"
+        elif cell.axis.memory != "none":
+            along += f" through a {cell.axis.memory} of {shown(cell.axis.coordinate, cell.axis.memory_size, vehicle)} to each side"
+        what += f", {_shape_words(law, values, along, vehicle)}"
+    return units.words(vehicle, what)
 
 
-def _shape_words(law: Law, values: Mapping[str, float], along: str) -> str:
+def _shape_words(law: Law, values: Mapping[str, float], along: str, vehicle: Vehicle) -> str:
     known, name = {**law.fixed, **values}, law.cell.axis.coordinate
 
     def at(key: str) -> str:
-        return shown(name, known[key])
+        return shown(name, known[key], vehicle)
 
     if law.form == "hinge" and known["below"] == 0.0 and known["value"] == 0.0:
         return f"only beyond {at('at')} of the {along}, growing with it"
@@ -174,14 +174,29 @@ _PLACES = {
 }  # fmt: skip
 
 
-def formula(described: Sequence[Mapping[str, Any]]) -> str:
+def formula(described: Sequence[Mapping[str, Any]], vehicle: Vehicle) -> str:
     """The laws in symbols: what each channel's signal is multiplied by, over its coordinate."""
-    parts = []
-    for law in described:
-        place = _PLACES.get(law["coordinate"], law["coordinate"].replace("_", " "))
-        remembered = "" if law["memory"] == "none" else f"; {law['memory']} of {law['memory_size']:.3g}"
-        parts.append(f"{_SIGNALS[law['channel']]} f({place}{remembered})".strip())
-    return "missing torque = " + " + ".join(parts)
+    parts = [f"{_f_in_symbols(law)} {_SIGNALS[law['channel']]}".strip() for law in described]
+    return units.law(vehicle, "torque [N m] = " + " + ".join(parts))
+
+
+def _f_in_symbols(law: Mapping[str, Any]) -> str:
+    """f with its numbers where few of them make it, else by name; in SI."""
+    place = _PLACES.get(law["coordinate"], law["coordinate"].replace("_", " "))
+    v, form = law["values"], law["form"]
+    if form == "constant":
+        return f"{v['value']:.4g}"
+    if law["memory"] != "none":
+        return f"f({place}; {law['memory']} of {law['memory_size']:.3g})"
+    level = f"{v['value']:+.4g} " if v.get("value") else ""
+    if form == "linear":
+        return f"({level}{v['slope']:+.4g} {place})"
+    if form == "power":
+        return f"{v['value']:.4g} |{place} / {v['scale']:.4g}|^{v['exponent']:.3g}"
+    if form == "sinusoid":
+        phase = f"2 pi {place} / {v['period']:.4g} {laws.COORDINATES[law['coordinate']]}"
+        return f"({level}{v['sine']:+.4g} sin({phase}) {v['cosine']:+.4g} cos({phase}))"
+    return f"f({place})"
 
 
 def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:

@@ -16,14 +16,11 @@ from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.ties import simplest, tied
 from lugre_steering.diagnosis.search.trial import (
     TRIAL_TOLERANCE,
+    Round,
     Trial,
-    begun_late,
     cost,
-    deepen,
-    everywhere,
     ranked,
     timed,
-    try_effect,
 )
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
@@ -142,7 +139,7 @@ def _rig_steps(
 
 
 @dataclass(frozen=True)
-class _Round:
+class _First:
     """What one round of the build-up tried: the screen's scores, and the trials, best first."""
 
     scores: tuple[Score, ...] = ()
@@ -154,12 +151,12 @@ class _Built:
     """A build-up: the baseline it left from, its first round, its steps and every trial it took into account."""
 
     baseline: Fit
-    first: _Round
+    first: _First
     steps: list[_Step]
     trials: list[Trial]
 
 
-def _others(problem: Problem, weight: Array, built: _Built) -> list[_Round]:
+def _others(problem: Problem, weight: Array, built: _Built) -> list[_First]:
     """Other first effects to build up from: those with the best fingerprints, each before the trials it does not lose to.
 
     Of several effects a wrong one may fit best alone by its freedom, whereas a fingerprint is of the place in the motion.
@@ -169,11 +166,11 @@ def _others(problem: Problem, weight: Array, built: _Built) -> list[_Round]:
         return []
     scores, trials = built.first.scores, built.first.trials
     others = sorted(range(1, len(trials)), key=lambda i: -trials[i].score.explained)
-    return [_Round(scores, trials[i:]) for i in others[:AGAIN]]
+    return [_First(scores, trials[i:]) for i in others[:AGAIN]]
 
 
 def _build_up(
-    problem: Problem, noise: Noise, split: Split, baseline: Fit, opening: _Round | None, progress: Callable[[str], None],
+    problem: Problem, noise: Noise, split: Split, baseline: Fit, opening: _First | None, progress: Callable[[str], None],
     given: Sequence[_Step] = (),
 ) -> _Built:
     """Add effects while they are significant, larger than our own error, and explain what is left.
@@ -185,7 +182,7 @@ def _build_up(
     start_cost = cost(problem, baseline, weight)
     steps: list[_Step] = list(given)
     current, restarts = given[-1][0] if given else baseline, 0
-    first, first_choice = opening or _Round(), opening is None
+    first, first_choice = opening or _First(), opening is None
     all_trials: list[Trial] = []
     for _ in range(MAX_ROUNDS):
         if len(steps) >= len(given) + (MAX_EFFECTS if first_choice else AGAIN_EFFECTS):
@@ -199,7 +196,7 @@ def _build_up(
             scores = _always(scores) if len(steps) > len(given) else scores
             trials = _tried(problem, weight, current, scores, samples, progress)
         if len(steps) == len(given):
-            first = _Round(tuple(scores), tuple(trials))
+            first = _First(tuple(scores), tuple(trials))
         if not trials:
             break
         best, before = trials[0], cost(problem, current, weight)
@@ -244,18 +241,18 @@ def _tried(
 ) -> list[Trial]:
     """One round: the shortlist fitted, what leads it also from an instant on and then with care; best first."""
     before = cost(problem, current, weight)
-    trials = []
+    trials, tried = [], Round(problem, weight, current, scores)
     for score in choose(scores, samples):
         progress(f"fitting {score.candidate.label}")
-        trials.append(everywhere(problem, weight, current, try_effect(problem, weight, current, score), scores))
+        trials.append(tried.everywhere(tried.try_effect(score)))
     trials = ranked(trials, before)
-    trials[: PROMISING[0]] = [begun_late(problem, weight, current, trial, scores) for trial in trials[: PROMISING[0]]]
+    trials[: PROMISING[0]] = [tried.begun_late(trial) for trial in trials[: PROMISING[0]]]
     trials = ranked(trials, before)
     if trials and timed(trials[0]):
-        trials = ranked([begun_late(problem, weight, current, trial, scores) for trial in trials], before)
+        trials = ranked([tried.begun_late(trial) for trial in trials], before)
     close = sum(trial.cost < trials[0].cost + CLOSE * (before - trials[0].cost) for trial in trials)
     promising = int(np.clip(close, *PROMISING))
-    trials[:promising] = [deepen(problem, weight, current, trial, scores) for trial in trials[:promising]]
+    trials[:promising] = [tried.deepen(trial) for trial in trials[:promising]]
     return ranked(trials, before)
 
 
@@ -306,16 +303,14 @@ def _confront(
     seen = best.get(own.effect.id)
     champion = Trial(seen if seen is not None and seen.explained > 0.0 else item.score, ordered, cost(problem, final, weight))
 
-    def fitted(score: Score) -> Trial:
-        trial = everywhere(problem, weight, without, try_effect(problem, weight, without, score), scores)
-        return deepen(problem, weight, without, trial, scores)
-
+    tried = Round(problem, weight, without, scores)
+    tried.best = champion.cost
     # Where nothing stands beside it, these have been fitted as deeply before.
     known = {trial.candidate.effect.id: trial for trial in item.trials if trial.deep and len(trial.fit.effects) == 1}
     trials = [
         known[name]
         if name in known and not rest
-        else fitted(best[name])
+        else tried.deepen_near(tried.everywhere(tried.try_effect(best[name])))
         for name in sorted(names)
         if name in best and best[name].explained > 0.3 * champion.score.explained
     ]

@@ -24,6 +24,9 @@ VARIANT, VARIANTS = 0.5, 2
 MEMORY = 4.0
 """Samples that count as one, roughly: errors have a memory."""
 TRIAL_TOLERANCE = 1e-4
+START, GO_ON, NEAR = 3, 5, 0.3
+"""Linearisations of a trial from each start and beyond, and the share of the best trial's gain within which it must be able to come:
+what ties or follows a name is far nearer."""
 SURE_SIGMA = 4.0
 """Standard deviations that keep an optional part of a law, or as much for each of several that only matter together."""
 
@@ -48,37 +51,95 @@ def cost(problem: Problem, result: Fit, weight: Array) -> float:
     return float(np.sum(((problem.measured - result.prediction) * weight) ** 2))
 
 
-def try_effect(problem: Problem, weight: Array, current: Fit, score: Score) -> Trial:
-    """Joint fit of calibration, earlier effects and this candidate; again from the sheet if the calibration is cornered."""
-    trial = _fitted(problem, weight, current, score, current.x)
-    if not _cornered(problem, current):
-        return trial
-    # Recalibration was bent to imitate what is missing; from there the way back may be closed.
-    return min([trial, _fitted(problem, weight, current, score, problem.start())], key=lambda each: each.cost)
+class Round:
+    """Trials beside one fit: what has been tried is kept, and what cannot come near the best any more is left unfinished."""
 
+    def __init__(self, problem: Problem, weight: Array, current: Fit, scores: Sequence[Score]) -> None:
+        self.problem, self.weight, self.current, self.scores = problem, weight, current, scores
+        self.before = self.best = cost(problem, current, weight)
+        self._tried: dict[Candidate, Trial] = {}
 
-def _fitted(problem: Problem, weight: Array, current: Fit, score: Score, start: Array) -> Trial:
-    """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
-    candidate = score.candidate
-    shapes = dict(candidate.shapes)
-    free = tuple(
-        p.name for p in candidate.effect.parameters if p.name in candidate.free or (p.name in shapes and not p.optional)
-    )
-    effects = [*current.effects, (replace(candidate, free=free), score.values)]
-    result = fit(problem, weight, effects, start, linearisations=8, tolerance=TRIAL_TOLERANCE)
-    return Trial(score, result, cost(problem, result, weight))
+    def try_effect(self, score: Score) -> Trial:
+        """Joint fit of calibration, earlier effects and this candidate."""
+        if score.candidate not in self._tried:
+            trial = self._joint(score)
+            self._tried[score.candidate] = trial
+            self.best = min(self.best, trial.cost)
+        return self._tried[score.candidate]
 
+    @property
+    def worth(self) -> float:
+        """Cost that a trial must be able to reach to matter."""
+        return self.best + NEAR * (self.before - self.best)
 
-def everywhere(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
-    """A trial of an effect in one bag only, or from a time on, against the same everywhere, which is the simpler claim."""
-    if not _partial(trial.score):
-        return trial
-    whole = next((s for s in scores if s.candidate.label == trial.score.candidate.label and not _partial(s)), None)
-    if whole is None or whole.explained <= 0.0:
-        return trial
-    simpler = try_effect(problem, weight, current, whole)
-    gain = cost(problem, current, weight) - trial.cost
-    return simpler if simpler.cost < trial.cost + PARTIAL * gain else trial
+    def _joint(self, score: Score) -> Trial:
+        if not _cornered(self.problem, self.current):
+            return self._fitted(score, self.current.x, linearisations=START + GO_ON, worth=self.worth)
+        # Recalibration was bent to imitate what is missing; from there the way back may be closed.
+        started = [self._fitted(score, x, linearisations=START) for x in (self.current.x, self.problem.start())]
+        ahead = min(started, key=lambda each: each.cost)
+        gone_on = fit(
+            self.problem, self.weight, ahead.fit.effects, ahead.fit.x, linearisations=GO_ON, tolerance=TRIAL_TOLERANCE,
+            worth=self.worth,
+        )
+        return Trial(score, gone_on, cost(self.problem, gone_on, self.weight))
+
+    def _fitted(self, score: Score, start: Array, *, linearisations: int = START + GO_ON, worth: float = np.inf) -> Trial:
+        """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
+        candidate = score.candidate
+        shapes = dict(candidate.shapes)
+        free = tuple(
+            p.name for p in candidate.effect.parameters if p.name in candidate.free or (p.name in shapes and not p.optional)
+        )
+        effects = [*self.current.effects, (replace(candidate, free=free), score.values)]
+        result = fit(
+            self.problem, self.weight, effects, start, linearisations=linearisations, tolerance=TRIAL_TOLERANCE, worth=worth
+        )
+        return Trial(score, result, cost(self.problem, result, self.weight))
+
+    def everywhere(self, trial: Trial) -> Trial:
+        """A trial of an effect in one bag only, or from a time on, against the same everywhere, which is the simpler claim."""
+        if not _partial(trial.score):
+            return trial
+        label = trial.score.candidate.label
+        whole = next((s for s in self.scores if s.candidate.label == label and not _partial(s)), None)
+        if whole is None or whole.explained <= 0.0:
+            return trial
+        simpler = self.try_effect(whole)
+        return simpler if simpler.cost < trial.cost + PARTIAL * (self.before - trial.cost) else trial
+
+    def begun_late(self, trial: Trial) -> Trial:
+        """A trial of an effect that is always there against the same from an instant on, which must explain clearly more."""
+        tried = trial.score.candidate
+        late = next((s for s in self.scores if (c := s.candidate).label == tried.label and c.bags is None and c.since), None)
+        if late is None or late.explained <= 0.0 or _partial(trial.score):
+            return trial
+        begun = retime(self.problem, self.weight, self.try_effect(late))
+        return begun if begun.cost < trial.cost - PARTIAL * (self.before - begun.cost) else trial
+
+    def deepen_near(self, trial: Trial) -> Trial:
+        """The same trial where it is too far from the best to matter, else ``deepen``."""
+        return trial if trial.cost > self.worth else self.deepen(trial)
+
+    def deepen(self, trial: Trial) -> Trial:
+        """A promising trial also from its next best shapes, and at its typical size from the sheet; then refined.
+
+        Valleys are narrow, and a linear guess far from the truth may lie beyond the next hill.
+        """
+        tried = trial.score.candidate
+        variants = [
+            score for score in self.scores
+            if (c := score.candidate).label == tried.label and (c.bags, c.since) == (tried.bags, tried.since)
+            and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
+        ]  # fmt: skip
+        typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))
+        starts = [*((score, trial.fit.x) for score in variants[:VARIANTS]), (typical, self.problem.start())]
+        best = trial
+        for score, x in starts:
+            best = min([best, self._fitted(score, x, worth=best.cost)], key=lambda each: each.cost)
+        for _ in range(RETIMED if tried.since else 0):
+            best = retime(self.problem, self.weight, best)
+        return replace(refine(self.problem, self.weight, best), deep=True)
 
 
 def _partial(score: Score) -> bool:
@@ -91,26 +152,6 @@ def _cornered(problem: Problem, current: Fit) -> bool:
     return bool(np.any(np.abs(current.x[: prior.size]) > 2.0 * prior))
 
 
-def deepen(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
-    """A promising trial also from its next best shapes, and at its typical size from the sheet; then refined.
-
-    Valleys are narrow, and a linear guess far from the truth may lie beyond the next hill.
-    """
-    tried = trial.score.candidate
-    variants = [
-        score for score in scores
-        if (c := score.candidate).label == tried.label and (c.bags, c.since) == (tried.bags, tried.since)
-        and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
-    ]  # fmt: skip
-    others = [_fitted(problem, weight, current, score, trial.fit.x) for score in variants[:VARIANTS]]
-    typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))
-    others.append(_fitted(problem, weight, current, typical, problem.start()))
-    best = min([trial, *others], key=lambda each: each.cost)
-    for _ in range(RETIMED if tried.since else 0):
-        best = retime(problem, weight, best)
-    return replace(refine(problem, weight, best), deep=True)
-
-
 def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
     """A late effect from the instants that fit best, one per bag, with its values fitted anew."""
     *earlier, (candidate, values) = trial.fit.effects
@@ -119,17 +160,6 @@ def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
     result = fit(problem, weight, effects, trial.fit.x, linearisations=8, tolerance=TRIAL_TOLERANCE)
     better = cost(problem, result, weight)
     return Trial(trial.score, result, better) if better < trial.cost else trial
-
-
-def begun_late(problem: Problem, weight: Array, current: Fit, trial: Trial, scores: Sequence[Score]) -> Trial:
-    """A trial of an effect that is always there against the same from an instant on, which must explain clearly more."""
-    tried = trial.score.candidate
-    late = next((s for s in scores if (c := s.candidate).label == tried.label and c.bags is None and c.since), None)
-    if late is None or late.explained <= 0.0 or _partial(trial.score):
-        return trial
-    begun = retime(problem, weight, try_effect(problem, weight, current, late))
-    gain = cost(problem, current, weight) - begun.cost
-    return begun if begun.cost < trial.cost - PARTIAL * gain else trial
 
 
 def rank(trial: Trial, before: float) -> float:
