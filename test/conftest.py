@@ -7,6 +7,7 @@ import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ["LUGRE_STEERING_CONFIG"] = "/nowhere/defaults.yaml"  # what a developer has saved changes no test
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LUGRE_STEERING_THREADS", "1")
 

@@ -238,7 +238,8 @@ def test_the_list_of_effects_fits_80_columns_and_one_screen_or_so(tmp_path: Path
 
 
 def test_saved_defaults_stand_in_for_options(bag: Path, tmp_path: Path) -> None:
-    environment = {**ENVIRONMENT, "XDG_CONFIG_HOME": str(tmp_path / "etc")}
+    environment = {key: value for key, value in ENVIRONMENT.items() if key != "LUGRE_STEERING_CONFIG"}
+    environment["XDG_CONFIG_HOME"] = str(tmp_path / "etc")
 
     def tool(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "lugre_steering", *map(str, arguments)]

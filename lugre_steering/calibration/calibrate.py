@@ -19,6 +19,7 @@ undetermined        combinations that the data leave open: ``parts``, ``data_ove
 assumed             sheet values taken as exact: relative change of each parameter per relative error of it
 per_bag             list: ``bag``, ``duration_s``, ``samples``, RMSE of ``sheet`` and ``calibrated`` vehicle
 data_quality        findings of the reader and of the checks of the sensors, per bag
+provenance          version, date, options, and the SHA-256 of the vehicle file and of every file of the bags
 statement           one paragraph
 ==================  ===============================================================================================
 """

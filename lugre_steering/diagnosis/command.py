@@ -26,7 +26,7 @@ STEPS = (
 """The words with which the steps of a diagnosis announce themselves, in order."""
 
 
-PICTURES = ("before_after_*.png", "residual_*.png", "evidence.png", "heldout.png")
+PICTURES = ("before_after_*.png", "residual_*.png", "law_*.png", "evidence.png", "heldout.png")
 
 
 def run(
@@ -83,6 +83,7 @@ def _take_away_report(out: Path, old: Mapping[str, Any]) -> None:
     """Delete the report of the diagnosis whose result ``old`` lies in ``out``, file by file as it was written."""
     try:
         names = [*(f"before_after_{bag}" for bag in old["bags"]), *(f"residual_{effect['id']}" for effect in old["effects"])]
+        names += [f"law_{law['id']}" for law in old.get("laws", ())]
     except (KeyError, TypeError):
         raise not_ours(out / "diagnosis.json") from None
     for name in ("report.html", *picture_names([*names, "evidence", "heldout"])):

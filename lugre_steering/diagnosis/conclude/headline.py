@@ -49,8 +49,8 @@ def unlisted(done: Finished, error: float, said: str) -> str:
 def consistent(done: Finished, error: float) -> str:
     """For a model that leaves nothing but noise: ``error`` [N m] on held-out data."""
     return (
-        f"Nothing is missing: recalibrated, the model explains the torque to {done.torque(error)} ({_share(error / done.amplitude)}). "
-        "Use augmented.yaml, the recalibrated vehicle file."
+        f"No missing physics is seen: recalibrated, the model explains the torque to {done.torque(error)} "
+        f"({_share(error / done.amplitude)}). Use augmented.yaml, the recalibrated vehicle file."
     )
 
 

@@ -12,7 +12,7 @@ from lugre_steering.report.markup import facts, text
 from lugre_steering.report.page import Tone
 
 VERDICTS: dict[str, tuple[str, Tone]] = {
-    "consistent": ("Nothing is missing from the model", "good"),
+    "consistent": ("No missing physics is seen", "good"),
     "missing_physics": ("Physics is missing from the model", "found"),
     "unlisted_physics": ("Physics is missing that no entry lists", "new"),
     "insufficient_data": ("The data do not decide", "unsure"),

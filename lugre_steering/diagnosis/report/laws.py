@@ -45,7 +45,7 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
     numbers = ", ".join(f"{name} = {words.number(value, 4)}{between(name)}" for name, value in law["values"].items())
     ties = "; ".join(f"{tie['channel']} over {tie['coordinate']}" for tie in law["ties"])
     return [
-        ("channel", f"{law['channel']} [{units.label(vehicle, laws.CHANNELS[law['channel']])}]"),
+        ("channel", words.labelled(law["channel"].replace("_", " "), units.label(vehicle, laws.CHANNELS[law["channel"]]))),
         ("depends on", law["coordinate"] + (f", {law['memory']} of {law['memory_size']:.3g}" if law["memory"] != "none" else "")),
         ("form, SI units", f"{law['form']}: {numbers}" if numbers else f"{law['form']}, see augmented.yaml"),
         ("at most", f"{words.number(law['largest_Nm'], 3)} {unit}, {words.percent(law['largest_share'])} of the torque"),

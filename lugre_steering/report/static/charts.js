@@ -21,8 +21,8 @@
   function xAt(series, i) { return series.x ? series.x[i] : series.x0 + i * series.dx; }
   function ticks(low, high, most) {
     var raw = (high - low) / Math.max(most, 1), power = Math.pow(10, Math.floor(Math.log10(raw)));
-    var step = [1, 2, 5, 10].map(function (n) { return n * power; }).find(function (n) { return n >= raw * (1 - 1e-9); });
-    var found = [], first = Math.ceil(low / step - 1e-9), decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    var step = [1, 2, 2.5, 5, 10].map(function (n) { return n * power; }).find(function (n) { return n >= raw * (1 - 1e-9); });
+    var found = [], first = Math.ceil(low / step - 1e-9), decimals = Math.min(9, (step.toFixed(9).replace(/0+$/, "").split(".")[1] || "").length);
     for (var k = first; k * step <= high + 1e-9 * step; k++) found.push([k * step, (k * step).toFixed(decimals).replace("-", "\u2212").replace(/^\u2212(0(\.0*)?)$/, "$1")]);
     return found;
   }
