@@ -18,7 +18,6 @@ OPEN = (
     "test_library.py::test_the_contract_s_own_schema_accepts_what_ours_does",
     "test_simulator.py::test_shares_no_code_with_the_estimator[contact]",
     "test_simulator.py::test_shares_no_code_with_the_estimator[conceal]",
-    "test_live_trust.py::",
     "test_laws_found.py::test_a_loss_beyond_an_angle",
     "test_own_physics.py::test_an_effect_of_one_line",
     "test_engine.py::test_physics_outside_the_catalogue_is_unlisted",

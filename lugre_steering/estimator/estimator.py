@@ -174,6 +174,12 @@ class Estimator:
         return table
 
     @property
+    def rejections(self) -> IntArray:
+        """What ``counters`` tell of rejected samples, as numbers only (channels, reasons)."""
+        reasons: IntArray = self._core.channels["reasons"].copy()
+        return reasons
+
+    @property
     def latest_ns(self) -> Mapping[str, int]:
         """Stamp of the latest accepted sample per channel name; 0 before the first."""
         return {

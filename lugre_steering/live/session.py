@@ -20,6 +20,10 @@ from lugre_steering.live.parameters import Settings
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
 
+LEAVE_S = 2.0
+"""No longer does the last ramp to zero take: who stops the node waits a few seconds before he kills it."""
+TICK_S = 0.02
+
 
 class Session:
     """One vehicle, its estimator, and the topics around it. Publishes nothing unless ``active``; the state goes on."""
@@ -41,7 +45,7 @@ class Session:
         self._torque_ns = 0  # stamp of the newest torque
         self._arrived_ns = 0  # monotonic time of the sample that gave it
         self._doubts = 0
-        self.news = False  # the doubts have changed since the last report
+        self.news = False  # the doubts have changed since the last report, or the node has been switched on or off
         self._now_ns: Callable[[], int] = time.time_ns
         self.choose_clock()
         self._inputs = Inputs(node, vehicle, settings.input_depth, self.health, guarded, self._push, self._set_plan)
@@ -52,15 +56,23 @@ class Session:
         self.outputs.close()
 
     def activate(self) -> None:
-        self.active = True
+        self.active = self.news = True
         if self._torque_ns:  # what has come meanwhile was for nobody: the feed-forward comes back from what was last published
             self.estimator.set_released(self.outputs.released or [0.0] * len(self.vehicle.sides))
         self.outputs.fading = None
 
     def deactivate(self) -> None:
         """Lead the feed-forward to zero; nothing else is published any more."""
-        self.active = False
-        self.outputs.begin_fade(self._now_ns(), self.settings.options.withdrawal_ramp_s)
+        self.active, self.news = False, True
+        self.outputs.begin_fade(self.settings.options.withdrawal_ramp_s)
+
+    def withdraw(self) -> None:
+        """Lead the feed-forward to zero and return when it is there: nobody will be left to do so."""
+        self.active, outputs = False, self.outputs
+        outputs.begin_fade(min(LEAVE_S, self.settings.options.withdrawal_ramp_s))
+        while not outputs.faded:
+            time.sleep(TICK_S)
+            outputs.fade(self._now_ns())
 
     def change(self, settings: Settings) -> None:
         """Go on with other settings (those that are not fixed)."""
@@ -82,7 +94,7 @@ class Session:
             silent_ns = time.monotonic_ns() - self._arrived_ns
             if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and outputs.released:
                 self.health.withheld["feed-forward led to zero: inputs stale"] += 1
-                outputs.begin_fade(self._now_ns(), self.settings.options.withdrawal_ramp_s)
+                outputs.begin_fade(self.settings.options.withdrawal_ramp_s)
         elif not outputs.faded:
             outputs.fade(self._now_ns())
             self.estimator.set_released(outputs.released)
@@ -96,11 +108,18 @@ class Session:
         self.simulated = bool(clock.ros_time_is_active)
         self._now_ns = (lambda: int(clock.now().nanoseconds)) if self.simulated else time.time_ns
 
+    @property
+    def untold(self) -> bool:
+        """Whether there is something that the last report did not tell."""
+        return self.news or self.health.untold(self._now_ns(), self.estimator.rejections)
+
     def statuses(self, monotonic_ns: int, elapsed_s: float) -> list[DiagnosticStatus]:
         self.news = False
         estimator = self.estimator
         self.health.simulated, self.health.active = self.simulated, self.active
-        return self.health.statuses(self._now_ns(), monotonic_ns, elapsed_s, estimator.counters, estimator.saturated_steps)
+        now_ns = self._now_ns()
+        self.health.told(now_ns, estimator.rejections)
+        return self.health.statuses(now_ns, monotonic_ns, elapsed_s, estimator.counters, estimator.saturated_steps)
 
     # --------------------------------------------------------------- samples
 

@@ -62,8 +62,8 @@ TABLE = (
     ),
     Parameter("frame_id", "base_link", "frame of the published torques (z up)", fixed=True),
     Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000, fixed=True),
-    Parameter("angle_timeout_s", 0.2, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
-    Parameter("pressure_timeout_s", 0.5, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
+    Parameter("angle_timeout_s", 0.15, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
+    Parameter("pressure_timeout_s", 0.15, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
     Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)", fixed=True),
     Parameter(
         "when_stale",
