@@ -7,7 +7,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-NAMES = ("kernel", "replay", "live", "own_error", "fuzz", "faults", "soak")
+NAMES = ("kernel", "replay", "live", "own_error", "fuzz", "faults", "soak", "watch")
 
 
 def main(arguments: list[str]) -> int:
