@@ -52,6 +52,7 @@ def _options(
 
 
 Bags = Annotated[list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not)")]
+BagsOrNone = Annotated[list[Path] | None, typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not)")]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML)")]
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
@@ -345,9 +346,12 @@ def calibrate(
 
 @command()
 def diagnose(
-    bags: Bags,
     vehicle: VehicleFile,
     out: OutFolder,
+    bags: BagsOrNone = None,
+    window: Annotated[
+        list[Path] | None, typer.Option(help="window file that the live node wrote when the model no longer matched; may be given again")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the noise draws and bootstraps")] = 1,
     material: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
@@ -359,7 +363,9 @@ def diagnose(
     from lugre_steering.diagnosis.command import STEPS, run
 
     with step_bar(STEPS) as progress:
-        result = run(bags, vehicle, out, seed=seed, material=material, report=report, progress=progress)
+        result = run(
+            bags or [], vehicle, out, seed=seed, material=material, report=report, windows=window or [], progress=progress
+        )
     if as_json:
         print_json(result)
     else:

@@ -88,7 +88,8 @@ class Controller:
         self.node = rclpy.create_node("controller", context=self._context)
         self._executor = rclpy.executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._angle = [self.node.create_publisher(JointState, topic, QoSProfile(depth=10)) for topic in (vehicle.topics.left, vehicle.topics.right)]
+        topics = vehicle.topics.left, vehicle.topics.right
+        self._angle = [self.node.create_publisher(JointState, topic, QoSProfile(depth=10)) for topic in topics]
         self._clock = self.node.create_publisher(Clock, "/clock", qos_profile_sensor_data)
         self._plan = self.node.create_publisher(JointTrajectory, "steering/command", QoSProfile(depth=10))
         self._heard: tuple[int, list[float]] = (0, [0.0, 0.0])
@@ -230,7 +231,8 @@ def draw(runs: list[Run], file: Path) -> None:
         for run_, colour in zip(runs, SERIES, strict=True):
             axes[1, 0].plot(run_.time, 1e-3 * run_.torque, color=colour, linewidth=1.0)
             axes[2, 0].plot(run_.time, run_.error_deg, color=colour, linewidth=1.0, label=f"{run_.feed_forward}: {run_.rms_deg:.2f} deg")
-        for ax, words in zip(axes[:, 0], ("wanted angle [deg]", "torque fed forward, left [kN m]", "tracking error, left [deg]"), strict=True):
+        titles = "wanted angle [deg]", "torque fed forward, left [kN m]", "tracking error, left [deg]"
+        for ax, words in zip(axes[:, 0], titles, strict=True):
             ax.set_ylabel(words)
             ax.set_xlabel("time [s]")
         axes[2, 0].legend()

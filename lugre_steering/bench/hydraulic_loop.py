@@ -58,7 +58,7 @@ def hydraulics_of(machine: Machine, gain: Array) -> Hydraulics:
 @njit(cache=True)
 def _advance(s, command, duration, h, par, track, ground, rubber, cells, hide):
     """One side for ``duration`` [s] with a valve command held; ``s``: angle, rate, load pressure, spool, spool rate, energy."""
-    for _ in range(int(round(duration / h))):
+    for _ in range(round(duration / h)):
         pull = par.valve_frequency**2 * (command - s[3]) - 2.0 * par.valve_damping * par.valve_frequency * s[4]
         s[4] += h * pull
         s[3] = min(max(s[3] + h * s[4], -1.0), 1.0)

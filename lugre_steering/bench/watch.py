@@ -30,6 +30,7 @@ from lugre_steering.bag.load import read_recording
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.estimator import Estimator
+from lugre_steering.proof.field.hidden import IN_SERVICE as CHANGES
 from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
 from lugre_steering.proof.made import Wanted
 from lugre_steering.recording import Array
@@ -38,7 +39,6 @@ from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, Watch, weigh
 
 STRETCH = 30.0
 THRESHOLDS = np.array([5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0, 150.0, 200.0])
-CHANGES = {"an end stop": "end_stop", "another pavement": "surface_patch", "cylinder friction": "cylinder_friction"}
 BEFORE = 1000
 STRENGTH = 5.0
 """Of the change, in typical sizes of what the proof hides: a machine that is damaged, not one that is a little off."""
@@ -69,7 +69,7 @@ def scores_of(vehicle: Vehicle, bag: Path) -> Scores:
     return Scores(np.array(found).reshape(-1, SCORES), span_h / max(len(found), 1))
 
 
-@njit(cache=True)
+@njit  # not cached: what it calls lives in another file, whose changes the cache would not see
 def _excursions(state, scores, thresholds, counts):
     """Count, for each threshold, how often the cumulative sum rises above it anew from zero."""
     highest = 0.0

@@ -9,11 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose
+from lugre_steering.bag.load import distinct, read_recordings
+from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import SCHEMA, picture_names
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder, write_record
 from lugre_steering.vehicle import load, save
+from lugre_steering.watch.window import read_window
 
 STEPS = (
     "reading", "checking the data", "estimating the motion", "recalibrating", "fingerprints", "rivals", "verifying",
@@ -33,22 +35,29 @@ def run(
     seed: int = 1,
     material: float = MATERIAL_SHARE,
     report: bool = True,
+    windows: Sequence[Path] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Diagnose and write DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures; returns the JSON.
+    """Diagnose bags, and windows that the live node has written; returns the JSON.
 
-    The report of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
+    Written are DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures. The report of an earlier diagnosis in
+    DIR is taken away: its pictures would not belong to this result.
     """
     vehicle = load(vehicle_file)
     if not 0.0 <= material <= 1.0:
         raise DataError(f"--material: got {material:g}, expected a share from 0 to 1")
+    if not bags and not windows:
+        raise DataError("no recording is given, expected a BAG or --window FILE")
     for bag in bags:
         if not bag.exists():
             raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
     with output_folder(out):
         pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
         old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
-        result = diagnose(bags, vehicle, seed=seed, material=material, progress=progress)
+        read = [(str(file), read_window(file, vehicle.channels).recording) for file in windows]
+        recorded = read_recordings(bags, vehicle.channels, progress)
+        recordings = distinct([*zip(map(str, bags), recorded, strict=True), *read])
+        result = diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
         try:
             if old is not None:
                 _take_away_report(out, old)

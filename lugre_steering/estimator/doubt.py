@@ -50,6 +50,9 @@ DOUBTS = ("angle jumped", "angle frozen", "angle noisy", "residual implausible",
           "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen")  # fmt: skip
 JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE = (1 << bit for bit in range(len(DOUBTS)))
 
+INPUTS = JUMPED | FROZEN | NOISY | LINE
+"""What speaks against the sensors and not against the model."""
+
 GUARD = np.dtype(
     [
         ("shadow_ns", np.int64),  # stamp of the trusted state; 0: the present one is trusted

@@ -56,6 +56,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         # Steady, so that health is reported while simulated time stands still.
         self.create_timer(TICK_S, self.guarded(self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, "~/reload", self._reload)
+        self.create_service(Trigger, "~/mark", self._mark)
         self._writer: threading.Thread | None = None
         change = self._service_change_state
         change.callback = self._answered(change.callback)
@@ -189,6 +190,11 @@ class SteeringTorqueEstimator(LifecycleNode):
             self._news_ns = now_ns
         if news or waited_s >= REPORT_S:
             self._report(session, now_ns)
+        if session.alarm:
+            session.alarm = False
+            write = session.window("the residual is not what it was")
+            if write is not None:
+                threading.Thread(target=self.guarded(lambda: self._written(write())), daemon=True).start()
 
     def _report(self, session: Session, monotonic_ns: int) -> None:
         session.choose_clock()
@@ -224,6 +230,23 @@ class SteeringTorqueEstimator(LifecycleNode):
         self.settings = changed(self, changes)
         if self.session is not None:
             self.session.change(self.settings)
+
+    def _written(self, file: Path) -> None:
+        self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}")
+
+    def _mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Write the window up to now, for diagnose."""
+        write = self.session.window("marked") if self.session is not None else None
+        try:
+            if write is None:
+                raise DataError("parameter 'watch_folder' names no folder for windows, or the node is not configured")
+            response.success, response.message = True, str(write())
+        except (DataError, OSError) as error:
+            response.success, response.message = False, str(error)
+        except Exception as error:  # would end the service, and the caller would wait for ever
+            self.fault(error)
+            response.success, response.message = False, self.last_exception
+        return response
 
     def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Take over what ``vehicle_file`` says now, all of it or nothing."""

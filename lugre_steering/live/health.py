@@ -56,6 +56,7 @@ class Health:
         self._node = NODE
         self.active = True
         self.leaving = False
+        self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
         self.doubted: Counter[str] = Counter()  # torques whose feed-forward was held back, by reason
@@ -258,6 +259,10 @@ class Health:
         if large:
             message = "; ".join(filter(None, [message, "residual as large as the torque: check units, signs, plugs; then diagnose"]))
         words = self._wrong_sheet()
+        unlike = math.isfinite(self.mismatch_s)
+        if unlike:
+            since = f"since {self.mismatch_s:.0f} s the residual is not what it was: the model no longer matches; diagnose"
+            message = "; ".join(filter(None, [message, since]))
         message = "; ".join(filter(None, [message, words]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
         values: dict[str, object] = {
@@ -265,7 +270,7 @@ class Health:
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
-        return self._status("residual", WARN if saturated or large or words or not count else OK, message, values)
+        return self._status("residual", WARN if saturated or large or words or unlike or not count else OK, message, values)
 
     def _wrong_sheet(self) -> str:
         """What to check in the vehicle file, where the measured torque has the shape of the estimate but another size."""

@@ -71,6 +71,8 @@ TABLE = (
         "the feed-forward when inputs are stale: silent at once, or led to zero over withdrawal_ramp_s and then silent",
         choices=WHEN_STALE,
     ),
+    Parameter("watch_folder", "", "folder for windows in which the model did not match (and ~/mark); empty: none", fixed=True),
+    Parameter("watch_before_s", 120.0, "such a window begins so long before [s]", 1.0, 3600.0),
     Parameter("state_file", "", "file in which temperatures and bristles survive a restart; empty: they do not"),
     Parameter("state_period_s", 10.0, "time between two writings of state_file [s]", 0.1, 3600.0),
     Parameter("state_max_age_s", 86400.0, "an older state_file is not used [s]", 0.0, 1e8),

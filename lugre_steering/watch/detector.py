@@ -28,10 +28,10 @@ FLOOR_SHARE = 1e-3
 """Of the static friction: residuals below are no news however they grow."""
 LEARN, KEPT, LAG, AGAIN = 60, 400, 40, 20
 """Scores needed before anything is judged, kept, left aside as too new, and after which the usual is taken anew."""
-CUT, SLACK = 3.0, 2.5
+CUT, SLACK = 3.0, 2.0
 SCORES = 3
 WIDE, WIDE_SIGMA = 0.95, 1.96
-"""Of the deviations, the quantile that tells their scatter, and what it is of a normal one: days and strokes of two kinds have two humps."""
+"""Quantile of the deviations that tells their scatter, and what it is of a normal one: days of two kinds have two humps."""
 LEAST_SCATTER = (0.1, 0.01, 0.1)
 """A tenth more or less error, or a hundredth of the friction, is never unusual."""
 THRESHOLD = 60.0
