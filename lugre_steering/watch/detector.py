@@ -26,15 +26,15 @@ from lugre_steering.vehicle.model import baseline_parameters
 MANOEUVRE = 2.0
 FLOOR_SHARE = 1e-3
 """Of the static friction: residuals below are no news however they grow."""
-LEARN, KEPT, LAG, AGAIN = 60, 400, 40, 20
-"""Scores needed before anything is judged, kept, left aside as too new, and after which the usual is taken anew."""
+LEARN, KEPT, LAG, AGAIN = 60, 2000, 40, 20
+"""Scores needed before anything is judged, kept (some hours: days are unlike), too new to count; after so many it is taken anew."""
 CUT, SLACK = 3.0, 2.0
 SCORES = 3
 WIDE, WIDE_SIGMA = 0.95, 1.96
 """Quantile of the deviations that tells their scatter, and what it is of a normal one: days of two kinds have two humps."""
 LEAST_SCATTER = (0.1, 0.01, 0.1)
 """A tenth more or less error, or a hundredth of the friction, is never unusual."""
-THRESHOLD = 60.0
+THRESHOLD = 30.0
 """Of the cumulative sum, for one false alarm in about 1000 h; see ``bench watch``."""
 
 RING = KEPT + LAG
