@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -32,7 +34,7 @@ def test_step_by_step_the_track_turns_as_it_does_at_once(setting: Setting) -> No
     track = standing(setting.cells[0], setting.ground)
     single = [
         turn_step(after, (after - before) / step, step, track, setting.ground, setting.ratios, setting.cells[0], Inside())
-        for before, after in zip(angle, angle[1:], strict=False)
+        for before, after in itertools.pairwise(angle)
     ]
     # The kingpin's torque follows the sum of the rates there, the angle itself here.
     assert np.abs(np.array(single) - (whole.friction + whole.aligning)[1:]).max() < 1e-6 * setting.torque_scale
