@@ -230,12 +230,13 @@ def draw(runs: list[Run], file: Path) -> None:
         axes[0, 0].plot(runs[0].time, np.degrees(runs[0].wanted), color="black")
         for run_, colour in zip(runs, SERIES, strict=True):
             axes[1, 0].plot(run_.time, 1e-3 * run_.torque, color=colour, linewidth=1.0)
-            axes[2, 0].plot(run_.time, run_.error_deg, color=colour, linewidth=1.0, label=f"{run_.feed_forward}: {run_.rms_deg:.2f} deg")
+            axes[2, 0].plot(run_.time, run_.error_deg, color=colour, linewidth=1.0)
+            axes[0, 0].plot([], [], color=colour, label=f"{run_.feed_forward}: {run_.rms_deg:.2f} deg")
         titles = "wanted angle [deg]", "torque fed forward, left [kN m]", "tracking error, left [deg]"
         for ax, words in zip(axes[:, 0], titles, strict=True):
             ax.set_ylabel(words)
             ax.set_xlabel("time [s]")
-        axes[2, 0].legend()
+        axes[0, 0].legend(loc="upper right", fontsize=8)
 
 
 def run(argv: list[str]) -> None:
