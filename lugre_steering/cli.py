@@ -77,9 +77,9 @@ def _options_of_commands() -> dict[str, dict[str, defaults.Option]]:
     return found
 
 
-Bags = Annotated[
-    list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not), folders of them, or patterns")
-]
+_BAGS = "rosbag2 folders or files (mcap or sqlite3, compressed or not), folders of them, or patterns"
+Bags = Annotated[list[Path], typer.Argument(help=_BAGS)]
+BagsOrNone = Annotated[list[Path] | None, typer.Argument(help=_BAGS)]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML)")]
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="recordings at a time, each in a process of its own")]
@@ -421,9 +421,12 @@ def calibrate(
 
 @command()
 def diagnose(
-    bags: Bags,
     vehicle: VehicleFile,
     out: OutFolder,
+    bags: BagsOrNone = None,
+    window: Annotated[
+        list[Path] | None, typer.Option(help="window file that the live node wrote when the model no longer matched; may be given again")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the noise draws and bootstraps")] = 1,
     material: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
@@ -444,11 +447,12 @@ def diagnose(
     from lugre_steering.diagnosis.result import facts, gate
     from lugre_steering.diagnosis.show import EXIT_CODES, show_diagnosis
 
-    wanted, found = gate(fail_on or ()), find(bags, out)
+    wanted, found = gate(fail_on or ()), find(bags or [], out)
     use_threads(jobs)
     with step_bar(STEPS) as progress:
         result = run(
-            found.bags, vehicle, out, seed=seed, material=material, report=report, progress=progress, skipped=found.skipped
+            found.bags, vehicle, out, seed=seed, material=material, report=report, windows=window or [], progress=progress,
+            skipped=found.skipped,
         )  # fmt: skip
     if as_json:
         print_json(result.json)
