@@ -61,6 +61,8 @@ def diagnose_recordings(
     progress: Progress = lambda _: None,
 ) -> Diagnosis:
     """Diagnose recordings of one vehicle together; effects that the vehicle file already has stay in the baseline."""
+    if not recordings:
+        raise DataError("no recording is given, expected at least one")
     progress("checking the data")
     qualities = [inspect(recording, vehicle) for recording in recordings]
     findings = _findings(qualities)
