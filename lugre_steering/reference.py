@@ -8,12 +8,10 @@ A page of ``docs/`` asks for one by a line ``<!-- reference: NAME -->``, which t
 from __future__ import annotations
 
 import argparse
-import ast
 import dataclasses
 import inspect
 import math
 import re
-import textwrap
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -25,14 +23,10 @@ from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.live.table import OPTION_TABLE, TABLE, Parameter
+from lugre_steering.schema import meanings_of, unit_of
 from lugre_steering.vehicle.plausible import KEYS
 from lugre_steering.vehicle.sections import Vehicle
 
-UNITS = {
-    "Nm_per_deg": "N m/deg", "J_kgK": "J/(kg K)", "W_m2K": "W/(m2 K)", "kg_m3": "kg/m3", "deg_s": "deg/s", "kgm2": "kg m2",
-    "degC": "degC", "Nms": "N m s", "deg": "deg", "Nm": "N m", "Pa": "Pa", "Hz": "Hz", "K": "K", "N": "N", "m": "m",
-}  # fmt: skip
-"""Unit by the ending of a key."""
 ASKED = re.compile(r"^<!-- reference: (\w+) -->$", re.MULTILINE)
 
 
@@ -58,26 +52,14 @@ class Section:
 
 def sections(cls: type = Vehicle, path: str = "") -> Iterator[Section]:
     """The vehicle file's sections from the top down; ``NAME`` stands for a name of one's own, ``[]`` for each of a list."""
-    hints, meanings = typing.get_type_hints(cls), attribute_docstrings(cls)
+    hints, meanings = typing.get_type_hints(cls), meanings_of(cls)
     fields = dataclasses.fields(cls)
-    keys = tuple(_key(item, hints[item.name], meanings.get(item.name, ""), path) for item in fields)
+    keys = tuple(_key(item, meanings.get(item.name, ""), path) for item in fields)
     yield Section(path, inspect.getdoc(cls) or "", keys)
     for item in fields:
         inner, ending = _mapping_in(hints[item.name])
         if inner is not None:
             yield from sections(inner, f"{path}.{item.name}{ending}".removeprefix("."))
-
-
-def attribute_docstrings(cls: type) -> dict[str, str]:
-    """What stands as a text below each attribute of a class."""
-    (body,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
-    assert isinstance(body, ast.ClassDef)
-    return {
-        attribute.target.id: " ".join(below.value.value.split())
-        for attribute, below in zip(body.body, body.body[1:], strict=False)
-        if isinstance(attribute, ast.AnnAssign) and isinstance(attribute.target, ast.Name)
-        and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str)
-    }  # fmt: skip
 
 
 def _mapping_in(hint: Any) -> tuple[type | None, str]:
@@ -88,11 +70,10 @@ def _mapping_in(hint: Any) -> tuple[type | None, str]:
     return typing.cast("type | None", found), ending
 
 
-def _key(item: dataclasses.Field[Any], hint: Any, meaning: str, path: str) -> Key:
-    unit = next((unit for ending, unit in UNITS.items() if item.name == ending or item.name.endswith(f"_{ending}")), "")
+def _key(item: dataclasses.Field[Any], meaning: str, path: str) -> Key:
     key = f"{path}.{item.name}".removeprefix(".")
     usual = next((f"; usual {u.low:g} to {u.high:g}" for u in KEYS if u.key == key), "")
-    return Key(item.name, unit, _range(item.metadata) + usual, _default(item), meaning)
+    return Key(item.name, unit_of(item.name), _range(item.metadata) + usual, _default(item), meaning)
 
 
 def _range(metadata: Mapping[str, Any]) -> str:
@@ -158,7 +139,8 @@ def effects() -> str:
 def law_parts() -> str:
     """What a law of the vehicle file may change, and what it may depend on."""
     channels, coordinates = (", ".join(f"`{name}` [{unit}]" for name, unit in of.items()) for of in (CHANNELS, COORDINATES))
-    rows = [("`channel`", channels), ("`coordinate`", coordinates), ("`form`", _listed([*FORMS, FORM_TABLE])), ("`memory`", _listed(MEMORIES))]
+    rows = [("`channel`", channels), ("`coordinate`", coordinates)]
+    rows += [("`form`", _listed([*FORMS, FORM_TABLE])), ("`memory`", _listed(MEMORIES))]
     return table(("key", "one of [unit]"), rows)
 
 

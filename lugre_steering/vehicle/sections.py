@@ -317,7 +317,7 @@ class Vehicle:
     schema: str
     """Kind and version of the file: `lugre_steering/vehicle/1`."""
     name: str
-    """Shown in results."""
+    """Of the vehicle, shown in results."""
     axle: Axle | None = None
     """The steered axle."""
     track: Track | None = None
