@@ -388,5 +388,5 @@ def test_the_guide_shows_the_kept_scoreboard() -> None:
         pytest.skip("the kept run is of an earlier scoreboard; docs/proof.md is remade with the next full run")
     page = (ROOT / "docs/proof.md").read_text(encoding="utf-8")
     missing = [line for line in page_lines(board) if line not in page]
-    assert not missing, "the table of docs/proof.md differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)
+    assert not missing, "docs/proof.md differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)
     assert board["made"]["command"] in page
