@@ -23,7 +23,7 @@ from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.live.table import OPTION_TABLE, TABLE, Parameter
-from lugre_steering.schema import meanings_of, unit_of
+from lugre_steering.schema import meanings_of, section_in, unit_of
 from lugre_steering.vehicle.plausible import KEYS
 from lugre_steering.vehicle.sections import Vehicle
 
@@ -57,17 +57,9 @@ def sections(cls: type = Vehicle, path: str = "") -> Iterator[Section]:
     keys = tuple(_key(item, meanings.get(item.name, ""), path) for item in fields)
     yield Section(path, inspect.getdoc(cls) or "", keys)
     for item in fields:
-        inner, ending = _mapping_in(hints[item.name])
-        if inner is not None:
+        if (inner := section_in(hints[item.name])) is not None:
+            ending = {tuple: "[]", dict: ".NAME"}.get(typing.get_origin(hints[item.name]), "")
             yield from sections(inner, f"{path}.{item.name}{ending}".removeprefix("."))
-
-
-def _mapping_in(hint: Any) -> tuple[type | None, str]:
-    """The dataclass that a key holds, and how its path goes on; None for plain values."""
-    arguments = typing.get_args(hint)
-    ending = {tuple: "[]", dict: ".NAME"}.get(typing.get_origin(hint), "")
-    found = next((a for a in (hint, *arguments) if dataclasses.is_dataclass(a)), None)
-    return typing.cast("type | None", found), ending
 
 
 def _key(item: dataclasses.Field[Any], meaning: str, path: str) -> Key:
@@ -132,7 +124,8 @@ def _parameter(p: Parameter) -> tuple[str, ...]:
 
 def effects() -> str:
     """The catalogue, by the stage of the signal path where the physics acts."""
-    rows = [(f"`{e.id}`", e.title, e.stage, ", ".join(f"`{p.name}` [{p.unit}]" for p in e.parameters)) for e in CATALOGUE.values()]
+    titles = {e.id: e.title + ("" if e.observable else f" (never named: needs {e.not_recorded})") for e in CATALOGUE.values()}
+    rows = [(f"`{e.id}`", titles[e.id], e.stage, ", ".join(f"`{p.name}` [{p.unit}]" for p in e.parameters)) for e in CATALOGUE.values()]
     return table(("id", "physics", "stage", "parameters"), rows)
 
 

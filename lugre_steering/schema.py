@@ -59,6 +59,12 @@ def meanings_of(cls: type) -> dict[str, str]:
     }  # fmt: skip
 
 
+def section_in(hint: Any) -> type | None:
+    """The dataclass that a key of this type holds, also as entries of a list or mapping; None for plain values."""
+    held = (each for each in (hint, *typing.get_args(hint)) if dataclasses.is_dataclass(each))
+    return typing.cast("type | None", next(held, None))
+
+
 def unit_of(key: str) -> str:
     """Unit that a key's ending names; empty if none does."""
     return next((unit for ending, unit in UNITS.items() if key.endswith(f"_{ending}")), "")

@@ -18,8 +18,8 @@ import yaml
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.files import read_text, write_text
 from lugre_steering.resources import config_folder
-from lugre_steering.schema import Reader, meanings_of, unit_of
-from lugre_steering.vehicle import Cylinder, Vehicle, from_mapping, pavements
+from lugre_steering.schema import Reader, meanings_of, section_in, unit_of
+from lugre_steering.vehicle import Vehicle, from_mapping, pavements
 from lugre_steering.vehicle.tables import LONGEST_TABLE
 
 Ask = Callable[[str, str], str]
@@ -133,12 +133,10 @@ def _ask_key(sheet: Sheet, key: str, file: Path, ask: Ask, say: Say, units: Mapp
 
 
 def _section(path: Sequence[str]) -> type:
-    """Of a vehicle, what stands at a path."""
-    if path[:2] == ["hydraulics", "cylinders"]:
-        return Cylinder
+    """Of a vehicle, what stands at a path; the name of a cylinder in it is no key."""
     cls: type = Vehicle
     for name in path:
-        cls = next(a for a in (typing.get_type_hints(cls)[name], *typing.get_args(typing.get_type_hints(cls)[name])) if isinstance(a, type))
+        cls = section_in(typing.get_type_hints(cls).get(name)) or cls
     return cls
 
 
@@ -180,14 +178,14 @@ def _lines(data: Mapping[str, Any], cls: type, indent: str = "") -> Iterator[str
     """A section as lines of YAML, each key with what it means."""
     hints = typing.get_type_hints(cls)
     for name, value in data.items():
-        inner = next((a for a in (hints.get(name), *typing.get_args(hints.get(name))) if dataclasses.is_dataclass(a)), None)
+        inner = section_in(hints.get(name))
         if isinstance(value, Mapping) and name == "cylinders":
             yield f"{indent}{name}:"
             yield from (f"{indent}  {cylinder}: {_flow(entry)}" for cylinder, entry in value.items())
         elif isinstance(value, Mapping) and inner is not None and name != "wlf":
             yield from ([""] if not indent else [])
             yield f"{indent}{name}:"
-            yield from _lines(value, typing.cast(type, inner), indent + "  ")
+            yield from _lines(value, inner, indent + "  ")
         else:
             yield f"{indent}{name}: {_flow(value)}".ljust(44) + f"  # {_meaning(cls, name)}"
 
