@@ -133,7 +133,7 @@ LOG = "time_s,angle_left_deg,angle_right_deg,main_a_bar,main_b_bar,aux_a_bar,aux
 
 
 def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In their order; those on what a diagnosis has written have a vehicle file in its place."""
+    """In their order; those on what a diagnosis has written have a vehicle file in its place. They print what the page says."""
     for name in ("bags", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "out/diagnosis").mkdir(parents=True)
@@ -148,6 +148,11 @@ def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: p
             done = CliRunner().invoke(app, arguments, input="\n" * 100)
             assert done.exit_code == 0, f"{arguments}: {done.output}"
             ran.append(arguments[0])
+            if ran == ["replay"]:
+                told = re.search(r"RMSE of (\d+) N m .*? and of (\d+) N m", (DOCS / "first_hour.md").read_text(), re.DOTALL)
+                assert told is not None
+                printed = [float(number) for number in re.findall(r"RMSE ([\d.]+) N m", done.stdout)]
+                assert [float(number) for number in told.groups()] == pytest.approx(printed, rel=0.01)
     assert set(ran) == set(QUICK)
     assert (tmp_path / "my_vehicle_rubber.csv").exists()
     assert (tmp_path / "my_bag/metadata.yaml").exists()
@@ -227,6 +232,16 @@ def test_node_parameters_and_effects_are_all_told() -> None:
     assert {name for name in defaults if f"| `{name}` |" not in told} == set()
     told = reference.filled((DOCS / "effects.md").read_text(encoding="utf-8"))
     assert {name for name in CATALOGUE if f"| `{name}` |" not in told} == set()
+
+
+def test_the_tables_are_printed_by_name() -> None:
+    command = [sys.executable, "-m", "lugre_steering.reference"]
+    done = subprocess.run([*command, "effects"], env=environment(), capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == reference.effects().strip()
+    done = subprocess.run([*command, "efects"], env=environment(), capture_output=True, text=True, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
+    assert all(table() in done.stdout for table in reference.TABLES.values())
 
 
 def findings() -> set[str]:
