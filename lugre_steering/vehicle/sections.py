@@ -233,7 +233,7 @@ class TorqueSensor:
     topic: str = "steering/measured_torque"
     """Topic of the measured torque."""
     noise_Nm: float = quantity(1e-15, 1e6, default=1.0)
-    """One standard deviation."""
+    """Noise of the sensor, one standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -241,15 +241,15 @@ class Sensors:
     """What the data sheets say of the sensors."""
 
     angle_resolution_deg: float = quantity(0.0, 10.0, default=0.0)
-    """One step of the angle sensors."""
+    """Resolution: one step of the angle sensors."""
     angle_noise_deg: float = quantity(0.0, 10.0, default=0.01)
-    """One standard deviation."""
+    """Noise of the angle sensors, one standard deviation."""
     pressure_reference: str = "gauge"
     """`gauge` or `absolute`."""
     pressure_range_Pa: float = quantity(1.0, 1e9, default=40.0e6)
     """End of the range of the pressure sensors."""
     pressure_noise_Pa: float = quantity(0.0, 1e8, default=1.5e4)
-    """One standard deviation."""
+    """Noise of the pressure sensors, one standard deviation."""
     pressure_gain: float = quantity(0.5, 2.0, default=1.0)
     """True over shown pressure; fitted by `calibrate --free pressure_gain`."""
     angle_from: str | None = None
@@ -317,7 +317,7 @@ class Vehicle:
     schema: str
     """Kind and version of the file: `lugre_steering/vehicle/1`."""
     name: str
-    """Of the vehicle, shown in results."""
+    """What results call the machine."""
     axle: Axle | None = None
     """The steered axle."""
     track: Track | None = None
