@@ -25,14 +25,16 @@ setup(
     packages=[*find_packages(include=[PACKAGE, f"{PACKAGE}.*"]), f"{PACKAGE}.config"],
     package_dir={f"{PACKAGE}.config": "config"},
     package_data={
-        PACKAGE: ["py.typed", "diagnosis/report/*.html"],
-        f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*"],
+        PACKAGE: ["py.typed", "report/static/*"],
+        f"{PACKAGE}.config": ["*", "own_physics/*", "own_physics/example_package/*", "layouts/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
         (f"share/{PACKAGE}/config", sorted(path for path in glob("config/*") if Path(path).is_file())),
         (f"share/{PACKAGE}/config/own_physics", sorted(path for path in glob("config/own_physics/*") if Path(path).is_file())),
+        (f"share/{PACKAGE}/config/layouts", sorted(glob("config/layouts/*"))),
+        (f"lib/{PACKAGE}", ["scripts/estimator"]),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     zip_safe=False,
@@ -51,7 +53,8 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "import": ["pyarrow>=14.0", "h5py>=3.8"],
         "frame": ["pandas>=2.0"],
-        "report": ["matplotlib>=3.6", "plotly>=5.18"],
+        "fleet": ["pyarrow>=14.0", "distributed>=2023.9"],
+        "report": ["matplotlib>=3.6"],
         "docs": DOCS,
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
@@ -61,6 +64,8 @@ setup(
             "hypothesis>=6.80",
             "jsonschema>=4.17",
             "mcap>=1.1",
+            "pyarrow>=14.0",
+            "distributed>=2023.9",
             "ruff>=0.6",
             "mypy>=1.10",
             "types-PyYAML",
@@ -72,7 +77,6 @@ setup(
     entry_points={
         "console_scripts": [
             "lugre-steering = lugre_steering.cli:main",
-            "estimator = lugre_steering.node:main",
         ],
     },
 )

@@ -10,19 +10,20 @@ import inspect
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from lugre_steering import serialise
+from lugre_steering import defaults, serialise
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
+from lugre_steering.terminal import forgive_letters
 from lugre_steering.version import __version__
 
 # Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
@@ -32,10 +33,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 app = typer.Typer(
     help="Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,  # it would take the brackets of units for its own
     pretty_exceptions_enable=False,
 )
-
 
 
 def _tell_version(wanted: bool) -> None:
@@ -46,14 +47,44 @@ def _tell_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     _: Annotated[bool, typer.Option("--version", help="print the version and leave", callback=_tell_version, is_eager=True)] = False,
 ) -> None:
-    """Options of the program itself."""
+    """Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out."""
+    if context.invoked_subcommand == "config":  # which must work with any content
+        return
+    try:
+        context.default_map = {**defaults.of_commands(defaults.load(), _options_of_commands())}
+    except LugreSteeringError as error:
+        print(f"lugre-steering: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
 
 
-Bags = Annotated[list[Path], typer.Argument(help="rosbag2 folders or files (mcap or sqlite3, compressed or not)")]
+def _options_of_commands() -> dict[str, dict[str, defaults.Option]]:
+    """The options of every command by the name as it is typed, without its dashes."""
+    found: dict[str, dict[str, defaults.Option]] = {}
+    for registered in app.registered_commands:
+        function = registered.callback
+        assert function is not None
+        name = registered.name or function.__name__
+        for parameter in inspect.signature(function, eval_str=True).parameters.values():
+            hint, *info = get_args(parameter.annotation) or (None,)
+            if info and isinstance(info[0], typer.models.OptionInfo):
+                # Typer holds the first name where other uses have a default.
+                names = [text for text in (info[0].default, *(info[0].param_decls or ())) if str(text).startswith("--")]
+                typed = str(names[0])[2:] if names else parameter.name.replace("_", "-")
+                found.setdefault(name, {})[typed] = defaults.Option(parameter.name, hint)
+    return found
+
+
+_BAGS = "rosbag2 folders or files (mcap or sqlite3, compressed or not), folders of them, or patterns"
+Bags = Annotated[list[Path], typer.Argument(help=_BAGS)]
+BagsOrNone = Annotated[list[Path] | None, typer.Argument(help=_BAGS)]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML)")]
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="recordings at a time, each in a process of its own")]
+Threads = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="threads of the computation [all processors]")]
+FailOn = Annotated[list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so (any wrong word tells all); repeatable")]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
 
 OwnEffects = Annotated[
@@ -135,6 +166,26 @@ def print_json(result: Any) -> None:
     print(serialise.as_json(result))
 
 
+def say_skipped(skipped: Iterable[tuple[str, str]]) -> None:
+    """What was left out and why, a line each on stderr."""
+    for bag, reason in skipped:
+        print(f"lugre-steering: skipped: {bag}: {reason}", file=sys.stderr)
+
+
+def use_threads(count: int | None) -> None:
+    """Limit what a fit takes for itself."""
+    if count is not None:
+        os.environ["LUGRE_STEERING_THREADS"] = str(count)
+
+
+def leave_if(failures: Sequence[str]) -> None:
+    """Exit code 1, with the reasons on stderr, where there are any."""
+    for failure in failures:
+        print(f"lugre-steering: --fail-on: {failure}", file=sys.stderr)
+    if failures:
+        raise typer.Exit(1)
+
+
 def command(name: str | None = None) -> Callable[[F], F]:
     """Register a command whose expected errors end as one line on stderr and exit code 2."""
 
@@ -181,25 +232,36 @@ def replay(
     initial_temperature: Annotated[
         str | None, typer.Option(help="of the rubber at the start of each bag [degC], or 'air': the first recorded air")
     ] = None,
+    jobs: Jobs = 1,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
-    """Run the estimator over recorded bags: a bag with the output topics beside the inputs, a summary, a picture."""
+    """Run the estimator over recorded bags.
+
+    Writes a bag with the output topics beside the inputs, a page, a picture and a summary."""
+    from lugre_steering.bag.find import find
     from lugre_steering.estimator import Options
     from lugre_steering.live.table import read_options
-    from lugre_steering.replay.run import describe
+    from lugre_steering.replay.result import facts, gate
     from lugre_steering.replay.run import replay as run
+    from lugre_steering.replay.table import show_replay
 
+    wanted = gate(fail_on or ())
     options = read_options(parameters) if parameters is not None else Options()
     if horizon is not None:
         options = replace(options, feed_forward_horizon_s=horizon)
+    found = find(bags, out)
     with progress_bar() as progress:
-        result = run(bags, vehicle, out, options, progress, initial_temperature)
+        result = run(found.bags, vehicle, out, options, progress, initial_temperature, jobs=jobs, skipped=found.skipped)
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:
+        say_skipped((one["bag"], one["reason"]) for one in result["skipped"])
         print_json(result)
     else:
-        print("\n".join([*describe(result), f"results in {out}"]))
+        show_replay(output(), result)
+        print(f"results in {out}")
+    leave_if(wanted.failures(facts(result)))
 
 
 @command()
@@ -226,8 +288,9 @@ def simulate(
     seed: Annotated[int | None, typer.Option(help="seed of noise and jitter [0]")] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a manoeuvre into a bag labelled synthetic, or reproduce the published experiments (exit code 1 if one
-    fails)."""
+    """Simulate a manoeuvre, or the published experiments.
+
+    A manoeuvre becomes a bag labelled synthetic; experiments leave with exit code 1 if one fails."""
     from lugre_steering.simulate import command as simulation
 
     if show_list:
@@ -268,7 +331,9 @@ def vehicle_(
     yes: Annotated[bool, typer.Option("--yes", help="with --new: ask nothing, take every value that is proposed")] = False,
     as_json: Json = False,
 ) -> None:
-    """Check a vehicle file, and say what it amounts to: loads, friction, heat, inputs and effects; or begin one."""
+    """Check a vehicle file and say what it amounts to, or begin one.
+
+    Loads, friction, heat, inputs and effects."""
     from lugre_steering.sheet.derived import derive
     from lugre_steering.sheet.show import draw_footprint, show_vehicle
     from lugre_steering.vehicle import load
@@ -298,7 +363,9 @@ def import_(
     storage: Annotated[str, typer.Option(help="mcap or sqlite3")] = "mcap",
     as_json: Json = False,
 ) -> None:
-    """Turn a table into a bag with the standard topics; counts rates, gaps and outliers, repairs nothing."""
+    """Turn a table of any logger into a bag.
+
+    The bag has the standard topics; rates, gaps and outliers are counted, nothing is repaired."""
     from lugre_steering.importing.propose import propose as write_map
     from lugre_steering.importing.show import show_import, show_proposal
     from lugre_steering.importing.write import import_table
@@ -324,18 +391,25 @@ def calibrate(
         list[str] | None, typer.Option(help="NAME=SHARE: relative standard deviation of the sheet [0.15]; repeatable")
     ] = None,
     no_prior: Annotated[bool, typer.Option("--no-prior", help="let the data alone decide")] = False,
+    jobs: Threads = None,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
-    """Fit the baseline parameters that a vehicle sheet may have wrong, all bags together: a vehicle file, intervals,
-    and what the data cannot tell."""
+    """Fit the parameters of a vehicle file to bags.
+
+    All bags together: a new vehicle file, intervals, and what the data cannot tell."""
+    from lugre_steering.bag.find import find
     from lugre_steering.calibration import calibrate as run
+    from lugre_steering.calibration.result import facts, gate
     from lugre_steering.calibration.table import parse_priors, show_calibration
 
     if no_prior and prior:
         raise DataError("--no-prior: leaves no use for --prior; expected one of them")
+    wanted, found = gate(fail_on or ()), find(bags, out)
+    use_threads(jobs)
     with spinner() as progress:
         result = run(
-            bags,
+            found.bags,
             vehicle,
             out,
             free=free or (),
@@ -343,35 +417,156 @@ def calibrate(
             prior=parse_priors(prior or ()),
             priors=not no_prior,
             progress=progress,
+            skipped=found.skipped,
         )
     if as_json:
         print_json(result)
     else:
         show_calibration(output(), result)
         print(f"results in {out}")
+    leave_if(wanted.failures(facts(result)))
 
 
 @command()
 def diagnose(
-    bags: Bags,
     vehicle: VehicleFile,
     out: OutFolder,
+    bags: BagsOrNone = None,
+    window: Annotated[
+        list[Path] | None, typer.Option(help="window file that the live node wrote when the model no longer matched; may be given again")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the noise draws and bootstraps")] = 1,
     material: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,
     report: Annotated[bool, typer.Option(help="write report.html and pictures")] = True,
+    exit_code: Annotated[
+        bool, typer.Option("--exit-code", help="leave with 3 for missing, 4 for unlisted physics, 5 for insufficient data")
+    ] = False,
+    jobs: Threads = None,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
-    """Say which physics the model leaves out: locate, name, model it, and show the gain on held-out data."""
-    from lugre_steering.diagnosis.command import STEPS, run
+    """Say which physics the model leaves out.
 
+    Locates, names and models it, and shows the gain on held-out data."""
+    from lugre_steering.bag.find import find
+    from lugre_steering.diagnosis.command import STEPS, run
+    from lugre_steering.diagnosis.result import facts, gate
+    from lugre_steering.diagnosis.show import EXIT_CODES, show_diagnosis
+
+    wanted, found = gate(fail_on or ()), find(bags or [], out)
+    use_threads(jobs)
     with step_bar(STEPS) as progress:
-        result = run(bags, vehicle, out, seed=seed, material=material, report=report, progress=progress)
+        result = run(
+            found.bags, vehicle, out, seed=seed, material=material, report=report, windows=window or [], progress=progress,
+            skipped=found.skipped,
+        )  # fmt: skip
     if as_json:
-        print_json(result)
+        print_json(result.json)
     else:
-        print(f"{result['verdict']}: {result['statement']}\nresults in {out}")
+        show_diagnosis(output(), result)
+        print(f"results in {out}" + (", for people in report.html" if report else ""))
+    leave_if(wanted.failures(facts(result.json)))
+    if exit_code:
+        raise typer.Exit(EXIT_CODES[result.verdict])
+
+
+@command()
+def fleet(
+    bags: Bags,
+    vehicle: Annotated[Path, typer.Option("--vehicle", help="vehicle file, or map of vehicles to patterns of their bags (YAML)")],
+    out: OutFolder,
+    diagnose: Annotated[bool, typer.Option(help="diagnose each recording, beside check and replay")] = True,
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="local processes [one per processor]")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler whose workers do it, e.g. tcp://host:8786")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the noise draws, bootstraps and permutations")] = 1,
+    fail_on: FailOn = None,
+    as_json: Json = False,
+) -> None:
+    """Examine many recordings of many vehicles together.
+
+    Checks, replays and diagnoses each, and judges all of them on one budget of false discoveries; killed, it goes on where it was."""
+    from lugre_steering.bag.find import find
+    from lugre_steering.fleet.command import show_fleet
+    from lugre_steering.fleet.result import facts, gate
+    from lugre_steering.fleet.run import run
+    from lugre_steering.fleet.work import Options
+
+    wanted, found = gate(fail_on or ()), find(bags, out)
+    with progress_bar() as progress:
+        done = run(
+            found.bags, vehicle, out, options=Options(diagnose, seed), jobs=jobs, scheduler=scheduler, skipped=found.skipped,
+            progress=progress,
+        )  # fmt: skip
+    if as_json:
+        print_json(done.json)
+    else:
+        show_fleet(output(), done.json, out)
+        print(f"results in {out}, report: {out / 'report.html'}")
+    leave_if(wanted.failures(facts(done.json)))
+
+
+@command()
+def play(
+    bag: Annotated[Path, typer.Argument(help="rosbag2 folder or file")],
+    rate: Annotated[
+        float, typer.Option(min=0.01, max=1000.0, help="times as fast as recorded; stamps keep their distances, and the node says so")
+    ] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="again and again, until interrupted")] = False,
+    recorded_stamps: Annotated[bool, typer.Option("--recorded-stamps", help="leave the header stamps as they are")] = False,
+    as_json: Json = False,
+) -> None:
+    """Publish a bag on ROS topics, in its own timing.
+
+    Its stamps are moved to now; what an estimator had published is left out."""
+    from lugre_steering.live.available import need_ros
+
+    need_ros("play")
+    from lugre_steering.live.play import play as run
+
+    with progress_bar() as progress:
+        done = run(bag, rate=rate, loop=loop, recorded_stamps=recorded_stamps, progress=progress)
+    for topic, reason in done.left_out.items():
+        print(f"lugre-steering: not published: {topic}: {reason}", file=sys.stderr)
+    print_json(done) if as_json else print(f"{done.messages.total()} messages on {len(done.messages)} topics")
+
+
+@command()
+def watch(
+    node_name: Annotated[str, typer.Option("--node", help="name of the node, with its namespace")] = "/steering_torque_estimator",
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="leave after this time [until interrupted]")] = None,
+) -> None:
+    """Show a live estimator in the terminal.
+
+    Torque, residual, angles, temperatures, their last minute, and its health."""
+    from lugre_steering.live.available import need_ros
+
+    need_ros("watch")
+    from lugre_steering.live.watch import watch as run
+    from lugre_steering.live_view import showing
+
+    with showing(output()) as show:
+        run(show, node_name, float("inf") if seconds is None else seconds)
+
+
+@command()
+def node(
+    vehicle: VehicleFile,
+    parameters: Annotated[Path | None, typer.Option(help="parameter file (YAML)")] = None,
+    setting: Annotated[list[str] | None, typer.Option("--set", "-p", help="NAME:=VALUE of a parameter; repeatable")] = None,
+    remap: Annotated[list[str] | None, typer.Option("--remap", "-r", help="FROM:=TO of a topic; repeatable")] = None,
+) -> None:
+    """Start the live estimator; Ctrl-C ends it.
+
+    The same node as that of 'ros2 run lugre_steering estimator'."""
+    from lugre_steering.live.available import need_ros
+
+    need_ros("node")
+    from lugre_steering.node import arguments_of
+    from lugre_steering.node import main as run
+
+    raise typer.Exit(run(arguments_of(vehicle, parameters, setting or (), remap or ())))
 
 
 @command()
@@ -386,7 +581,9 @@ def effects(
     to: Annotated[Path, typer.Option(help="file of effects of your own that it is kept in, for --effects")] = Path("own_physics.yaml"),
     as_json: Json = False,
 ) -> None:
-    """List the physics that diagnosis knows, explain one effect (law, source, parameters, how it shows), or keep a law that was found."""
+    """List or explain the physics that diagnosis knows.
+
+    One effect: law, source, parameters, how it shows. With --add a law that was found is kept under a name."""
     from lugre_steering.diagnosis import effect_card as card
     from lugre_steering.effects import registry
 
@@ -426,7 +623,9 @@ def prove(
     peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hide physics in recordings of two other simulators, diagnose them blind, and score the answers."""
+    """Score diagnosis on physics hidden from it.
+
+    Hides effects in recordings of two other simulators, diagnoses them blind and scores the answers."""
     from lugre_steering.proof.command import run
     from lugre_steering.proof.table import show_board
 
@@ -442,9 +641,34 @@ def prove(
         print(f"results in {out}")
 
 
+@command()
+def config(
+    option: Annotated[str, typer.Argument(help="name of an option (vehicle), or of that of one command (diagnose.seed)")] = "",
+    value: Annotated[str, typer.Argument(help="what it shall be where it is not given")] = "",
+    unset: Annotated[bool, typer.Option("--unset", help="forget this default")] = False,
+    as_json: Json = False,
+) -> None:
+    """Show, save or forget defaults of options.
+
+    Such as the vehicle file: lugre-steering config vehicle truck.yaml; --unset forgets it."""
+    saved = defaults.load()
+    if unset:
+        saved.pop(option, None)
+        defaults.save(saved)
+    elif option:
+        saved[option] = defaults.checked(option, value, _options_of_commands())
+        defaults.save(saved)
+    if as_json:
+        print_json({"file": defaults.file(), "defaults": saved})
+    else:
+        lines = [f"{defaults.file()}:", *(f"  {key} = {kept}" for key, kept in saved.items())]
+        print("\n".join(lines) if saved else "no defaults are saved")
+
+
 def main() -> None:
     """Entry point of ``lugre-steering``."""
-    app()
+    forgive_letters()
+    app(prog_name="lugre-steering")
 
 
 if __name__ == "__main__":

@@ -171,25 +171,31 @@ def read_text(file: Path, longest: int) -> str:
 def output_folder(out: Path) -> Iterator[Path]:
     """The folder ``out`` for this run alone, made if it is not there, without what killed runs left in it.
 
-    ``DataError`` if another run is writing there or the folder cannot be written. A folder made for a run that fails
-    is taken away again if it is empty.
+    ``DataError`` if another run is writing there or the folder cannot be written. Folders made for a run that fails
+    are taken away again if they are empty.
     """
-    new = not out.exists()
+    made = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         out.mkdir(parents=True, exist_ok=True)
         descriptor = _locked(out)
     except OSError as error:
+        _take_away_empty(made)
         raise DataError(f"{out}: cannot be written ({error.strerror or error}); expected a writable folder") from error
     try:
         _clear_dead(out)
         yield out
     except BaseException:
         _unlock(out, descriptor)
-        if new:
-            with suppress(OSError):
-                out.rmdir()
+        _take_away_empty(made)
         raise
     _unlock(out, descriptor)
+
+
+def _take_away_empty(folders: Iterable[Path]) -> None:
+    """From the innermost outwards."""
+    with suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
 
 
 def _locked(out: Path) -> int:

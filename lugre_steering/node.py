@@ -7,11 +7,23 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 
 HELP = """usage: estimator --ros-args -p vehicle_file:=FILE [-p NAME:=VALUE ...] [--params-file FILE] [-r FROM:=TO ...]
 
 The live steering torque estimator. Its parameters: ros2 param describe /steering_torque_estimator NAME, while it runs;
 topics and a parameter file to copy: docs/ros.md of lugre_steering."""
+
+
+def arguments_of(vehicle: Path, parameters: Path | None, settings: Sequence[str], remaps: Sequence[str]) -> list[str]:
+    """The node's arguments as ROS reads them; what is set by name stands above the file."""
+    chosen = ["--params-file", str(parameters)] if parameters is not None else []
+    for value in (f"vehicle_file:={vehicle}", *settings):
+        chosen += ["-p", value]
+    for rule in remaps:
+        chosen += ["-r", rule]
+    return ["estimator", "--ros-args", *chosen]
 
 
 def main(args: list[str] | None = None) -> int:

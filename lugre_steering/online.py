@@ -15,6 +15,7 @@ from lugre_steering.vehicle.model import baseline_parameters
 
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3
+BROKEN_S = 0.5  # a curve is broken where nothing came for longer than this
 LARGE_SHARE = 0.7
 ALIKE, WRONG_TIMES, UNIT_TIMES = 0.85, 1.6, 30.0
 """Correlation about zero from which measured and estimated torque have one shape, the factor between them that no nominal value and
@@ -230,3 +231,11 @@ class Curves:
         filled = np.flatnonzero(np.isfinite(self._low).any(axis=0))
         middle: Array = (filled + 0.5).astype(np.float64) * self.bin_s
         return middle, self._low[:, filled], self._high[:, filled]
+
+    def lines(self) -> tuple[Array, Array]:
+        """Time (m,) and curves (k, m) that go through the smallest and largest value of every bin; NaN breaks them."""
+        middle, low, high = self.bins()
+        both = np.stack([low, high], axis=-1).reshape(len(low), -1)
+        time = np.repeat(middle, 2)
+        breaks = 2 * (np.flatnonzero(np.diff(middle) > max(BROKEN_S, 2.0 * self.bin_s)) + 1)
+        return np.insert(time, breaks, np.nan), np.insert(both, breaks, np.nan, axis=1)

@@ -16,11 +16,12 @@ from typing import Annotated, Any, Literal, Union
 from lugre_steering.calibration.result import Calibration
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.errors import LugreSteeringError
+from lugre_steering.fleet.result import Fleet
 from lugre_steering.replay.result import Replay
 from lugre_steering.result import folder_for
 from lugre_steering.serialise import as_json, written
 
-FILES: Mapping[str, type] = {"diagnosis": Diagnosis, "calibration": Calibration, "summary": Replay}
+FILES: Mapping[str, type] = {"diagnosis": Diagnosis, "calibration": Calibration, "summary": Replay, "fleet": Fleet}
 """Result files by the stem of their name."""
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _SIMPLE: dict[Any, dict[str, Any]] = {

@@ -25,7 +25,7 @@ COORDINATES = {
 }  # fmt: skip
 """Axes along which residuals are drawn and effects told, with the units of a steered track."""
 
-_PROSE = frozenset({"statement", "description", "formula", "manoeuvre", "why", "coordinate", "unit"})
+_PROSE = frozenset({"statement", "headline", "description", "formula", "manoeuvre", "why", "coordinate", "unit"})
 """Keys of the diagnosis that hold words; names, topics and bags are left as they are."""
 
 

@@ -7,6 +7,7 @@ import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ["LUGRE_STEERING_CONFIG"] = "/nowhere/defaults.yaml"  # what a developer has saved changes no test
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LUGRE_STEERING_THREADS", "1")
 
@@ -14,7 +15,6 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 OPEN = (
     "test_readme.py::test_the_sentence_of_the_bundled_pair",
     "test_readme.py::test_the_shipped_pictures_are_those_of_today",
-    "test_live_trust.py::",
 )
 """Tests known to fail since the last merge of many changes, each to be mended before anything else is built."""
 

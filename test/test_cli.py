@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import codecs
+import inspect
 import json
 import os
 import subprocess
@@ -179,3 +181,95 @@ def test_a_vehicle_sheet_of_a_rig_has_its_units_and_no_footprint(tmp_path: Path)
     assert refused.returncode == 2
     assert "axle" in refused.stderr
     assert not (tmp_path / "sheet").exists()
+
+
+# ----------------------------------------------------------------- help, letters, defaults
+
+
+@pytest.mark.parametrize("module", ["lugre_steering", "lugre_steering.cli"])
+def test_it_runs_as_a_module_and_h_helps(tmp_path: Path, module: str) -> None:
+    command = [sys.executable, "-m", module, "simulate", "-h"]
+    done = subprocess.run(command, cwd=tmp_path, env={**ENVIRONMENT, "COLUMNS": "80"}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("Usage: lugre-steering simulate")
+    words = " ".join(done.stdout.split())
+    for kept in ("mcap or sqlite3 [mcap]", "sampling instants [s]", "deg [as the vehicle's sensors section]"):
+        assert kept in words
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_help_of_every_option_is_whole() -> None:
+    """Square brackets of units and defaults are text, in every help there is."""
+    from typer.testing import CliRunner
+
+    from lugre_steering import cli
+
+    for registered in cli.app.registered_commands:
+        name = registered.name or registered.callback.__name__  # type: ignore[union-attr]
+        shown = " ".join(CliRunner().invoke(cli.app, [name, "--help"], env={"COLUMNS": "80"}).stdout.split())
+        for parameter in inspect.signature(registered.callback, eval_str=True).parameters.values():  # type: ignore[arg-type]
+            for info in getattr(parameter.annotation, "__metadata__", ()):
+                assert "[" not in info.help or info.help.split("[")[1][:3] in shown, info.help
+
+
+@pytest.mark.parametrize("arguments", [("effects", "end_stop"), ("vehicle", VEHICLE), ("simulate", "--list"), ("effects", "--help")])
+def test_terminals_that_know_ascii_only_get_near_letters(tmp_path: Path, arguments: tuple[str | Path, ...]) -> None:
+    environment = {**ENVIRONMENT, "PYTHONIOENCODING": "ascii", "LC_ALL": "C", "COLUMNS": "80"}
+    command = [sys.executable, "-m", "lugre_steering", *map(str, arguments)]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.isascii()
+    assert len(done.stdout) > 500
+
+
+def test_the_nearest_letters() -> None:
+    from lugre_steering.terminal import nearest
+
+    codecs.register_error("test.nearest", nearest)
+    assert "1\u2009750 … 2 → 3 Ω".encode("ascii", "test.nearest") == b"1 750 ... 2 -> 3 ?"
+
+
+def test_the_list_of_effects_fits_80_columns_and_one_screen_or_so(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "lugre_steering", "effects"]
+    done = subprocess.run(command, cwd=tmp_path, env={**ENVIRONMENT, "COLUMNS": "80"}, capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert len(lines) < 60
+    assert max(map(len, lines)) <= 80
+
+
+def test_saved_defaults_stand_in_for_options(bag: Path, tmp_path: Path) -> None:
+    environment = {key: value for key, value in ENVIRONMENT.items() if key != "LUGRE_STEERING_CONFIG"}
+    environment["XDG_CONFIG_HOME"] = str(tmp_path / "etc")
+
+    def tool(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "lugre_steering", *map(str, arguments)]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+
+    assert tool("config").stdout == "no defaults are saved\n"
+    (tmp_path / "own.yaml").write_text(VEHICLE.read_text().replace("rubber_dma", f"{VEHICLE.parent}/rubber_dma"))
+    assert tool("config", "vehicle", "own.yaml").returncode == 0
+    assert tool("config", "diagnose.seed", "7").returncode == 0
+    saved = json.loads(tool("config", "--json").stdout)["defaults"]
+    assert saved == {"vehicle": str(tmp_path / "own.yaml"), "diagnose.seed": 7}
+    done = tool("replay", bag, "--out", "out")  # no --vehicle
+    assert (done.returncode, done.stderr) == (0, "")
+    given = tool("replay", bag, "--out", "out", "--vehicle", "absent.yaml")
+    assert (given.returncode, "absent.yaml" in given.stderr) == (2, True)  # what is given counts
+    for wrong in (("diagnose.seed", "x"), ("nothing", "1"), ("replay.seed", "1"), ("vehicle",)):
+        refused = tool("config", *wrong)
+        assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    assert tool("config", "vehicle", "--unset").returncode == 0
+    assert "Missing option" in tool("replay", bag, "--out", "out").stderr
+    (tmp_path / "etc" / "lugre_steering" / "defaults.yaml").write_text("colour: red\n")
+    broken = tool("effects")
+    assert (broken.returncode, len(broken.stderr.splitlines())) == (2, 1)
+    assert "colour" in broken.stderr
+    assert tool("config", "colour", "--unset").returncode == 0  # the way out that it names
+    assert tool("effects").returncode == 0
+
+
+def test_completion_is_offered(tmp_path: Path) -> None:
+    environment = {**ENVIRONMENT, "_LUGRE_STEERING_COMPLETE": "complete_bash", "COMP_WORDS": "lugre-steering diag", "COMP_CWORD": "1"}
+    command = [sys.executable, "-m", "lugre_steering"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["diagnose"]

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lugre_steering.bench.neighbour import Strokes
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
@@ -150,6 +151,73 @@ def test_a_parked_vehicle_whose_pressures_leak_away_is_not_frozen() -> None:
         estimator.push(1, T0 + i * PERIOD_NS - 1, 20e3 * math.exp(-i / 6000.0))
         rows = estimator.push(0, T0 + i * PERIOD_NS, 0.1)[0]
         assert not [row for row in rows if "angle frozen" in doubts(row)]
+
+
+def torque_doubts(
+    change: Callable[[float, int, float], float], seconds: float = 8.5, begin_s: float = 6.0
+) -> list[tuple[float, tuple[str, ...]]]:
+    """Since when [s] which doubts stand, in a drive whose line pressures are the plant's; ``change`` of (time, line, pressure)
+    from 6 s (or sooner) to 7.5 s."""
+    strokes, estimator, rng = Strokes(VEHICLE), Estimator(VEHICLE), np.random.default_rng(2)
+    found: list[tuple[float, tuple[str, ...]]] = []
+    for i in range(round(seconds * 100)):
+        t = 0.01 * i
+        values = strokes.at(t + 0.9).tolist()
+        for channel, value in enumerate(values[:6]):
+            reading = value + (SIGMA if channel < 2 else 1.5e4) * float(rng.standard_normal())
+            if channel >= 2 and begin_s <= t < 7.5:
+                reading = change(t, channel, reading)
+            for row in estimator.push(channel, T0 + i * PERIOD_NS, reading)[0]:
+                if not found or tuple(doubts(row)) != found[-1][1]:
+                    found.append((t, tuple(doubts(row))))
+    return found
+
+
+def first_value() -> Callable[[float, int, float], float]:
+    kept: dict[int, float] = {}
+    return lambda _t, line, value: kept.setdefault(line, value)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda _t, _line, value: 1e-5 * value, "residual implausible"),
+        (lambda _t, _line, value: -value, "residual implausible"),
+        (first_value(), "pressure frozen"),
+    ],
+)
+def test_pressures_that_cannot_be_are_told_within_a_fifth_of_a_second_and_forgotten_within_one(
+    change: Callable[[float, int, float], float], reason: str
+) -> None:
+    after_start = [(t, told) for t, told in torque_doubts(change) if t > 2.0]
+    begins, told = after_start[0]
+    assert reason in told
+    assert 6.0 <= begins < 6.2
+    ends, left = after_start[-1]
+    assert left == ()
+    assert 7.5 <= ends < 8.5
+
+
+def test_sound_pressures_raise_no_doubt() -> None:
+    assert [told for t, told in torque_doubts(lambda _t, _line, value: value, 20.0) if t > 2.0] == []
+
+
+def test_pressures_of_a_coarse_sensor_are_not_frozen() -> None:
+    held = torque_doubts(lambda _t, _line, value: 5e4 * round(value / 5e4), 7.0, 0.0)
+    assert all("pressure frozen" not in told for _t, told in held)
+
+
+def test_a_jump_is_believed_soon_where_the_measured_torque_speaks_for_it() -> None:
+    """Stamps of both angles and pressures 0.5 s behind, from then on: the angle has jumped and stays plausible."""
+    strokes, estimator, rng = Strokes(VEHICLE), Estimator(VEHICLE, Options(max_rate_rad_s=2.0)), np.random.default_rng(2)
+    doubted = []
+    for i in range(900):
+        t = 0.01 * i
+        for channel, value in enumerate(strokes.at(t + 0.8 + (0.5 if t >= 6.0 else 0.0)).tolist()[:6]):
+            reading = value + (SIGMA if channel < 2 else 1.5e4) * float(rng.standard_normal())
+            doubted += [t for row in estimator.push(channel, T0 + i * PERIOD_NS, reading)[0] if doubts(row) and t > 2.0]
+    assert 6.0 <= doubted[0] < 6.05
+    assert doubted[-1] < 7.0
 
 
 def test_limits_of_value_and_rate_hold() -> None:

@@ -213,14 +213,15 @@ def test_picture_is_a_png(double_cycle: tuple[Path, dict[str, Any]]) -> None:
     assert (out / f"{DOUBLE_CYCLE.name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_again_into_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_again_into_the_same_folder_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1790000000")  # else every result says when it was made
     bag = make.write(tmp_path / "run", drive())
-    files = ("run/run.mcap", "run/metadata.yaml", "summary.json", "run.png")
+    files = ("run/run.mcap", "run/metadata.yaml", "summary.json", "run.png", "run.html")
     replay([bag], VEHICLE, tmp_path / "out")
     first = [(tmp_path / "out" / file).read_bytes() for file in files]
     replay([bag], VEHICLE, tmp_path / "out")
     assert [(tmp_path / "out" / file).read_bytes() for file in files] == first
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["run", "run.png", "summary.json"]
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["run", "run.html", "run.png", "summary.json"]
 
 
 # ------------------------------------------------------------ feed-forward
@@ -567,7 +568,7 @@ def test_a_file_put_into_an_earlier_result_is_never_deleted(tmp_path: Path, monk
     with pytest.raises(BagError, match=f"{notes}: exists and is not an earlier result"):
         replay([bag], VEHICLE, tmp_path / "out")
     assert notes.read_text() == "mine"
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"run", "run.png", "summary.json"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"run", "run.html", "run.png", "summary.json"}
 
 
 def test_a_picture_put_in_the_place_of_ours_is_never_replaced(tmp_path: Path) -> None:

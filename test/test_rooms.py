@@ -57,7 +57,7 @@ def test_arrows_point_one_way(folders: bool) -> None:
 
 def test_the_chain_knows_no_vehicle_file_and_the_report_no_program() -> None:
     assert arrows(folders=True)["chain"] <= {"errors", "recording"}
-    assert arrows(folders=True)["report"] <= {"errors", "files", "recording", "units", "vehicle"}
+    assert arrows(folders=True)["report"] <= {"errors", "files", "provenance", "recording", "units", "vehicle"}
 
 
 @pytest.mark.parametrize("effect", CATALOGUE)

@@ -22,6 +22,11 @@ def each(data: Given | Sequence[Given]) -> list[Given]:
     return [data] if isinstance(data, (str, Path, Recording)) else list(data)
 
 
+def files(data: Given | Sequence[Given]) -> list[Path]:
+    """The paths among them."""
+    return [Path(item) for item in each(data) if not isinstance(item, Recording)]
+
+
 def given_recordings(
     data: Given | Sequence[Given], channels: Sequence[Channel], progress: Callable[[str], None] = lambda _: None
 ) -> list[Recording]:

@@ -31,7 +31,7 @@ MESSAGE_TYPE = {
     Kind.AIR_TEMPERATURE: cdr.TEMPERATURE,
     Kind.TORQUE: cdr.WRENCH_STAMPED,
 }
-_SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
+SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 _TOPICS_LIMIT = 5_000  # no vehicle has as many; each costs time and memory with every block
 _LONGEST = 1 << 20  # bytes of a message of one of these types, with thousands of joints
 _PEEK = 500_000  # messages looked at to find which topic carries a joint
@@ -108,7 +108,7 @@ class Bag:
             if not self.path.is_file():
                 raise BagError(f"{self.path}: neither a file nor a folder (a pipe or device?)")
             return [self.path]
-        found = sorted(f for f in self.path.iterdir() if f.is_file() and f.name.endswith(_SUFFIXES))
+        found = sorted(f for f in self.path.iterdir() if f.is_file() and f.name.endswith(SUFFIXES))
         listed: list[Path] = []
         file = self.path / "metadata.yaml"
         if os.path.isfile(file):
@@ -354,7 +354,7 @@ def bag_name(path: Path) -> str:
     absolute = Path(os.path.abspath(path))  # not resolved: a link is known by its own name
     if absolute.is_dir():
         return absolute.name
-    endings = [ending for ending in _SUFFIXES if absolute.name.endswith(ending)]
+    endings = [ending for ending in SUFFIXES if absolute.name.endswith(ending)]
     return absolute.name.removesuffix(endings[0]) if endings else absolute.stem
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Literal, Protocol
 
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import yaml
 from numpy.lib.stride_tricks import sliding_window_view
@@ -35,6 +36,7 @@ from lugre_steering.recording import IntArray
 
 VERSION = 9  # of metadata.yaml, ROS 2 Jazzy
 _CHUNK_BYTES = 1 << 20
+_LEVEL = 3  # of LZ4: a quarter in place of a third of the size, for three times the time; more gains nothing
 _TOPICS_LIMIT = (1 << 16) - 1  # MCAP numbers them from 1 with 16 bits
 
 
@@ -98,6 +100,8 @@ class BagWriter:
         folder: str | Path,
         storage: Literal["mcap", "sqlite3"] = "mcap",
         custom_data: Mapping[str, str] | None = None,
+        *,
+        compressed: bool = False,
     ) -> None:
         self.folder = Path(folder)
         self._custom_data = dict(custom_data or {})
@@ -113,7 +117,7 @@ class BagWriter:
             raise BagError(f"{self.folder}: cannot be written ({error})") from error
         try:
             self._file = self.folder / f"{self.folder.name}.{'mcap' if storage == 'mcap' else 'db3'}"
-            self._storage: _Storage = _McapStorage(self._file) if storage == "mcap" else _SqliteStorage(self._file)
+            self._storage: _Storage = _McapStorage(self._file, compressed) if storage == "mcap" else _SqliteStorage(self._file)
         except (OSError, sqlite3.Error) as error:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise BagError(f"{self.folder}: cannot be written ({error})") from error
@@ -302,11 +306,12 @@ def _text(text: str) -> bytes:
 
 
 class _McapStorage:
-    """MCAP with the ros2 profile, chunked, indexed, with checksums, not compressed (rosbag2's own default)."""
+    """MCAP with the ros2 profile, chunked, indexed, with checksums; plain (rosbag2's own default) or with chunks packed by LZ4."""
 
     head = mcap.MESSAGE_HEAD.itemsize
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, compressed: bool) -> None:
+        self._codec = "lz4" if compressed else ""
         self._file: BinaryIO = path.open("xb")
         self._schemas: dict[str, tuple[int, bytes]] = {}
         self._channels: dict[int, bytes] = {}
@@ -354,9 +359,10 @@ class _McapStorage:
     def _write_chunk(self, data: Bytes, channel: NDArray[np.uint16], log_ns: IntArray, offset: IntArray) -> None:
         first, last = int(log_ns[0]), int(log_ns[-1])
         raw = data.tobytes()
+        packed = lz4.frame.compress(raw, compression_level=_LEVEL, block_size=lz4.frame.BLOCKSIZE_MAX1MB) if self._codec else raw
         position = self._file.tell()
-        head = struct.pack("<QQQI", first, last, len(raw), zlib.crc32(raw)) + _text("") + struct.pack("<Q", len(raw))
-        length = self._file.write(_record(mcap_records.CHUNK, head, raw))
+        head = struct.pack("<QQQI", first, last, len(raw), zlib.crc32(raw)) + _text(self._codec) + struct.pack("<Q", len(packed))
+        length = self._file.write(_record(mcap_records.CHUNK, head, packed))
         index, places = [], []
         at = position + length
         for number in np.unique(channel).tolist():
@@ -368,7 +374,7 @@ class _McapStorage:
             self._counts[number] += int(of_channel.sum())
         self._file.write(b"".join(index))
         content = struct.pack("<QQQQI", first, last, position, length, 10 * len(places)) + b"".join(places)
-        content += struct.pack("<Q", at - position - length) + _text("") + struct.pack("<QQ", len(raw), len(raw))
+        content += struct.pack("<Q", at - position - length) + _text(self._codec) + struct.pack("<QQ", len(packed), len(raw))
         self._chunks.append(_record(mcap_records.CHUNK_INDEX, content))
         self._span = (min(self._span[0], first), max(self._span[1], last))
 

@@ -17,7 +17,9 @@ rmse_Nm             of ``sheet`` and ``calibrated`` vehicle on all samples, and 
 heldout_rmse_Nm     of ``sheet`` and ``calibrated`` on stretches that this extra fit did not see
 undetermined        combinations that the data leave open: ``parts``, ``data_over_sheet``, ``statement``
 assumed             sheet values taken as exact: relative change of each parameter per relative error of it
+per_bag             list: ``bag``, ``duration_s``, ``samples``, RMSE of ``sheet`` and ``calibrated`` vehicle
 data_quality        findings of the reader and of the checks of the sensors, per bag
+provenance          version, date, options, and the SHA-256 of the vehicle file and of every file of the bags
 statement           one paragraph
 ==================  ===============================================================================================
 """
@@ -25,7 +27,7 @@ statement           one paragraph
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from typing import Any, Literal
@@ -233,7 +235,17 @@ def _summed_up(
         statement=units.words(problem.vehicle, first + statement(rows, rmse, held, weak, assumed)),
         calibrated=calibrated,
         seen=seen_range(problem),
+        per_bag=tuple(_per_bag(problem, fitted)),
     )
+
+
+def _per_bag(problem: Problem, fitted: Estimate) -> Iterator[result.BagErrors]:
+    """How well sheet and calibrated vehicle explain each recording."""
+    sheet = problem.measured - problem.predict_all(problem.start())
+    for bag, run in enumerate(problem.runs):
+        used = (problem.bag == bag) & (fitted.weight > 0.0)
+        errors = [_rms(left[used]) if used.any() else None for left in (sheet, fitted.residual)]
+        yield result.BagErrors(run.name, float(run.time[-1] - run.time[0]), int(used.sum()), *errors)
 
 
 def _fitted_errors(problem: Problem, fitted: Estimate) -> result.FittedErrors:

@@ -9,13 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lugre_steering.bag import read_recordings
+from lugre_steering.bag.batch import read_of_machine
+from lugre_steering.bag.find import Skipped
 from lugre_steering.calibration import result
 from lugre_steering.calibration.calibrate import Calibrated, calibrate_recordings, chosen
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.report.available import no_pictures
-from lugre_steering.vehicle import load, save
+from lugre_steering.vehicle import load
 
 FILES = (result.VEHICLE, "calibration.png")
 """What is written beside the record."""
@@ -31,25 +33,37 @@ def calibrate(
     prior: Mapping[str, float] | None = None,
     priors: bool = True,
     progress: Callable[[str], None] = lambda _: None,
+    skipped: Sequence[Skipped] = (),
 ) -> dict[str, Any]:
     """Fit the vehicle file to the bags; write calibrated.yaml, calibration.json and calibration.png into ``out``.
 
     Returns the content of calibration.json. ``free`` adds ``kingpin_arm`` or ``pressure_gain`` to the fitted values,
     ``fix`` keeps some at the sheet, ``prior`` gives relative standard deviations of sheet values.
+    ``skipped``: what has been left out before; of several bags, those of other machines are left out too. Both are told among the
+    findings about the data.
     """
     vehicle = load(vehicle_file)
     calibrations = chosen(vehicle, free, fix, prior or {})
+    options = {"free": free, "fix": fix, "prior": prior or {}, "priors": priors}
     with output_folder(out):
         earlier_result(out, result.RECORD, result.SCHEMA, FILES, vehicle_file)
-        recordings = read_recordings(bags, vehicle.channels, progress)
+        recordings, others = read_of_machine(bags, vehicle.channels, progress)
         done = calibrate_recordings(recordings, vehicle, calibrations, priors=priors, progress=progress)
-        found = replace(done.calibration, bags=tuple(str(bag) for bag in bags), vehicle=str(vehicle_file))
+        left = {one.bag for one in others}
+        used = [bag for bag in bags if str(bag) not in left]
+        found = replace(
+            done.calibration,
+            bags=tuple(str(bag) for bag in used),
+            vehicle=str(vehicle_file),
+            data_quality=(*(one.finding() for one in (*skipped, *others)), *done.calibration.data_quality),
+            provenance=made("calibrate", options, vehicle_file, used),
+        )
         progress("writing")
         try:
             for name in FILES:  # of an earlier run: they would not belong to this record
                 (out / name).unlink(missing_ok=True)
-            save(found.with_provenance(), out / result.VEHICLE)
-            picture, note = _picture(done, out / "calibration.png")
+            found.write_vehicle(out)
+            picture, note = _picture(replace(done, calibration=found), out / "calibration.png")
             found = replace(found, picture=picture, picture_note=note)
             write_record(found.json, out / result.RECORD)
         except OSError as error:

@@ -27,7 +27,7 @@ def draw_calibration(done: Calibrated, file: Path) -> None:
     if len(problem.runs) > len(runs):
         caption += f" {len(problem.runs) - len(runs)} more bags were fitted and are not drawn."
     with figure(
-        1 + 2 * len(runs), 1, caption, file, row_inches=2.1, words=partial(units.words, problem.vehicle)
+        1 + 2 * len(runs), 1, caption, file, row_inches=2.1, words=partial(units.words, problem.vehicle), made=done.calibration.provenance
     ) as axes:
         _parameters(axes[0, 0], result["parameters"])
         for bag, run in enumerate(runs):
@@ -39,8 +39,9 @@ def draw_calibration(done: Calibrated, file: Path) -> None:
             torque.plot(time, sheet[part] * 1e-3, **ORIGINAL, label="sheet")
             torque.plot(time, calibrated * 1e-3, **IMPROVED, label="calibrated")
             torque.set_title(f"torque, bag {run.name}")
-            residual.plot(time, (run.measured - sheet[part]) * 1e-3, **{**ORIGINAL, "linewidth": 0.9}, label="sheet")
-            residual.plot(time, (run.measured - calibrated) * 1e-3, color=IMPROVED["color"], lw=0.9, label="calibrated")
+            # Broad and pale below, thin above: where both run along each other, both are seen.
+            residual.plot(time, (run.measured - sheet[part]) * 1e-3, color=ORIGINAL["color"], lw=3.0, alpha=0.4, label="sheet")
+            residual.plot(time, (run.measured - calibrated) * 1e-3, color=IMPROVED["color"], lw=0.8, label="calibrated")
             residual.set_title(f"residual, bag {run.name}")
             for ax in (torque, residual):
                 ax.set_xlim(0.0, float(time[-1]))

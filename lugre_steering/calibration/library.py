@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from lugre_steering.bag.given import Given, given_recordings
+from lugre_steering.bag.given import Given, files, given_recordings
 from lugre_steering.calibration.calibrate import calibrate_recordings, chosen
 from lugre_steering.calibration.result import Calibration
+from lugre_steering.effects.registry import made
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
@@ -32,4 +34,7 @@ def calibrate(
     model = vehicle_of(vehicle)
     recordings = given_recordings(data, model.channels, progress)
     wanted = chosen(model, free, fix, prior)
-    return calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
+    found = calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
+    sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
+    options = {"free": free, "fix": fix, "prior": prior or {}, "priors": priors}
+    return replace(found, provenance=made("calibrate", options, sheet, files(data)))

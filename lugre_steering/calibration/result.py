@@ -4,16 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from lugre_steering.calibration.identify import Assumed, Combination
 from lugre_steering.files import earlier_result, write_record
+from lugre_steering.gate import Facts, Gate, quality_facts
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import BagFinding
 from lugre_steering.result import Result, folder_for, frame, html
-from lugre_steering.serialise import IN_MEMORY, in_order
+from lugre_steering.serialise import ADDED, IN_MEMORY, in_order
 from lugre_steering.vehicle import Vehicle, save
 
 if TYPE_CHECKING:
@@ -72,6 +74,35 @@ class HeldOutErrors:
 
 
 @dataclass(frozen=True)
+class BagErrors:
+    """One recording (or piece of one, where it is cut): seconds, samples fitted, RMSE [N m] of sheet and calibrated vehicle on them."""
+
+    bag: str
+    duration_s: float
+    samples: int
+    sheet: float | None
+    calibrated: float | None
+
+
+def gate(wanted: Sequence[str]) -> Gate:
+    """What a calibration can be made to fail for."""
+    return Gate(wanted, ("skipped", "finding", "undetermined", "at-bound"), ("rmse",))
+
+
+def facts(result: Mapping[str, Any]) -> Facts:
+    """What of it is so; ``rmse`` [N m] is that of the calibrated vehicle on held-out stretches, or where there are none on all."""
+    bounds = [row["key"] for row in result["parameters"] if row["at_bound"]]
+    weak = [row["key"] for row in result["parameters"] if row["prior_dominated"]]
+    held = result["heldout_rmse_Nm"]["calibrated"]
+    return {
+        **quality_facts(result["data_quality"]),
+        "undetermined": f"hardly determined: {', '.join(weak)}" if weak else None,
+        "at-bound": f"at a bound: {', '.join(bounds)}" if bounds else None,
+        "rmse": result["rmse_Nm"]["calibrated"] if held is None else held,
+    }
+
+
+@dataclass(frozen=True)
 class Calibration(Result):
     """Fitted keys of a vehicle file with intervals, how well they explain the torque, and what the data cannot tell.
 
@@ -99,6 +130,9 @@ class Calibration(Result):
     """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``."""
     picture: str | None = None
     picture_note: str | None = None
+    per_bag: tuple[BagErrors, ...] = field(default=(), metadata=ADDED)
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    """Options, and hashes of the files."""
 
     def with_provenance(self) -> Vehicle:
         """The calibrated vehicle with a note of how its values came about."""
@@ -119,7 +153,11 @@ class Calibration(Result):
         folder = folder_for(out)
         earlier_result(folder, RECORD, SCHEMA, (VEHICLE,))
         write_record(self.json, folder / RECORD)
-        save(self.with_provenance(), folder / VEHICLE)
+        self.write_vehicle(folder)
+
+    def write_vehicle(self, folder: Path) -> None:
+        """The vehicle file into a folder where it may stand."""
+        save(self.with_provenance(), folder / VEHICLE, self.provenance.lines() if self.provenance is not None else ())
 
     def to_frame(self) -> DataFrame:
         """One row per fitted key, as a pandas table."""

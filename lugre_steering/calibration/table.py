@@ -10,7 +10,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from lugre_steering.bag.find import SKIPPED
 from lugre_steering.errors import DataError
+from lugre_steering.report import words
+from lugre_steering.terminal import point
 
 
 def parse_priors(texts: Sequence[str]) -> dict[str, float]:
@@ -34,16 +37,34 @@ def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
         interval = " … ".join(f"{end:.5g}" for end in row["ci95"])
         table.add_row(row["key"], f"{row['sheet']:.5g}", f"{row['value']:.5g}", interval)
     console.print(table)
+    console.print(_per_bag(result))
+    for found in result["data_quality"]:
+        if found["finding"] == SKIPPED:
+            console.print(f"skipped: {found['bag']}: {found['statement']}", highlight=False, soft_wrap=True)
     for row in result["parameters"]:
         if remark := _remark(row):
-            console.print(f"{row['key']}: {remark}", highlight=False)
-    console.print(result["statement"], soft_wrap=True)
+            console.print(point(f"{row['key']}: {remark}"))
+    said = {row["key"] for row in result["parameters"] if _remark(row)}
+    for sentence in words.sentences(result["statement"]):
+        if sentence.split(" ")[0] not in said:
+            console.print(point(sentence))
     if result["picture_note"]:
         console.print(result["picture_note"])
 
 
+def _per_bag(result: Mapping[str, Any]) -> Table:
+    table = Table(title="torque error (RMSE, N m or the unit of the axis)", title_justify="left")
+    table.add_column("recording", overflow="fold")
+    for column in ("seconds", "samples", "sheet", "calibrated"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for row in result["per_bag"]:
+        errors = ("-" if row[key] is None else f"{row[key]:.1f}" for key in ("sheet", "calibrated"))
+        table.add_row(row["bag"], f"{row['duration_s']:.1f}", str(row["samples"]), *errors)
+    return table
+
+
 def _remark(row: Mapping[str, Any]) -> str:
-    remarks = [f"at the {row['at_bound']} bound"] if row["at_bound"] else []
+    remarks = [f"at the {row['at_bound']} end of its range"] if row["at_bound"] else []
     if row["prior_dominated"]:
-        remarks.append("hardly determined")
+        remarks.append(f"hardly determined by these recordings; drive '{row['advice']}'")
     return ", ".join(remarks)

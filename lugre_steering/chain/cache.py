@@ -63,7 +63,10 @@ class _KeptCode(caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            kept = super().load_overload(sig, target_context)
+            if kept is None and sys.stderr.isatty():  # somebody waits and wonders
+                _tell("compiling the model, once for this computer and these effects; this takes up to a minute")
+            return kept
         except Exception:  # unpickling what another version has sealed may raise anything
             _tell(f"the code kept in {_folder()} is damaged or cannot be read: it is compiled anew")
             self._cache_file.discard()

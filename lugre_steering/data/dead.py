@@ -126,7 +126,7 @@ def _rough(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
 def _travel(run: Run, values: Array) -> float:
     """Span of (n,) values once noise is averaged out."""
     smooth = uniform_filter1d(values, max(1, round(MEAN_S / float(run.time[1] - run.time[0]))))
-    return float(np.ptp(smooth))
+    return float(np.ptp(smooth)) if smooth.size else 0.0
 
 
 def _frozen(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:

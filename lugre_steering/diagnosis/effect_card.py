@@ -165,7 +165,7 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
         top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label=f"with {effect.id}")
         middle.plot(run.time, best.difference * change.scale, color=SERIES[0], label="difference")
         middle.plot(run.time, best.visible * change.scale, color=SERIES[1], linewidth=0.9, label="after recalibration")
-        for ax, title, unit in ((top, "torque", torque.label), (middle, "what the effect changes", change.label)):
+        for ax, title, unit in ((top, "torque", torque.unit), (middle, "what the effect changes", change.unit)):
             ax.set_title(title)
             ax.set_ylabel(unit)
             ax.set_xlabel("time (s)")
@@ -177,7 +177,7 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
             axes[2, 0].plot(x, y, color=SERIES[0], linewidth=1.1)
             axes[2, 0].set_title("difference along the coordinate that tells it")
             axes[2, 0].set_xlabel(axis.label)
-            axes[2, 0].set_ylabel(change.label)
+            axes[2, 0].set_ylabel(change.unit)
     return file
 
 
@@ -186,19 +186,17 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
 
 def show_list(console: Console) -> None:
     """The catalogue as a table, one stage after the other."""
-    table = Table(title="Physics that the baseline leaves out", title_justify="left", title_style="bold")
+    table = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
     table.add_column("id", no_wrap=True)
-    table.add_column("stage", no_wrap=True)
-    table.add_column("tier", justify="right")
     table.add_column("what it is", overflow="fold")
-    table.add_column("how it shows, or what it would need", overflow="fold")
     stage = ""
     for effect in CATALOGUE.values():
-        if stage and effect.stage != stage:
-            table.add_section()
-        stage = effect.stage
-        shows = effect.trace if effect.observable else Text(f"not observable: needs {effect.not_recorded}", "yellow")
-        table.add_row(effect.id, effect.stage, str(effect.tier), effect.title, shows)
+        if effect.stage != stage:
+            stage = effect.stage
+            table.add_row(Text(stage.replace("_", " "), "bold"))
+        table.add_row(f"  {effect.id}", effect.title)
+        if not effect.observable:
+            table.add_row("", Text(f"not observable: needs {effect.not_recorded}", "yellow"))
     console.print(table)
     console.print("'lugre-steering effects ID' explains one; with --out DIR it draws its signature.", highlight=False)
 

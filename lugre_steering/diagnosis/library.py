@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from lugre_steering.bag.given import Given, given_recordings
+from lugre_steering.bag.given import Given, files, given_recordings
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
+from lugre_steering.effects.registry import made
 from lugre_steering.result import folder_for
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
@@ -30,7 +32,9 @@ def diagnose(
     """
     model = vehicle_of(vehicle)
     recordings = given_recordings(data, model.channels, progress)
-    return diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
+    found = diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
+    sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
+    return replace(found, provenance=made("diagnose", {"seed": seed, "material": material}, sheet, files(data)))
 
 
 def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:

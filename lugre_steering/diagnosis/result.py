@@ -8,11 +8,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from lugre_steering import units
 from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, write_record
+from lugre_steering.gate import Facts, Gate, quality_facts
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, BagFinding, unused_name
 from lugre_steering.result import Result, folder_for, frame, html, of_bag
 from lugre_steering.serialise import ADDED, IN_MEMORY, finite, mapped
@@ -89,9 +91,9 @@ class Augmented(Errors):
     causal_rmse_Nm: float | None = field(default=None, metadata=ADDED)
     """On all valid samples, without looking ahead and with bristles relaxed at the start, as the live node must."""
 
-    def save(self, path: str | Path) -> None:
-        """Write the vehicle file (augmented.yaml of the command)."""
-        save(self.vehicle, path)
+    def save(self, path: str | Path, notes: Sequence[str] = ()) -> None:
+        """Write the vehicle file (augmented.yaml of the command) with ``notes`` as comments."""
+        save(self.vehicle, path, notes)
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,10 @@ class NamedEffect:
     energy_share: Share
     masked_share: Share
     indistinguishable_from: Annotated[tuple[str, ...], {"maxItems": 6}]
+    largest_Nm: float | None = field(default=None, metadata=ADDED)
+    """Largest torque it makes in the recordings [N m]."""
+    largest_share: float | None = field(default=None, metadata=ADDED)
+    """The same over the amplitude of the measured torque."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +167,17 @@ class Experiment:
     why: str
 
 
+def gate(wanted: Sequence[str]) -> Gate:
+    """What a diagnosis can be made to fail for."""
+    return Gate(wanted, ("skipped", "finding", *get_args(Verdict)))
+
+
+def facts(result: Mapping[str, Any]) -> Facts:
+    """What of it is so."""
+    verdicts = {verdict: f"verdict {verdict}" if verdict == result["verdict"] else None for verdict in get_args(Verdict)}
+    return {**quality_facts(result["data_quality"]), **verdicts}
+
+
 @dataclass(frozen=True)
 class Diagnosis(Result):
     """What a diagnosis came to, with the names of ``diagnosis.json``; torques in N m (the vehicle's force unit for a linear axis).
@@ -183,9 +200,15 @@ class Diagnosis(Result):
     next_experiment: Experiment | None
     laws: tuple[Mapping[str, Any], ...] = field(default=(), metadata=ADDED)
     """Found where no entry of the catalogue explains what is left; ``augmented.yaml`` runs them."""
+    headline: str = field(default="", metadata=ADDED)
+    """How the statement begins: what, where, how much of the torque, what to do."""
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    """By what version, when, with what options and from which files it was made; None for data in memory."""
     traces: tuple[BagTrace, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
     evidence: tuple[Evidence, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
     coordinate_of: Mapping[str, str] = field(default_factory=dict, repr=False, metadata=IN_MEMORY)
+    sheet: Vehicle | None = field(default=None, repr=False, metadata=IN_MEMORY)
+    """The vehicle as it was given."""
 
     @property
     def vehicle(self) -> Vehicle:
@@ -202,8 +225,12 @@ class Diagnosis(Result):
         """Write diagnosis.json and augmented.yaml into a folder; replaces only an earlier diagnosis there."""
         folder = folder_for(out)
         earlier_result(folder, "diagnosis.json", SCHEMA, ("augmented.yaml",))
+        self.write(folder)
+
+    def write(self, folder: Path) -> None:
+        """The two files into a folder where they may stand."""
         write_record(self.json, folder / "diagnosis.json")
-        self.augmented.save(folder / "augmented.yaml")
+        self.augmented.save(folder / "augmented.yaml", self.provenance.lines() if self.provenance is not None else ())
 
     def to_frame(self) -> DataFrame:
         """One row per fitted parameter of every named effect, as a pandas table."""

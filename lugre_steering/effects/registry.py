@@ -11,10 +11,11 @@ import importlib
 import inspect
 import os
 import pkgutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from lugre_steering.effects import own
 from lugre_steering.effects.entry import STAGES, Effect
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
+from lugre_steering.provenance import Provenance, provenance
 
 GROUP = "lugre_steering.effects"
 VARIABLE = "LUGRE_STEERING_EFFECTS"
@@ -107,6 +109,12 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
             raise EffectError(f"{where}: {error}") from error
         CATALOGUE[new.id], ORIGINS[new.id] = new, origin
     _sort()
+
+
+def made(command: str, options: Mapping[str, Any], vehicle: Path | None, bags: Sequence[Path]) -> Provenance:
+    """How a result of these files came about, foreign physics included."""
+    foreign = {effect_id: f"{origin.source} sha256 {origin.sha256}" for effect_id, origin in ORIGINS.items()}
+    return provenance(command, {**options, **({"effects": foreign} if foreign else {})}, vehicle, bags)
 
 
 def _try(new: Effect) -> None:

@@ -22,8 +22,10 @@ from lugre_steering.estimator.layout import (
     SPIKE,
     ZERO,
 )
-from lugre_steering.recording import AIR_LIMIT_DEGC, Kind
+from lugre_steering.recording import Kind
 
+HOTTEST_AIR_DEGC = 75.0
+"""No air about a vehicle is warmer, or colder the other way; the one in a compartment is not what the tracks meet."""
 CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
 
 
@@ -101,7 +103,7 @@ def _absurd(c, kind, value):
         return abs(value) > c.max_angle
     if kind == Kind.PRESSURE:
         return abs(value) > c.max_pressure
-    return abs(value) > (AIR_LIMIT_DEGC if kind == Kind.AIR_TEMPERATURE else 1e12)
+    return abs(value) > (HOTTEST_AIR_DEGC if kind == Kind.AIR_TEMPERATURE else 1e12)
 
 
 @njit

@@ -5,7 +5,8 @@
 A confirmed jump of an angle re-anchors its side: the model goes on with the bristle as it was, and nothing is slid or
 heated by the jump. The state before the first jump is kept as a shadow, to which every further jump goes back: what came
 between was not true. If the angle is now where the joint can have got to since, at the rates that it has shown before, the
-side goes there in a straight line over the time that passed. What no jump takes back within ``TRUSTED_S`` is believed.
+side goes there in a straight line over the time that passed. What no jump takes back within ``TRUSTED_S`` is believed; sooner where the
+measured torque speaks for it.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from lugre_steering.chain.step import step
 from lugre_steering.estimator.layout import ANGLE_JUMP
 from lugre_steering.estimator.preview import departs
 from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
+from lugre_steering.recording import Kind
 
 TRUSTED_S = 10.0
+SUPPORTED_S, SUPPORT_SHARE = 0.3, 0.25
+"""A jump is believed as soon as this, where the measured torque stays within such a share of the estimate and both are large."""
 SETTLED_S = 0.2
 """For so long after a return the angle stays in doubt."""
 FASTER = 1.5
@@ -35,10 +39,19 @@ NOISE_MEMORY_S = 0.2
 PRESSURE_MEMORY_S = 1.0
 """Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
 RESIDUAL_MEMORY_S = 2.0
+SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.5
+"""A residual as large as the torque, where that is at least this share of the static friction, needs no long look."""
+BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
+"""A residual beyond its bound is forgotten again in less than a second, however large it was."""
+REPEATING, REPEATS_MEMORY = 0.1, 50.0
+"""Of a line whose samples have repeated less often than this, over so many of them, a standstill is no measurement."""
 
 DOUBTS = ("angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
-          "outside the range of the calibration", "plan far from the angle", "plan has run out")  # fmt: skip
-JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT = (1 << bit for bit in range(len(DOUBTS)))
+          "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen")  # fmt: skip
+JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE = (1 << bit for bit in range(len(DOUBTS)))
+
+INPUTS = JUMPED | FROZEN | NOISY | LINE
+"""What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
     [
@@ -137,13 +150,21 @@ def weigh_pressures(core, stamp_ns, measured):
 
 
 @njit
+def _supported(c):
+    """Whether the measured torque has just spoken for the estimate."""
+    smaller = math.sqrt(min(c.measured_now, c.estimate_now))
+    return smaller > SUDDEN_SHARE * c.friction and math.sqrt(c.residual_now) < SUPPORT_SHARE * smaller
+
+
+@njit
 def trust(core, side, dt):
     """Time passes without a jump: in the end the present state is the trusted one."""
     g = core.guard[side]
     g.absurd = False
     if g.shadow_ns != 0:
         g.calm += dt
-        if g.calm >= (SETTLED_S if g.returned else TRUSTED_S):
+        patience = SUPPORTED_S if _supported(core.config[0]) else TRUSTED_S
+        if g.calm >= (SETTLED_S if g.returned else patience):
             g.shadow_ns = 0
     elif not g.frozen:
         g.fastest += max(0.0, abs(core.motion[side].omega) - g.fastest) * min(1.0, dt / FASTEST_MEMORY_S)
@@ -201,11 +222,47 @@ def re_anchor(core, side, ch, stamp_ns, value):
 
 
 @njit
+def watch_line(ch, stamp_ns, value):
+    """Learn from the next reading of a line how often its readings repeat, and whether it stands still now."""
+    same = ch.last_ns != 0 and value == ch.last_value
+    if not same:
+        ch.still, ch.still_ns = 0, stamp_ns
+    else:
+        ch.still += 1
+    if ch.still < STILL_SAMPLES:  # a frozen line teaches nothing about a sound one
+        ch.repeats += ((1.0 if same else 0.0) - ch.repeats) / REPEATS_MEMORY
+    ch.last_value = value
+
+
+@njit
+def line_frozen(ch):
+    """Whether a line whose readings hardly ever repeat has given the same one for a while."""
+    return ch.repeats < REPEATING and ch.still >= STILL_SAMPLES and ch.last_ns - ch.still_ns >= STILL_NS
+
+
+@njit
+def _sudden(c):
+    """Whether residuals have just become as large as the torque, and that is large."""
+    larger = math.sqrt(max(c.measured_now, c.estimate_now))
+    return larger > SUDDEN_SHARE * c.friction and math.sqrt(c.residual_now) > LARGE_SHARE * larger
+
+
+@njit
 def weigh_residual(c, stamp_ns, measured, residual):
     """Learn from the next residual [N m] how large residuals and torques have been of late."""
     dt = (stamp_ns - c.residual_ns) * 1e-9
-    weight = min(1.0, dt / RESIDUAL_MEMORY_S) if dt > 0.0 and c.residual_ns != 0 else 0.0
+    known = dt > 0.0 and c.residual_ns != 0
     c.residual_ns = stamp_ns
+    soon = min(1.0, dt / SUDDEN_MEMORY_S) if known else 0.0
+    c.residual_now += (residual * residual - c.residual_now) * soon
+    c.measured_now += (measured * measured - c.measured_now) * soon
+    c.estimate_now += ((measured - residual) ** 2 - c.estimate_now) * soon
+    if c.residual_bound > 0.0:
+        share = min(BOUND_CAP, (residual / c.residual_bound) ** 2)
+        c.beyond += (share - c.beyond) * (min(1.0, dt / BOUND_MEMORY_S) if known else 0.0)
+    if _sudden(c):  # told already, and to be forgotten soon after
+        return
+    weight = min(1.0, dt / RESIDUAL_MEMORY_S) if known else 0.0
     c.residual_square += (residual * residual - c.residual_square) * weight
     c.measured_square += (measured * measured - c.measured_square) * weight
     c.estimate_square += ((measured - residual) ** 2 - c.estimate_square) * weight
@@ -219,8 +276,11 @@ def standing_doubts(core, stamp_ns):
         level = math.sqrt(c.residual_square)
         smaller = math.sqrt(min(c.measured_square, c.estimate_square))
         large = c.estimate_square > (NOTABLE_SHARE * c.friction) ** 2 and level > LARGE_SHARE * smaller
-        if large or (c.residual_bound > 0.0 and level > c.residual_bound):
+        if large or c.beyond > 1.0 or _sudden(c):
             found |= RESIDUAL
+    for i in range(core.state.size, core.channels.size):
+        if core.channels[i].kind == Kind.PRESSURE and line_frozen(core.channels[i]):
+            found |= LINE
     if c.horizon > 0.0 and c.plan_size > 0:
         if stamp_ns >= core.plan_ns[c.plan_size - 1]:
             found |= PLAN_OUT

@@ -18,7 +18,7 @@ from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import JUMPED, REJECTED, admit
-from lugre_steering.estimator.doubt import DOUBTS, GUARD
+from lugre_steering.estimator.doubt import DOUBTS, GUARD, watch_line
 from lugre_steering.estimator.known import known_range
 from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
 from lugre_steering.estimator.memory import Memory, hand_over, recall, remembered
@@ -88,6 +88,7 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
             continue
         else:
             line = ch.index
+            watch_line(ch, stamp_ns[i], value[i])
             ch.last_ns = stamp_ns[i]
             core.line_ns[line, ch.head % core.line_ns.shape[1]] = stamp_ns[i]
             core.line_value[line, ch.head % core.line_ns.shape[1]] = value[i]
@@ -173,6 +174,12 @@ class Estimator:
             counts = {reason: int(n) for reason, n in zip(REASONS, row["reasons"], strict=True) if n}
             table[_label(channel.kind, channel.name)] = {"accepted": int(row["accepted"]), **counts}
         return table
+
+    @property
+    def rejections(self) -> IntArray:
+        """What ``counters`` tell of rejected samples, as numbers only (channels, reasons)."""
+        reasons: IntArray = self._core.channels["reasons"].copy()
+        return reasons
 
     @property
     def latest_ns(self) -> Mapping[str, int]:

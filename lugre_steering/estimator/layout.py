@@ -66,6 +66,10 @@ CONFIG = np.dtype(
         ("residual_square", np.float64),  # of late [(N m)^2], and the same of the measured and the estimated torque
         ("measured_square", np.float64),
         ("estimate_square", np.float64),
+        ("residual_now", np.float64),  # the same three of the very last time
+        ("measured_now", np.float64),
+        ("estimate_now", np.float64),
+        ("beyond", np.float64),  # share of the bound that residuals have had of late, squared
         ("residual_bound", np.float64),  # RMS [N m] beyond which a residual is implausible; 0: none is known
         ("friction", np.float64),  # static torque of all sides [N m]
         ("seen_angle", np.float64),  # largest angle [rad] and rate [rad/s] that the calibration saw; inf: not told
@@ -89,6 +93,9 @@ CHANNEL = np.dtype(
         ("suspect_ns", np.int64),
         ("suspect_value", np.float64),
         ("last_value", np.float64),
+        ("repeats", np.float64),  # share of samples of late that were equal to the one before
+        ("still", np.int64),  # samples equal to the one before, in a row
+        ("still_ns", np.int64),  # stamp of the first of them
         ("accepted", np.int64),
         ("period_ns", np.int64),  # from the last but one accepted sample to the last
         ("head", np.int64),  # samples stored so far in the ring of this line or side

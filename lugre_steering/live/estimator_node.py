@@ -23,16 +23,15 @@ from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.live.console import Console
 from lugre_steering.live.parameters import changed, declare
-from lugre_steering.live.session import Session
+from lugre_steering.live.session import TICK_S, Session
 from lugre_steering.live.state_file import read_state, write_state
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
 
 LATENCY_WINDOW = 4096
 REPORT_S = 1.0
-TICK_S = 0.02
 NEWS_S = 0.1
-"""A change of what speaks against the feed-forward is reported this soon, or this long after the report before."""
+"""What is new is reported at once, or this long after the news before."""
 NAMES_EVERY = 5
 """Reports: how often the network is asked for a node of the same name."""
 
@@ -49,6 +48,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._refusal: LugreSteeringError | None = None
         self._latency_window = latency_window
         self._began_ns = self._reported_ns = self._saved_ns = time.monotonic_ns()
+        self._news_ns = 0
         self._reports = 0
         self._namesakes = 0
         self._console = Console(self.get_logger())
@@ -56,6 +56,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         # Steady, so that health is reported while simulated time stands still.
         self.create_timer(TICK_S, self.guarded(self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, "~/reload", self._reload)
+        self.create_service(Trigger, "~/mark", self._mark)
         self._writer: threading.Thread | None = None
         change = self._service_change_state
         change.callback = self._answered(change.callback)
@@ -116,21 +117,27 @@ class SteeringTorqueEstimator(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._leave()
+        self.leave()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._leave()
+        self.leave()
         return super().on_shutdown(state)
 
     def on_error(self, _: LifecycleState) -> TransitionCallbackReturn:
         """After an exception in a transition: back to unconfigured, from where it can be configured anew."""
-        self._leave()
+        self.leave()
         return TransitionCallbackReturn.SUCCESS
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
+        """Say so, lead the feed-forward to zero, keep the state, leave the topics."""
+        session = self.session
+        if session is not None:
+            session.health.leaving = True
+            self._report(session, time.monotonic_ns())
+            session.withdraw()
         self.save()
-        session, self.session = self.session, None
+        self.session = None
         if session is not None:
             session.close()
 
@@ -178,8 +185,16 @@ class SteeringTorqueEstimator(LifecycleNode):
                 self._diagnose([DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{NODE}: outputs", message="not configured")])
             return
         session.tick()
-        if waited_s >= REPORT_S or (session.news and waited_s >= NEWS_S):
+        news = now_ns - self._news_ns >= NEWS_S * 1e9 and session.untold
+        if news:
+            self._news_ns = now_ns
+        if news or waited_s >= REPORT_S:
             self._report(session, now_ns)
+        if session.alarm:
+            session.alarm = False
+            write = session.window("the residual is not what it was")
+            if write is not None:
+                threading.Thread(target=self.guarded(lambda: self._written(write())), daemon=True).start()
 
     def _report(self, session: Session, monotonic_ns: int) -> None:
         session.choose_clock()
@@ -215,6 +230,23 @@ class SteeringTorqueEstimator(LifecycleNode):
         self.settings = changed(self, changes)
         if self.session is not None:
             self.session.change(self.settings)
+
+    def _written(self, file: Path) -> None:
+        self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}")
+
+    def _mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Write the window up to now, for diagnose."""
+        write = self.session.window("marked") if self.session is not None else None
+        try:
+            if write is None:
+                raise DataError("parameter 'watch_folder' names no folder for windows, or the node is not configured")
+            response.success, response.message = True, str(write())
+        except (DataError, OSError) as error:
+            response.success, response.message = False, str(error)
+        except Exception as error:  # would end the service, and the caller would wait for ever
+            self.fault(error)
+            response.success, response.message = False, self.last_exception
+        return response
 
     def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Take over what ``vehicle_file`` says now, all of it or nothing."""

@@ -11,13 +11,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from lugre_steering.online import is_large
-from lugre_steering.recording import NODE, Kind
+from lugre_steering.online import NOTABLE_SHARE, is_large, sheet_words
+from lugre_steering.recording import NODE, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import baseline_parameters
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+STALE = "stale"
 FAULT_HOLD_NS = 1_000_000_000
 RESIDUAL_SECONDS = 10
+SHEET_SECONDS = 60
+PERIOD_S = 0.5
+"""Rates and levels are taken over at least so long, however soon after the last one a report comes."""
 FAR_NS = 10_000_000_000
 """A clock that is wrong by more than that is another clock."""
 
@@ -50,6 +55,8 @@ class Health:
     def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int) -> None:
         self._node = NODE
         self.active = True
+        self.leaving = False
+        self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
         self.doubted: Counter[str] = Counter()  # torques whose feed-forward was held back, by reason
@@ -74,9 +81,16 @@ class Health:
         self._fault_ns = -FAULT_HOLD_NS
         self._vehicle = vehicle
         self._residual_squares = self._estimate_squares = self._measured_squares = 0.0
-        self._levels: deque[tuple[float, float, float, int]] = deque(maxlen=RESIDUAL_SECONDS)
+        self._levels: deque[tuple[float, float, float, int, float]] = deque(maxlen=round(SHEET_SECONDS / PERIOD_S))
         self._then: Mapping[str, int] = {}
         self._then_arrivals = list(self.arrivals)
+        self._period_s = 0.0
+        self._rates = [0.0] * len(self._kinds)  # arrivals [Hz], and their number when it was taken
+        self._rated = list(self.arrivals)
+        self._told: frozenset[tuple[object, ...]] = frozenset()
+        self._told_rejections: IntArray | None = None
+        self._told_counts: list[Counter[str]] = [Counter()] * 3
+        self._told_exceptions = 0
         self._then_residuals = 0
         self._then_saturated = 0
         self._then_exceptions = 0
@@ -109,6 +123,38 @@ class Health:
         self._estimate_squares += (measured - residual) * (measured - residual)
         self._measured_squares += measured * measured
 
+    def _troubles(self, now_ns: int, rejections: IntArray) -> frozenset[tuple[object, ...]]:
+        """What is wrong now, or has come up since the last report: stale inputs, counts that have grown."""
+        found: set[tuple[object, ...]] = set()
+        for i, (kind, timeout_s) in enumerate(zip(self._kinds, self._timeouts_s, strict=True)):
+            if kind is not Kind.AIR_TEMPERATURE and not 0 <= now_ns - self.arrived_ns[i] <= timeout_s * 1e9:
+                found.add((STALE, i))
+        if self._told_rejections is not None:
+            found.update(zip(*(index.tolist() for index in np.nonzero(rejections > self._told_rejections)), strict=True))
+        for which, (counts, told) in enumerate(zip(self._counts, self._told_counts, strict=True)):
+            found.update((which, key) for key, n in counts.items() if n > told[key])
+        if self.exceptions > self._told_exceptions:
+            found.add(("exception",))
+        return frozenset(found)
+
+    @property
+    def _counts(self) -> tuple[Counter[str], ...]:
+        return self.withheld, self.unused, self.foreign
+
+    def untold(self, now_ns: int, rejections: IntArray) -> bool:
+        """Whether anything is wrong that was not when the last report was made; ``rejections`` as the estimator counts them."""
+        found = self._troubles(now_ns, rejections)
+        # An input that came back since is news when it ends again; a count goes on until the next report.
+        self._told = frozenset(trouble for trouble in self._told if trouble[0] != STALE or trouble in found)
+        return not found <= self._told
+
+    def told(self, now_ns: int, rejections: IntArray) -> None:
+        """A report is being made."""
+        self._told = self._troubles(now_ns, rejections)
+        self._told_rejections = rejections
+        self._told_counts = [counts.copy() for counts in self._counts]
+        self._told_exceptions = self.exceptions
+
     def statuses(
         self,
         now_ns: int,
@@ -118,8 +164,11 @@ class Health:
         saturated_steps: int,
     ) -> list[DiagnosticStatus]:
         """The status messages of the last ``elapsed_s`` seconds; ``counters`` as the estimator keeps them."""
+        self._period_s += elapsed_s
+        if self._period_s >= PERIOD_S:
+            self._take_levels()
         statuses = [
-            self._inputs(now_ns, elapsed_s, list(counters)),
+            self._inputs(now_ns, list(counters)),
             self._rejected(counters),
             self._latency(),
             self._residual(saturated_steps),
@@ -128,18 +177,38 @@ class Health:
         self._then_arrivals = list(self.arrivals)
         return statuses
 
+    def _take_levels(self) -> None:
+        """The rates and residual levels of the period that ends now."""
+        arrivals = zip(self.arrivals, self._rated, strict=True)
+        self._rates = [(now - then) / self._period_s for now, then in arrivals]
+        self._rated = list(self.arrivals)
+        sums = self._residual_squares, self._estimate_squares, self._measured_squares
+        self._levels.append((*sums, self.residuals - self._then_residuals, self._period_s))
+        self._residual_squares = self._estimate_squares = self._measured_squares = self._period_s = 0.0
+        self._then_residuals = self.residuals
+
+    def _sums(self, seconds: float) -> tuple[float, float, float, int]:
+        """Squares of residual, estimate and measured torque, and the number of residuals, over the last ``seconds`` of data."""
+        residual, estimate, measured, count, spent = 0.0, 0.0, 0.0, 0, 0.0
+        for row in reversed(self._levels):
+            if spent >= seconds:
+                break
+            residual, estimate, measured, count = residual + row[0], estimate + row[1], measured + row[2], count + row[3]
+            spent += row[4]
+        return residual, estimate, measured, count
+
     def _status(self, component: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
         name = f"{self._node}: {component}"
         return DiagnosticStatus(level=level, name=name, message=message, hardware_id=self._vehicle.name, values=pairs)
 
-    def _inputs(self, now_ns: int, elapsed_s: float, labels: Sequence[str]) -> DiagnosticStatus:
+    def _inputs(self, now_ns: int, labels: Sequence[str]) -> DiagnosticStatus:
         level, troubles = OK, []
         values: dict[str, object] = {}
         for i, label in enumerate(labels):
             age_s = (now_ns - self.arrived_ns[i]) * 1e-9 if self.arrivals[i] else math.inf
             values[f"{label} topic"] = self._topics[i]
-            values[f"{label} rate [Hz]"] = (self.arrivals[i] - self._then_arrivals[i]) / elapsed_s
+            values[f"{label} rate [Hz]"] = self._rates[i]
             values[f"{label} age [s]"] = age_s
             if self.arrivals[i]:
                 values[f"{label} stamp behind clock [s]"] = self.behind_ns[i] * 1e-9
@@ -181,11 +250,7 @@ class Health:
         return self._status("latency", OK, "p50 and p99 of the window, max since start", values)
 
     def _residual(self, saturated_steps: int) -> DiagnosticStatus:
-        sums = self._residual_squares, self._estimate_squares, self._measured_squares
-        self._levels.append((*sums, self.residuals - self._then_residuals))
-        self._residual_squares = self._estimate_squares = self._measured_squares = 0.0
-        self._then_residuals = self.residuals
-        *squares, count = (sum(column) for column in zip(*self._levels, strict=True))
+        *squares, count = self._sums(RESIDUAL_SECONDS)
         rms, estimate, measured = (math.sqrt(s / count) if count else math.nan for s in squares)
         large = is_large(rms, estimate, measured, self._vehicle)
         saturated = saturated_steps > self._then_saturated
@@ -193,13 +258,27 @@ class Health:
         message = "rubber temperature outside the rubber table" if saturated else ""
         if large:
             message = "; ".join(filter(None, [message, "residual as large as the torque: check units, signs, plugs; then diagnose"]))
+        words = self._wrong_sheet()
+        unlike = math.isfinite(self.mismatch_s)
+        if unlike:
+            since = f"since {self.mismatch_s:.0f} s the residual is not what it was: the model no longer matches; diagnose"
+            message = "; ".join(filter(None, [message, since]))
+        message = "; ".join(filter(None, [message, words]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
         values: dict[str, object] = {
             f"RMS over {RESIDUAL_SECONDS} s [N m]": rms,
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
-        return self._status("residual", WARN if saturated or large or not count else OK, message, values)
+        return self._status("residual", WARN if saturated or large or words or unlike or not count else OK, message, values)
+
+    def _wrong_sheet(self) -> str:
+        """What to check in the vehicle file, where the measured torque has the shape of the estimate but another size."""
+        residual, estimate, measured, count = self._sums(SHEET_SECONDS)
+        friction = len(self._vehicle.sides) * float(baseline_parameters(self._vehicle)["static_torque"])
+        if not count or estimate < (NOTABLE_SHARE * friction) ** 2 * count:
+            return ""
+        return sheet_words(residual, estimate, measured, self._vehicle) or ""
 
     def _outputs(self, monotonic_ns: int) -> DiagnosticStatus:
         faulty = self.faulty(monotonic_ns) or self.exceptions > self._then_exceptions  # every exception is told once
@@ -213,6 +292,8 @@ class Health:
         doubts = [f"feed-forward to zero: {reason}" for reason in new]
         if not self.active:
             doubts.append("node not active")
+        if self.leaving:
+            doubts.append("node stops: feed-forward to zero")
         arrived = [
             now - then
             for now, then, kind in zip(self.arrivals, self._then_arrivals, self._kinds, strict=True)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import WrenchStamped
@@ -66,8 +67,9 @@ class Outputs:
     def set_ramp(self, settings: Settings) -> None:
         self._ramp.set_times(settings.angle_timeout_s, settings.options.recovery_ramp_s)
 
-    def begin_fade(self, now_ns: int, ramp_s: float) -> None:
-        """From now on ``fade`` leads the feed-forward to zero."""
+    def begin_fade(self, ramp_s: float) -> None:
+        """From now on ``fade`` leads the feed-forward to zero, by the steady clock: simulated time may stand still."""
+        now_ns = time.monotonic_ns()
         self.fading = Fade(now_ns, self.released, ramp_s)
         self._fade_commands = Fade(now_ns, self._ramp.published, ramp_s)
 
@@ -76,11 +78,12 @@ class Outputs:
         """Whether the feed-forward that others know is zero."""
         return not any(self.released) and not any(self._ramp.published)
 
-    def fade(self, now_ns: int) -> None:
+    def fade(self, stamp_ns: int) -> None:
         """Publish the next feed-forward on the way to zero, stamped with the time."""
         if self.fading is None or self._fade_commands is None or not self.released:
             return
-        self._set_stamp(now_ns)
+        now_ns = time.monotonic_ns()
+        self._set_stamp(stamp_ns)
         message, publisher = self._feed_forward
         message.effort = self.released = self.fading(now_ns)
         publisher.publish(message)

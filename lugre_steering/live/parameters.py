@@ -34,6 +34,8 @@ class Settings:
     publish_commands: bool
     autostart: bool
     when_stale: str
+    watch_folder: Path | None
+    watch_before_s: float
     state_file: Path | None
     state_period_s: float
     state_max_age_s: float
@@ -77,6 +79,9 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
         raise ParameterError("parameter 'vehicle_file': got nothing, expected a vehicle file (--ros-args -p vehicle_file:=PATH)")
     given["vehicle_file"] = Path(given["vehicle_file"])
     given["effects_files"] = tuple(Path(name) for name in given["effects_files"].split(os.pathsep) if name)
+    given["watch_folder"] = Path(given["watch_folder"]) if given["watch_folder"] else None
+    if given["watch_folder"] is not None and not given["watch_folder"].is_dir():
+        raise ParameterError(f"parameter 'watch_folder': got '{given['watch_folder']}', expected a folder that is there, or nothing")
     given["state_file"] = Path(given["state_file"]) if given["state_file"] else None
     return Settings(**given, options=Options(**{parameter.name: values[parameter.name] for parameter in OPTION_TABLE}))
 

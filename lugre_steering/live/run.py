@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import time
@@ -15,13 +16,13 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions, install_signal_handlers
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.live.estimator_node import SteeringTorqueEstimator
 
-_SLICE_S = 0.5  # how long a shutdown that came between check and spin may go unnoticed
+_SLICE_S = 0.1  # how long a signal may go unnoticed
 _FAULTS = 100  # of the middleware in a row, and no callback between: a supervisor must know
 _PATIENCE = 5
 _BREATH_S = 0.05  # after each further such fault: no core is kept busy with nothing
@@ -42,7 +43,10 @@ def run(args: list[str]) -> int:
         gc.freeze()
         if not spin(node, node.settings.executor, node.fault, lambda: node.callbacks):
             return _refused(RuntimeError(f"no callback runs any more; the last of {_FAULTS} faults: {node.last_exception}"))
-        node.save()
+        if rclpy.ok():
+            node.leave()
+        else:
+            node.save()
     except (LugreSteeringError, ParameterException, RCLError) as error:  # rclpy's: its own parameters, names of topics
         return _refused(error)
     finally:
@@ -56,18 +60,26 @@ def _refused(error: BaseException) -> int:
 
 
 def spin(node: Node, executor_kind: str, fault: Callable[[Exception], None], callbacks: Callable[[], int]) -> bool:
-    """Run callbacks until shutdown; what the middleware raises between them goes to ``fault``, not out of the node.
+    """Run callbacks until SIGINT, SIGTERM or shutdown; what the middleware raises between them goes to ``fault``, not out of the node.
 
+    The context is left as it is: there is something to be said before the node goes. A second signal ends the process at once.
     False if it raises again and again and no callback runs any more, as the count of ``callbacks`` tells.
     """
     executor = make_executor(executor_kind)
     executor.add_node(node)
+    stopped = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopped
+        if stopped:
+            os._exit(0)
+        stopped = True
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: None)  # rclpy's handlers, put before these, shut the context down
-    install_signal_handlers(SignalHandlerOptions.ALL)
+        signal.signal(number, stop)
     try:
         faults = 0
-        while rclpy.ok() and faults < _FAULTS:
+        while rclpy.ok() and not stopped and faults < _FAULTS:
             before = callbacks()
             sound = _spin_some(executor, fault)
             if sound or callbacks() > before:

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -13,12 +15,19 @@ from rclpy.node import Node
 
 from lugre_steering.chain.step import Records
 from lugre_steering.estimator import Estimator, Options, doubts
+from lugre_steering.estimator.doubt import INPUTS
 from lugre_steering.live.health import Health
 from lugre_steering.live.inputs import Inputs
 from lugre_steering.live.outputs import Outputs
 from lugre_steering.live.parameters import Settings
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.watch.detector import Watch
+from lugre_steering.watch.window import Samples, write_window
+
+LEAVE_S = 2.0
+"""No longer does the last ramp to zero take: who stops the node waits a few seconds before he kills it."""
+TICK_S = 0.02
 
 
 class Session:
@@ -37,11 +46,14 @@ class Session:
         self.estimator = Estimator(vehicle, settings.options, lean=True)
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
         self.outputs = Outputs(node, vehicle, settings)
+        self.watch = Watch(vehicle)
+        self.samples = Samples() if settings.watch_folder is not None else None
+        self.alarm = False  # the watch has just found that the model no longer matches
         self._node = node
         self._torque_ns = 0  # stamp of the newest torque
         self._arrived_ns = 0  # monotonic time of the sample that gave it
         self._doubts = 0
-        self.news = False  # the doubts have changed since the last report
+        self.news = False  # the doubts have changed since the last report, or the node has been switched on or off
         self._now_ns: Callable[[], int] = time.time_ns
         self.choose_clock()
         self._inputs = Inputs(node, vehicle, settings.input_depth, self.health, guarded, self._push, self._set_plan)
@@ -52,15 +64,23 @@ class Session:
         self.outputs.close()
 
     def activate(self) -> None:
-        self.active = True
+        self.active = self.news = True
         if self._torque_ns:  # what has come meanwhile was for nobody: the feed-forward comes back from what was last published
             self.estimator.set_released(self.outputs.released or [0.0] * len(self.vehicle.sides))
         self.outputs.fading = None
 
     def deactivate(self) -> None:
         """Lead the feed-forward to zero; nothing else is published any more."""
-        self.active = False
-        self.outputs.begin_fade(self._now_ns(), self.settings.options.withdrawal_ramp_s)
+        self.active, self.news = False, True
+        self.outputs.begin_fade(self.settings.options.withdrawal_ramp_s)
+
+    def withdraw(self) -> None:
+        """Lead the feed-forward to zero and return when it is there: nobody will be left to do so."""
+        self.active, outputs = False, self.outputs
+        outputs.begin_fade(min(LEAVE_S, self.settings.options.withdrawal_ramp_s))
+        while not outputs.faded:
+            time.sleep(TICK_S)
+            outputs.fade(self._now_ns())
 
     def change(self, settings: Settings) -> None:
         """Go on with other settings (those that are not fixed)."""
@@ -73,6 +93,7 @@ class Session:
         """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
         self.estimator = self.estimator.continued(vehicle)
         self.vehicle = vehicle
+        self.watch = Watch(vehicle)
         self.health.set_vehicle(vehicle)
 
     def tick(self) -> None:
@@ -82,7 +103,7 @@ class Session:
             silent_ns = time.monotonic_ns() - self._arrived_ns
             if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and outputs.released:
                 self.health.withheld["feed-forward led to zero: inputs stale"] += 1
-                outputs.begin_fade(self._now_ns(), self.settings.options.withdrawal_ramp_s)
+                outputs.begin_fade(self.settings.options.withdrawal_ramp_s)
         elif not outputs.faded:
             outputs.fade(self._now_ns())
             self.estimator.set_released(outputs.released)
@@ -96,11 +117,32 @@ class Session:
         self.simulated = bool(clock.ros_time_is_active)
         self._now_ns = (lambda: int(clock.now().nanoseconds)) if self.simulated else time.time_ns
 
+    def window(self, reason: str) -> Callable[[], Path] | None:
+        """What writes the samples of the time since the mismatch began, and of some time before; None without a folder for them."""
+        folder = self.settings.watch_folder
+        if folder is None or self.samples is None:
+            return None
+        since_ns = (self.watch.since_ns or self._torque_ns) - round(self.settings.watch_before_s * 1e9)
+        rows, vehicle, file = self.samples.since(since_ns), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
+
+        def write() -> Path:
+            write_window(file, vehicle, reason, rows)
+            return file
+
+        return write
+
+    @property
+    def untold(self) -> bool:
+        """Whether there is something that the last report did not tell."""
+        return self.news or self.alarm or self.health.untold(self._now_ns(), self.estimator.rejections)
+
     def statuses(self, monotonic_ns: int, elapsed_s: float) -> list[DiagnosticStatus]:
         self.news = False
-        estimator = self.estimator
+        estimator, now_ns = self.estimator, self._now_ns()
         self.health.simulated, self.health.active = self.simulated, self.active
-        return self.health.statuses(self._now_ns(), monotonic_ns, elapsed_s, estimator.counters, estimator.saturated_steps)
+        self.health.mismatch_s = (now_ns - self.watch.since_ns) * 1e-9 if self.watch.since_ns else math.nan
+        self.health.told(now_ns, estimator.rejections)
+        return self.health.statuses(now_ns, monotonic_ns, elapsed_s, estimator.counters, estimator.saturated_steps)
 
     # --------------------------------------------------------------- samples
 
@@ -118,8 +160,14 @@ class Session:
         health.arrived_ns[channel] = now_ns
         health.behind_ns[channel] = now_ns - stamp_ns
         estimates, residuals = self.estimator.push(channel, stamp_ns, value, rate)
+        if self.samples is not None:
+            self.samples.add(channel, stamp_ns, value, rate)
         if estimates.size:
             self._publish(estimates[0], begin_ns)
+        for residual in residuals:
+            # In doubt the inputs are at fault, not the model; and one that is no number is told below.
+            if not self._doubts & INPUTS and math.isfinite(residual["residual"]):
+                self.alarm |= self.watch.add(int(residual["stamp_ns"]), float(residual["residual"]))
         if not self.active:
             return
         for residual in residuals:
@@ -135,6 +183,7 @@ class Session:
             outputs.interrupt_commands()
         self._torque_ns = stamp_ns
         self._arrived_ns = begin_ns
+        self.watch.turned(float(row["theta"][0]))
         if row["doubts"] != self._doubts:
             self._doubts, self.news = int(row["doubts"]), True
         if self._doubts:

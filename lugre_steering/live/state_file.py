@@ -15,16 +15,12 @@ from typing import Any
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.memory import Memory
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.identity import identity
 
 SCHEMA = "lugre_steering/state/1"
 LARGEST_BYTES = 1_000_000
 AHEAD_S = 1.0
 """A state may be this much ahead of the clock: clocks are set."""
-
-
-def identity(vehicle: Vehicle) -> str:
-    """A hash of all that the vehicle file and its tables say."""
-    return hashlib.sha256(repr(vehicle).encode()).hexdigest()
 
 
 def write_state(file: Path, vehicle: Vehicle, memory: Memory) -> None:

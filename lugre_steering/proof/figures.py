@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.proof.scoreboard import OUTCOMES, TARGETS
-from lugre_steering.report.style import SERIES, figure
+from lugre_steering.report.style import SERIES, figure, whole_ticks
 
 Board = Mapping[str, Any]
 VERDICTS = [name for name in OUTCOMES if name not in ("right name", "wrong name", "extra name")]
@@ -103,6 +103,7 @@ def draw_location(board: Board, file: Path, made: str) -> None:
     )
     with figure(1, 1, caption, file, row_inches=3.2, width=7.0) as axes:
         axes[0, 0].hist(board["location"]["values"], np.linspace(0.0, 1.0, 21), color=SERIES[0])
+        whole_ticks(axes[0, 0].yaxis)
         axes[0, 0].axvline(TARGETS["location_iou"].value, color="k", linestyle="--", label="target")
         axes[0, 0].set(xlabel="intersection over union (1)", ylabel="cases", title="Place in time")
         axes[0, 0].legend()
@@ -159,10 +160,15 @@ def _unlisted(board: Board) -> set[str]:
     return set(UNLISTED_IDS) & set(board["effects"])
 
 
+DARK = 0.65
+"""Share from which a cell is so dark that black would not be read on it."""
+
+
 def _matrix(axis: Any, shares: Any, texts: Sequence[Sequence[str]]) -> None:
     """A table with shaded cells (1 darkest)."""
     axis.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.3, aspect="auto")
     axis.grid(visible=False)
     for i, row in enumerate(texts):
         for j, text in enumerate(row):
-            axis.text(j, i, text, ha="center", va="center", fontsize=7)
+            colour = "white" if shares[i][j] > DARK else "black"
+            axis.text(j, i, text, ha="center", va="center", fontsize=7, color=colour)

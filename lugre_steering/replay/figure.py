@@ -12,25 +12,22 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.online import Agreement, Curves, r2_words
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array
 from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, SHOWN, figure
 from lugre_steering.vehicle import Vehicle
 
-BROKEN_S = 0.5
-"""A curve is broken where nothing came for longer than this."""
-
 
 def draw_replay(
-    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Agreement | None, file: Path
+    name: str, vehicle: Vehicle, motion: Curves, check: Curves, fit: Agreement | None, made: Provenance, file: Path
 ) -> None:
     """Write the picture as PNG.
 
     ``motion``: angle of each side, temperature of each side, estimated torque; ``check``: cylinder torque, residual.
     """
-    with figure(
-        4 if vehicle.rubber else 3, 1, _caption(name, vehicle, fit), file, row_inches=1.9, words=partial(units.words, vehicle)
-    ) as axes:
-        (time, lines), (check_time, checked) = _lines(motion), _lines(check)
+    rows, said = 4 if vehicle.rubber else 3, partial(units.words, vehicle)
+    with figure(rows, 1, _caption(name, vehicle, fit), file, row_inches=1.9, words=said, made=made) as axes:
+        (time, lines), (check_time, checked) = motion.lines(), check.lines()
         measured = "sensor torque" if vehicle.torque_sensor is not None else "cylinder torque"
         sides, force = len(vehicle.sides), vehicle.coordinate.force_unit
         _angles(axes[0, 0], vehicle, time, lines[:sides])
@@ -75,15 +72,6 @@ def _temperatures(ax: Any, vehicle: Vehicle, time: Array, temperatures: Array) -
         ax.plot(time, temperature, label=side, color=colour)
     ax.set_title("tread rubber temperature (estimate)")
     ax.set_ylabel("degC")
-
-
-def _lines(curves: Curves) -> tuple[Array, Array]:
-    """Time (m,) and curves (k, m) that go through the smallest and largest value of every bin; NaN breaks them."""
-    middle, low, high = curves.bins()
-    both = np.stack([low, high], axis=-1).reshape(len(low), -1)
-    time = np.repeat(middle, 2)
-    breaks = 2 * (np.flatnonzero(np.diff(middle) > max(BROKEN_S, 2.0 * curves.bin_s)) + 1)
-    return np.insert(time, breaks, np.nan), np.insert(both, breaks, np.nan, axis=1)
 
 
 def _caption(name: str, vehicle: Vehicle, fit: Agreement | None) -> str:

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
-from lugre_steering.bag.given import Given, each, with_both_tracks
+from lugre_steering.bag.given import Given, each, files, with_both_tracks
 from lugre_steering.bag.reader import bag_name
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError
 from lugre_steering.estimator import Options
 from lugre_steering.online import Comparison
@@ -37,4 +39,6 @@ def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, opti
             raise BagError(f"{path}: no such file or folder")
         overall.merge(passage.fit)
     source = model.name if isinstance(vehicle, Vehicle) else str(vehicle)
-    return Replay(SCHEMA, source, model.coordinate.force_unit, timing, tuple(bags), overall.result())
+    sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
+    origin = made("replay", {**asdict(timing), "initial_temperature": None}, sheet, files(data))
+    return Replay(SCHEMA, source, model.coordinate.force_unit, timing, tuple(bags), overall.result(), origin)

@@ -4,20 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from lugre_steering.bag.find import Skipped
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Options
 from lugre_steering.files import earlier_result, write_record
+from lugre_steering.gate import Facts, Gate
 from lugre_steering.online import Agreement
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Finding
 from lugre_steering.result import Result, folder_for, frame, html, of_bag
-from lugre_steering.serialise import IN_MEMORY
+from lugre_steering.serialise import ADDED, IN_MEMORY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +28,23 @@ if TYPE_CHECKING:
 
 SCHEMA: Final = "lugre_steering/replay/1"
 RECORD = "summary.json"
+
+
+def gate(wanted: Sequence[str]) -> Gate:
+    """What a replay can be made to fail for."""
+    return Gate(wanted, ("skipped", "finding", "no-residual"), ("rmse",))
+
+
+def facts(summary: Mapping[str, Any]) -> Facts:
+    """What of it is so; ``rmse`` [N m] is the largest of any recording."""
+    found = [f"{bag['name']}: {finding['finding']}" for bag in summary["bags"] for finding in bag["findings"]]
+    bare = [bag["name"] for bag in summary["bags"] if bag["fit"] is None]
+    return {
+        "skipped": f"{len(summary['skipped'])} skipped" if summary["skipped"] else None,
+        "finding": ", ".join(found) or None,
+        "no-residual": f"no residual of {', '.join(bare)}" if bare else None,
+        "rmse": max((bag["fit"]["rmse_Nm"] for bag in summary["bags"] if bag["fit"]), default=None),
+    }
 
 
 @dataclass(frozen=True)
@@ -73,6 +93,8 @@ class ReplayedBag:
     findings: tuple[Finding, ...]
     picture: str | None = None
     picture_note: str | None = None
+    page: str | None = field(default=None, metadata=ADDED)
+    """File of the page beside the record."""
     series: Series | None = field(default=None, repr=False, metadata=IN_MEMORY)
 
     def kept(self) -> Series:
@@ -96,7 +118,8 @@ class ReplayedBag:
 class Replay(Result):
     """Torques that the estimator gives for recordings; ``overall``: agreement with the measured torque over all of them.
 
-    ``torque_unit``: N m, or the force unit of a linear axis; ``options``: the timing rules that were used.
+    ``torque_unit``: N m, or the force unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was
+    named and gave no torque, with the reason.
     """
 
     schema: Literal["lugre_steering/replay/1"]
@@ -105,6 +128,8 @@ class Replay(Result):
     options: Options
     bags: tuple[ReplayedBag, ...]
     overall: Agreement | None
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    skipped: tuple[Skipped, ...] = field(default=(), metadata=ADDED)
 
     def save(self, out: str | Path) -> None:
         """Write summary.json into a folder; replaces only an earlier one there."""

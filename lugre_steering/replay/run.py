@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,17 +24,22 @@ from rosbags.typesys.store import Typestore
 
 from lugre_steering import yaml_text
 from lugre_steering.bag import Bag, BagWriter, Block, Part, cdr
+from lugre_steering.bag.find import REPLAYED, Skipped
 from lugre_steering.bag.given import in_stamp_order
 from lugre_steering.bag.load import STRAY_NS
-from lugre_steering.bag.reader import bag_name
+from lugre_steering.bag.reader import bag_name, shortened
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
-from lugre_steering.errors import BagError, DataError
+from lugre_steering.effects.registry import made
+from lugre_steering.errors import BagError, DataError, ImplausibleWarning
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
 from lugre_steering.live.plan import planned_angles
-from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, r2_words, sheet_words
+from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
+from lugre_steering.pool import WorkerDiedError, in_processes
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import AIR_LIMIT_DEGC, NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
+from lugre_steering.replay.page import write_page
 from lugre_steering.replay.result import RECORD, SCHEMA, InputCounts, Replay, ReplayedBag, Series
 from lugre_steering.report.available import no_pictures
 from lugre_steering.vehicle import Vehicle, load
@@ -44,8 +50,6 @@ COMMAND = "steering/command"
 AIR = "air"
 """In place of an initial temperature: that of the first recorded air."""
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-MARK = {"lugre_steering": "replay"}
-"""In metadata.yaml of every bag written here: only such a bag is ever replaced."""
 NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate", "angle_jump")
 """Counters of the estimator about samples that it did use."""
 
@@ -60,48 +64,101 @@ def replay(
     options: Options | None = None,
     progress: Progress | None = None,
     initial_temperature: str | None = None,
+    *,
+    jobs: int = 1,
+    skipped: Sequence[Skipped] = (),
 ) -> dict[str, Any]:
-    """Run the estimator over each bag anew; write bags, pictures and summary.json into ``out``.
+    """Run the estimator over each bag anew, ``jobs`` at a time; write bags, pictures and summary.json into ``out``.
 
     ``initial_temperature``: of the rubber at the start of each bag, a number [degC] or ``air`` for the first recorded air; without it that
-    of the vehicle file.
-    Returns the summary. Raises ``BagError`` or ``VehicleFileError`` for input that is of no use.
+    of the vehicle file. ``skipped``: what has been left out before.
+    Returns the summary. Of several bags, one that gives no torque is left out with the reason; ``BagError`` or ``VehicleFileError`` for
+    input of which nothing is of use.
     """
     vehicle = load(vehicle_file)
     names = _names(bags, out)  # before anything is made
     options = options or Options()
-    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None)
+    if initial_temperature not in (None, AIR):
+        _degrees(initial_temperature)
+    origin = made("replay", {**asdict(options), "initial_temperature": initial_temperature}, vehicle_file, bags)
+    tasks = [
+        _Task(path, name, vehicle_file, out, options, initial_temperature, origin) for path, name in zip(bags, names, strict=True)
+    ]
+    done: dict[int, ReplayedBag | Skipped] = {}
     overall = Comparison()
+    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None, origin, tuple(skipped))
     try:
         with output_folder(out):
-            for path, name in zip(bags, names, strict=True):
-                run = Passage(path, name, vehicle, options, initial_temperature)
-                written = run.write(out, progress)
-                overall.merge(run.fit)
-                summary = replace(summary, bags=(*summary.bags, written), overall=overall.result())
-                write_record(summary.json, out / RECORD)
+            for number, (result, fit) in _results(tasks, vehicle, jobs, progress):
+                done[number] = result
+                overall.merge(fit)
+                in_order = [done[key] for key in sorted(done)]
+                written = tuple(bag for bag in in_order if isinstance(bag, ReplayedBag))
+                left = tuple(bag for bag in in_order if isinstance(bag, Skipped))
+                summary = replace(summary, bags=written, overall=overall.result(), skipped=(*skipped, *left))
+                if written:
+                    write_record(summary.json, out / RECORD)
+            if not summary.bags:
+                raise BagError(_nothing([bag for bag in done.values() if isinstance(bag, Skipped)]))
     except OSError as error:
         raise BagError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
     return summary.json
 
 
-def describe(summary: Mapping[str, Any]) -> Iterator[str]:
-    """The summary in a few lines of text."""
-    unit = summary["torque_unit"]
-    for bag in summary["bags"]:
-        yield f"{bag['name']}: {bag['estimates']} torques from {bag['messages']} messages in {bag['duration_s']:.1f} s"
-        fit = bag["fit"]
-        if fit is None:
-            yield f"  {bag['fit_note']}"
-        else:
-            r2 = r2_words(fit["r2"])
-            yield f"  against cylinder torque: RMSE {fit['rmse_Nm']:.1f} {unit}{r2}, bias {fit['bias_Nm']:+.1f} {unit}"
-        for label, counts in bag["samples"].items():
-            if counts["rejected"]:
-                reasons = ", ".join(f"{count} {reason}" for reason, count in counts["rejected"].items())
-                yield f"  {label}: {counts['used']} used; rejected: {reasons}"
-        for finding in bag["findings"]:
-            yield f"  {finding['finding']}: {finding['topic']} {finding['statement']}".replace(":  ", ": ")
+@dataclass(frozen=True)
+class _Task:
+    """What a process needs to replay one bag."""
+
+    path: Path
+    name: str
+    vehicle_file: Path
+    out: Path
+    options: Options
+    initial_temperature: str | None
+    origin: Provenance
+
+
+_Answer = tuple["ReplayedBag | Skipped", Comparison]
+
+
+def _results(
+    tasks: Sequence[_Task], vehicle: Vehicle, jobs: int, progress: Progress | None
+) -> Iterator[tuple[int, _Answer]]:
+    """Number and outcome of each bag as it ends; in this process if there is one job only."""
+    if min(jobs, len(tasks)) <= 1:
+        for number, task in enumerate(tasks):
+            yield number, _passed(task, vehicle, progress)
+        return
+    for done, (number, answer) in enumerate(in_processes(_alone, tasks, jobs), 1):
+        if isinstance(answer, WorkerDiedError):
+            answer = Skipped(str(tasks[number].path), str(answer)), Comparison()
+        if progress is not None:
+            progress("recordings", done, len(tasks))
+        yield number, answer
+
+
+def _alone(task: _Task) -> _Answer:
+    """One bag in a process of its own; doubts about the vehicle file are told by the one that started it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ImplausibleWarning)
+        return _passed(task, load(task.vehicle_file), None)
+
+
+def _passed(task: _Task, vehicle: Vehicle, progress: Progress | None) -> _Answer:
+    """One bag written, or why not."""
+    run = Passage(task.path, task.name, vehicle, task.options, task.initial_temperature)
+    try:
+        return run.write(task.out, task.origin, progress), run.fit
+    except BagError as error:
+        return Skipped(str(task.path), str(error).removeprefix(f"{task.path}: ")), Comparison()
+
+
+def _nothing(skipped: Sequence[Skipped]) -> str:
+    """What to say where no bag was of use: of several, the reasons of the first few."""
+    reasons = [f"{one.bag}: {one.reason}" for one in skipped]
+    if len(reasons) == 1:
+        return reasons[0]
+    return f"none of {len(reasons)} recordings gave a torque: {shortened(reasons, 3)}"
 
 
 # ------------------------------------------------------------------ files
@@ -121,9 +178,9 @@ def _names(bags: Sequence[Path], out: Path) -> list[str]:
             if source == result or source in result.parents or result in source.parents:
                 raise BagError(f"{path}: the result {out / name} would touch this bag; choose another --out")
         _refuse_foreign(out / name)
-        picture = out / f"{name}.png"
-        if picture.exists() and not is_ours(picture):
-            raise _not_ours(picture)
+        for beside in (out / f"{name}.png", out / f"{name}.html"):
+            if beside.exists() and not is_ours(beside):
+                raise _not_ours(beside)
     if (out / RECORD).exists() and read_record(out / RECORD, SCHEMA) is None:
         raise _not_ours(out / RECORD)
     return names
@@ -141,7 +198,7 @@ def _refuse_foreign(folder: Path) -> None:
         content: Any = yaml_text.parse((folder / "metadata.yaml").read_text(encoding="utf-8"))
         described = content["rosbag2_bagfile_information"]
         own = {"metadata.yaml", *described["relative_file_paths"]}
-        ours = described["custom_data"] == MARK
+        ours = described["custom_data"] == REPLAYED
     except (OSError, ValueError, yaml.YAMLError, LookupError, TypeError):
         ours = False
     if not ours or folder.is_symlink():
@@ -174,20 +231,22 @@ class Passage:
         self._log_ns: tuple[int, int] | None = None
         self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
-    def write(self, out: Path, progress: Progress | None) -> ReplayedBag:
-        """Write the bag and the picture; returns the summary of this bag."""
+    def write(self, out: Path, origin: Provenance, progress: Progress | None) -> ReplayedBag:
+        """Write the bag, the page and the picture; returns the summary of this bag."""
         with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
             topics = self._topics(bag, channels)
-            with BagWriter(result, custom_data=MARK) as writer:
+            with BagWriter(result, custom_data=REPLAYED, compressed=True) as writer:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
             self._check_estimates(samples)
             _refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
             findings = [*bag.findings, *self._found, *self._last_findings()]
         summary = self._summary(samples, findings)
-        picture, note = self._picture(out / f"{self.name}.png", summary.fit)
-        return replace(summary, picture=picture, picture_note=note)
+        page = out / f"{self.name}.html"
+        write_page(summary, self.vehicle, self.motion, self.check, origin, page)
+        picture, note = self._picture(out / f"{self.name}.png", summary.fit, origin)
+        return replace(summary, picture=picture, picture_note=note, page=page.name)
 
     def remember(self) -> ReplayedBag:
         """Write nothing, keep the torques in memory; returns the summary of this bag with them."""
@@ -455,13 +514,13 @@ class Passage:
             words.append(", ".join([f"{label}: {counts.used} samples used", *reasons]))
         return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
-    def _picture(self, file: Path, fit: Agreement | None) -> tuple[str | None, str | None]:
+    def _picture(self, file: Path, fit: Agreement | None, origin: Provenance) -> tuple[str | None, str | None]:
         if note := no_pictures():
             file.unlink(missing_ok=True)  # of an earlier run: it would not belong to this result
             return None, note
         from lugre_steering.replay.figure import draw_replay
 
-        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, file)
+        draw_replay(self.name, self.vehicle, self.motion, self.check, fit, origin, file)
         return file.name, None
 
 

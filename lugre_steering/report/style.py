@@ -5,20 +5,25 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.files import MAKER, refuse_foreign, replacing
+from lugre_steering.provenance import Provenance, provenance
 
 try:
     import matplotlib as mpl
     from cycler import cycler
     from matplotlib.figure import Figure
     from matplotlib.text import Text
+    from matplotlib.ticker import MaxNLocator
 except ImportError as error:
     raise LugreSteeringError("pictures need matplotlib: install 'lugre_steering[report]'") from error
 
@@ -29,6 +34,20 @@ ORIGINAL = {"color": "#1f4fb4", "linestyle": "-.", "linewidth": 1.4}
 
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
 """Colours for any other family of curves; told apart by readers with colour-deficient sight too (Okabe and Ito)."""
+
+def whole_ticks(axis: Any) -> None:
+    """Ticks at whole numbers only, for what is counted."""
+    axis.set_major_locator(MaxNLocator(integer=True))
+
+
+def family(labels: Sequence[str]) -> list[str]:
+    """Colours for a family of curves: from dark to light where their labels begin with the numbers of an ordered quantity (rates,
+    temperatures), else each its own."""
+    if len(labels) > 2 and all(re.match(r"[-+]?\d", label) for label in labels):
+        shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(labels)))
+        return [str(mpl.colors.to_hex(shade)) for shade in shades]
+    return [SERIES[i % len(SERIES)] for i in range(len(labels))]
+
 
 SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1000.0, "mm")}
 """Coordinates on axes: factor and unit."""
@@ -66,13 +85,15 @@ def figure(
     row_inches: float = 3.0,
     width: float = 10.0,
     words: Callable[[str], str] = str,
+    made: Provenance | None = None,
 ) -> Iterator[Any]:
     """Axes (rows, columns) to draw on; on leaving, the caption is set below them and the picture is written to
     ``file``.
 
     The caption is also the description inside the file, which says who made it: a picture of anybody else is never
     replaced (``DataError``). ``words`` is applied to all text (a linear axis has forces where
-    others have torques). The figure grows with its caption, so no line of it is ever cut off.
+    others have torques); ``made``, how the result came about, goes into the file. The figure grows with its caption, so no
+    line of it is ever cut off.
     """
     refuse_foreign([file])
     lines = [
@@ -91,4 +112,6 @@ def figure(
         fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
         fig.text(0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333")
         with replacing(file) as stream:
-            fig.savefig(stream, format="png", metadata={"Software": MAKER, "Description": words(caption)})
+            origin = "\n".join((made or provenance("figure", {})).lines())
+            metadata = {"Software": MAKER, "Description": words(caption), "Comment": origin}
+            fig.savefig(stream, format="png", metadata=metadata)

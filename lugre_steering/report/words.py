@@ -20,36 +20,51 @@ _HANDIER = (("rad", "deg", 180.0 / math.pi), ("m", "mm", 1e3), ("Pa", "MPa", 1e-
 
 @dataclass(frozen=True)
 class Axis:
-    """A quantity on an axis: its label with unit, and what to multiply SI values by."""
+    """A quantity on an axis: its name and unit, and what to multiply SI values by."""
 
-    label: str
+    name: str
+    unit: str
     scale: float
+
+    @property
+    def label(self) -> str:
+        """As every axis of a picture or chart is labelled."""
+        return labelled(self.name, self.unit)
+
+
+def labelled(name: str, unit: str) -> str:
+    """A quantity with its unit, if it has one."""
+    return name if unit in ("", "1") else f"{name} ({unit})"
 
 
 def torque_axis(vehicle: Vehicle, *values: Array) -> Axis:
     """Torque (or force) in N m, or in kN m where the values are large."""
     unit = vehicle.coordinate.force_unit
     top = max((float(np.nanmax(np.abs(v))) for v in values if v.size), default=0.0)
-    return Axis(f"k{unit}", 1e-3) if top >= 2000.0 else Axis(unit, 1.0)
+    return Axis("torque", f"k{unit}", 1e-3) if top >= 2000.0 else Axis("torque", unit, 1.0)
 
 
 def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
     """A coordinate of ``units.COORDINATES``, or its name in this vehicle's words, in its words and units; angles in degrees."""
     name = {units.words(vehicle, key): key for key in units.COORDINATES}.get(name, name)
     if name == "torque":
-        return Axis(f"{units.words(vehicle, name)} [k{vehicle.coordinate.force_unit}]", 1e-3)
+        return Axis(units.words(vehicle, name), f"k{vehicle.coordinate.force_unit}", 1e-3)
     unit, scale = units.label(vehicle, units.COORDINATES.get(name, "")), 1.0
     for plain, handy, factor in _HANDIER:
         if re.match(rf"{plain}(?!\w)|{plain}/", unit):
             unit, scale = handy + unit[len(plain) :], factor
             break
-    words = coordinate_name(vehicle, name)
-    return Axis(words if unit in ("", "1") else f"{words} [{unit}]", scale)
+    return Axis(coordinate_name(vehicle, name), unit, scale)
 
 
 def coordinate_name(vehicle: Vehicle, name: str) -> str:
     """'steering rate' of a linear axis called position: 'position rate'; 'steering angle' by the name it has in the file."""
     return units.words(vehicle, name).replace("steering angle", vehicle.coordinate.name)
+
+
+def with_article(noun: str) -> str:
+    """'a steering rate', 'an angle'."""
+    return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -61,8 +76,21 @@ def number(value: float | None, digits: int = 4) -> str:
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
     if not -4 <= decimals <= 6:
         return f"{value:.{digits - 1}e}"
-    text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u2009")
+    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    if abs(value) >= 1e4:  # four digits read well without a gap
+        text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u2009")
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """A number with its unit; what is counted in ones has none."""
+    return number(value, 3) if unit in ("", "1") else f"{number(value, 3)} {unit}"
+
+
+def torque(vehicle: Vehicle, value: float) -> str:
+    """A torque (or force) as in every sentence and table: three digits with its unit, large ones in thousands."""
+    unit = vehicle.coordinate.force_unit
+    return f"{number(1e-3 * value, 3)} k{unit}" if abs(value) >= 9995.0 else f"{number(value, 3)} {unit}"
 
 
 def estimate(value: float | None, ends: Sequence[float | None] | None) -> tuple[str, str]:
@@ -106,6 +134,11 @@ def thin(values: Array, limit: int) -> tuple[Array, int]:
     first, last = np.sort(np.stack([rows.argmin(axis=1), rows.argmax(axis=1)]), axis=0)
     at = np.arange(len(rows))
     return np.stack([rows[at, first], rows[at, last]], axis=1).ravel(), width // 2
+
+
+def sentences(text: str) -> list[str]:
+    """A paragraph sentence by sentence."""
+    return [sentence for sentence in re.split(r"(?<=[.)]) (?=[A-Z]|[a-z]+[._][a-z_]+\b)", text) if sentence]
 
 
 def broken(x: Array, y: Array) -> tuple[Array, Array]:

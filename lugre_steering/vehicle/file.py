@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,13 +70,14 @@ def _with_initial(vehicle: Vehicle) -> Vehicle:
     return vehicle.replace(initial=Initial(law.reference_temperature_degC, law.reference_temperature_degC))
 
 
-def save(vehicle: Vehicle, path: str | Path) -> None:
-    """Write a vehicle file that stands alone; keys left at None and empty defaults are not written.
+def save(vehicle: Vehicle, path: str | Path, notes: Sequence[str] = ()) -> None:
+    """Write a vehicle file that stands alone; keys left at None and empty defaults are not written. ``notes`` become comments.
 
     Its first and last lines tell who wrote it and that nothing is missing: most of its beginnings would be valid vehicles.
     """
     content = yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120)
-    write_text(f"{VEHICLE_MARK}; not whole without the three dots of its last line\n{content}{END}\n", Path(path))
+    comments = "".join(f"# {''.join(c if c.isprintable() else '?' for c in note)}\n" for note in notes)
+    write_text(f"{VEHICLE_MARK}; not whole without the three dots of its last line\n{comments}{content}{END}\n", Path(path))
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:

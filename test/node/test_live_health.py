@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -278,6 +279,47 @@ def test_every_withheld_output_is_an_error_once() -> None:
     health.withheld["torque is not a finite number"] += 3
     assert outputs_of(health) == (ERROR, "withheld: torque is not a finite number")
     assert outputs_of(health) == (OK, "running")
+
+
+def residual_after(seconds: int, measured_over_estimate: float, estimate: float) -> tuple[bytes, str]:
+    """Level and message about the residual after so long with torques of one shape."""
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    for _ in range(seconds):
+        for i in range(100):
+            torque = estimate * math.sin(0.1 * i)
+            health.add_residual((measured_over_estimate - 1.0) * torque, measured_over_estimate * torque)
+        status = health.statuses(0, 0, 1.0, {}, 0)[3]
+    return status.level, status.message
+
+
+def test_a_torque_of_the_right_shape_and_another_size_tells_the_sheet() -> None:
+    level, message = residual_after(20, 1.65, 3e4)
+    assert level == WARN
+    assert "measured torque is 1.6 times" in message or "measured torque is 1.7 times" in message
+    assert "axle.load_N" in message
+    assert residual_after(20, 1.2, 3e4) == (OK, "residual formed")
+    assert residual_after(20, 1.65, 30.0) == (OK, "residual formed")  # next to nothing moves
+
+
+def test_what_is_new_is_to_be_told_at_once_and_what_goes_on_is_not() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    rejected = np.zeros((7, 13), np.int64)
+    health.arrivals, health.arrived_ns = [1] * 7, [SECOND] * 7
+    health.told(SECOND, rejected)
+    assert not health.untold(SECOND, rejected)
+    assert health.untold(SECOND + 300_000_000, rejected)  # angles are stale
+    for step in range(1, 4):
+        more = rejected.copy()
+        more[2, 4] += step
+        assert health.untold(SECOND, more) == (step == 1)
+        health.told(SECOND, more)
+    health.unused["steering/command: malformed"] += 1
+    assert health.untold(SECOND, more)
+    late = SECOND + 300_000_000
+    health.told(late, more)
+    assert not health.untold(late, more)
+    assert not health.untold(SECOND, more)  # all inputs are back
+    assert health.untold(late, more)
 
 
 def test_other_joints_are_a_mistake_only_where_no_wanted_joint_comes() -> None:

@@ -108,6 +108,23 @@ def node_output(node: Any) -> str:
     return str(node.output)
 
 
+def test_a_node_that_is_stopped_says_so_and_leads_the_commands_to_zero() -> None:
+    with LiveNode(*COMMANDS, "-p", "withdrawal_ramp_s:=0.4") as node, World() as world:
+        Driver(world).steer(1.5)
+        count = len(commands(world))
+        assert abs(commands(world)[-1]) > 5e3
+        code, seconds = node.stop(signal.SIGTERM)
+        assert code == 0
+        assert seconds < 3.0
+        world.wait(lambda: commands(world)[-1] == 0.0)
+        last = commands(world)[count - 1 :]
+        assert len(last) > 10
+        assert max(abs(b - a) for a, b in itertools.pairwise(last)) < 0.25 * abs(last[0])
+        assert world.heard["feed_forward"][-1].effort[0] == 0.0
+        told = [status.message for status in world.heard["diagnostics"][-1].status if status.name.endswith("outputs")]
+        assert "node stops: feed-forward to zero" in told[0]
+
+
 def test_two_nodes_of_one_name_a_missing_topic_and_another_clock_are_told_on_the_console() -> None:
     with LiveNode() as one, LiveNode() as _, World() as world:
         for _ in range(40):

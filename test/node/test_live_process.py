@@ -20,7 +20,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
 from lugre_steering.live.table import OPTION_TABLE, TABLE
 
-FIXED = {"autostart", "effects_files", "executor", "frame_id", "input_depth", "publish_commands"}
+FIXED = {"autostart", "effects_files", "executor", "frame_id", "input_depth", "publish_commands", "watch_folder"}
 CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"
 
 

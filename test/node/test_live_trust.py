@@ -29,6 +29,7 @@ from live_harness import (
     commands,
     message_of,
     set_parameters,
+    to_ns,
 )
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -36,12 +37,20 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 COMMANDS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5")
 
 
-def told_after(world: World, text: str, since: float) -> float:
-    """Seconds from then until /diagnostics said so."""
-    for message, when in zip(world.heard["diagnostics"], world.arrived["diagnostics"], strict=False):
-        if when >= since and any(text in status.message for status in message.status):
-            return when - since
+def told_after(world: World, text: str, since_ns: int) -> float:
+    """Seconds from then (the sensors' clock) until the node said so on /diagnostics."""
+    for message in world.heard["diagnostics"]:
+        when_ns = to_ns(message.header.stamp)
+        if when_ns >= since_ns and any(text in status.message for status in message.status):
+            return (when_ns - since_ns) * 1e-9
     raise AssertionError(f"'{text}' was never told")
+
+
+def steer_until_it_moves(driver: Driver) -> None:
+    """Near the end of a stroke an angle that stands still is no fault."""
+    driver.steer(1.2)
+    while abs(math.cos(0.9 * driver.time)) < 0.8:
+        driver.steer(0.05)
 
 
 FAULTS: dict[str, tuple[Callable[[], Callable[[int, float], float]], str]] = {
@@ -63,18 +72,30 @@ def neighbour() -> Iterator[tuple[World, Driver]]:
 def test_a_fault_is_told_within_a_fifth_of_a_second_and_the_commands_go_to_zero(neighbour: tuple[World, Driver], name: str) -> None:
     world, driver = neighbour
     fault, reason = FAULTS[name]
-    driver.steer(1.2)
-    begin, sent = time.monotonic(), len(commands(world))
+    steer_until_it_moves(driver)
+    begin_ns, sent = time.time_ns(), len(commands(world))
     driver.steer(0.8, fault())
     during = len(commands(world))
     driver.steer(1.6)
     time.sleep(0.2)
     found = commands(world)
-    # What the issue asks for, and the reports' own 0.1 s and a busy machine's delay.
-    assert told_after(world, f"feed-forward to zero: {reason}", begin) < 0.2 + 0.15
-    assert found[during - 1] == 0.0
-    assert max(abs(b - a) for a, b in itertools.pairwise(found[sent:])) < 5e3
-    assert found[-1] == world.heard["feed_forward"][-1].effort[0] == world.heard["estimate"][-1].effort[0]
+    assert told_after(world, f"feed-forward to zero: {reason}", begin_ns) < 0.2
+    assert 0.0 in found[sent:during]
+    # Of 25 kN m at most a quarter at once: the ramp of 0.2 s counts no gap of a busy machine for more than 0.05 s.
+    assert max(abs(b - a) for a, b in itertools.pairwise(found[sent:])) < 0.25 * 25e3
+    for _ in range(5):  # each gap that a busy machine makes begins the ramp of the commands anew
+        if commands(world)[-1] != world.heard["estimate"][-1].effort[0]:
+            driver.steer(0.8)
+            time.sleep(0.1)
+    assert commands(world)[-1] == world.heard["feed_forward"][-1].effort[0] == world.heard["estimate"][-1].effort[0]
+
+
+def test_an_input_that_ends_is_told_within_a_fifth_of_a_second(neighbour: tuple[World, Driver]) -> None:
+    world, driver = neighbour
+    driver.steer(0.5)
+    last_ns = time.time_ns()
+    time.sleep(0.4)
+    assert told_after(world, "angle/left stale; angle/right stale", last_ns) < 0.2
 
 
 def long_plan(points: int) -> JointTrajectory:
@@ -173,6 +194,8 @@ def test_a_vehicle_file_is_reloaded_without_a_gap_all_or_nothing(neighbour: tupl
     asking.join()
     time.sleep(0.3)
     assert found[0].success, found[0].message
-    torques = [message.wrench.torque.z for message in world.heard["torque"][before:]]
-    assert len(torques) == 150
-    assert max(abs(b - a) for a, b in itertools.pairwise(torques)) < 5e3
+    heard = [(to_ns(message.header.stamp), message.wrench.torque.z) for message in world.heard["torque"][before:]]
+    assert len(heard) == 150
+    # No faster than both tracks' presliding stiffness makes of the motion; a busy machine makes gaps between the samples.
+    fastest = 2.0 * math.degrees(5900.0) * 0.3 * 0.9
+    assert all(abs(b - a) < 2e3 + fastest * (later - sooner) * 1e-9 for (sooner, a), (later, b) in itertools.pairwise(heard))

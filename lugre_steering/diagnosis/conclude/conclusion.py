@@ -50,13 +50,14 @@ def conclude(
         final = whole  # timed by all data
     left = left_over(done, final)
     verdict: Verdict
-    lawful, beside, laws = None, done, []
+    lawful, beside, laws, law = None, done, [], ""
     if left.structured and not named:
         lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress)
     if lawful is not None:
         beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
         laws = described(lawful)
-        left = beside_laws(left, left_over(beside, final), sentence(laws, done.torque), formula(laws, problem.vehicle))
+        law = sentence(laws, done.torque)
+        left = beside_laws(left, left_over(beside, final), law, formula(laws, problem.vehicle))
     if named:
         verdict = "missing_physics"
     elif left.structured:
@@ -73,11 +74,14 @@ def conclude(
     ended = [effect.id for effect in effects if effect.id not in kept]
     causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
+    advice = next_experiment(done, verdict, whole)
+    headline, statistics = statement(done, verdict, effects, judged, causal, left.text, ended, law, advice)
     return Diagnosis(
         schema=SCHEMA,
         bags=tuple(run.name for run in problem.runs),
         verdict=verdict,
-        statement=statement(done, verdict, effects, judged, causal, left.text, ended, lawful is not None),
+        statement=f"{headline} {statistics}",
+        headline=headline,
         noise_floor_Nm=done.noise.floor,
         baseline=Errors(verify.rmse(problem, found.baseline, problem.valid), judged.before),
         augmented=Augmented(
@@ -92,11 +96,12 @@ def conclude(
         unexplained=left.entry,
         detection_limits=_limits(done, [effect.id for effect in effects]),
         data_quality=tuple(findings),
-        next_experiment=next_experiment(done, verdict, whole),
+        next_experiment=advice,
         laws=tuple(laws),
         traces=traces(beside, whole, final, None if judged.rotated else found.final if named else final),
         evidence=evidence(done, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
+        sheet=problem.vehicle,
     ).in_words()
 
 

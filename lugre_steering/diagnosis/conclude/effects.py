@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.search.trial import Trial, cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate
 from lugre_steering.recording import Array
+from lugre_steering.report import words
 
 BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
@@ -35,13 +36,15 @@ def named_effects(done: Finished, whole: Fit, material: float) -> list[NamedEffe
     entries = []
     for index, ((candidate, _), item) in enumerate(zip(whole.effects, found.found, strict=True)):
         part = locate.contribution(problem, whole, index)
+        size = float(np.max(np.abs(part)))
         rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
         entries.append(NamedEffect(
             id=candidate.effect.id, stage=cast(Stage, candidate.effect.stage),
-            statement=_statement(done, whole, index, item, part, rivals, material),
+            statement=_statement(done, whole, index, item, size, rivals, material),
             p_value=item.score.p_value, parameters=intervals[index], where=tuple(_where(done, candidate, part)),
             energy_share=float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0)),
             masked_share=float(np.clip(item.score.masked_share, 0.0, 1.0)), indistinguishable_from=tuple(rivals),
+            largest_Nm=size, largest_share=size / done.amplitude,
         ))  # fmt: skip
     return sorted(entries, key=lambda entry: -entry.energy_share)
 
@@ -68,17 +71,15 @@ def _intervals(done: Finished, whole: Fit) -> list[dict[str, FittedValue]]:
 
 
 def _statement(
-    done: Finished, whole: Fit, index: int, item: Found, part: Array, rivals: list[str], material: float
+    done: Finished, whole: Fit, index: int, item: Found, size: float, rivals: list[str], material: float
 ) -> str:
-    """One sentence; an effect is material above the share ``material`` of the torque amplitude."""
+    """One sentence; an effect of ``size`` [N m] is material above the share ``material`` of the torque amplitude."""
     candidate, _ = whole.effects[index]
-    amplitude = float(np.percentile(np.abs(done.problem.measured), 99.0))
-    size = float(np.max(np.abs(part)))
     law = units.law(done.problem.vehicle, candidate.effect.equation)
-    label = "material" if size > material * amplitude else "small"
+    label = "material" if size > material * done.amplitude else "small"
     return (
         f"{done.title(candidate.effect.id)}: {law}. Up to {done.torque(size)} "
-        f"({100 * size / amplitude:.1f} % of the torque amplitude, {label}){_since(done, candidate)}"
+        f"({words.percent(size / done.amplitude)} of the torque amplitude, {label}){_since(done, candidate)}"
         + _lines(done, whole, index, item)
         + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
     )
@@ -102,7 +103,7 @@ def _lines(done: Finished, whole: Fit, index: int, item: Found) -> str:
     equal = tied(problem, done.weight, done.roles, own, others, before, float(problem.valid.sum()), law=0.0)
     key = candidate.free[0]
     unit = done.unit(candidate.parameter(key).unit)
-    named = [f"{trial.candidate.line} ({trial.fit.effects[-1][1][key]:.3g} {unit})" for trial in equal]
+    named = [f"{trial.candidate.line} ({words.quantity(trial.fit.effects[-1][1][key], unit)})" for trial in equal]
     return f"; line {candidate.line} cannot be told from {', '.join(named)}" if named else ""
 
 

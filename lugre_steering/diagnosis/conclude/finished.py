@@ -16,6 +16,7 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
+from lugre_steering.report import words
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,11 @@ class Finished:
         """Title of an effect of the catalogue, likewise."""
         return units.title(self.problem.vehicle, CATALOGUE[effect])
 
+    @cached_property
+    def amplitude(self) -> float:
+        """Of the measured torque [N m]: exceeded in one of a hundred samples."""
+        return float(np.percentile(np.abs(self.problem.measured), 99.0))
+
     def torque(self, value: float) -> str:
         """A torque (or force) in few digits, with its unit."""
-        digits = f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
-        return f"{digits} {self.problem.vehicle.coordinate.force_unit}"
+        return words.torque(self.problem.vehicle, value)

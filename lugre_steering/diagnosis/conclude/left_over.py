@@ -89,8 +89,7 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
 def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> LeftOver:
     """Unlisted structure ``before`` once a law is found for it, said in ``law`` and ``formula``; ``after``: what is left beside the law."""
     rest = f"beside the law, {after.text or after.entry.description}"
-    entry = replace(before.entry, description=f"{law}; {rest}", formula=formula)
-    return LeftOver(entry, f"a law that was not listed does: {law}; {rest}", True)
+    return LeftOver(replace(before.entry, description=f"{law}; {rest}", formula=formula), rest, True)
 
 
 def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict in words."""
+"""The verdict in words: first for an engineer, then what speaks for it and what limits it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lugre_steering.diagnosis.conclude import headline
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.verify import Judged
-from lugre_steering.diagnosis.result import NamedEffect, Verdict
+from lugre_steering.diagnosis.result import Experiment, NamedEffect, Verdict
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.problem import STATIC, resized
+from lugre_steering.report import words
 from lugre_steering.vehicle.size import VEHICLE, Size
 
 
@@ -44,53 +46,57 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
 
 def statement(
     done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str,
-    ended: Sequence[str], lawful: bool,
-) -> str:
-    """The verdict for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
-    looking ahead, ``left``: what remains,
-    ``ended``: effects that do not act in the last bag, ``lawful``: a law was found for it."""
-    floor, torque = done.torque(done.noise.floor), done.torque
+    ended: Sequence[str], law: str, advice: Experiment | None,
+) -> tuple[str, str]:
+    """Headline and statistics, for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
+    looking ahead, ``left``: what remains, ``ended``: effects that do not act in the last bag, ``law``: the one found for it, if any,
+    ``advice``: the next experiment."""
+    floor = f"Noise alone makes {done.torque(done.noise.floor)}."
     if verdict == "consistent":
-        return (
-            f"After recalibration the published model explains the recording: held-out error "
-            f"{torque(judged.before)} at a noise floor of {floor}. No missing physics is needed; "
-            "see detection_limits for what could have gone unseen."
-        )
-    if verdict == "unlisted_physics" and lawful:
-        return (
-            f"No entry of the catalogue explains what the recalibrated model leaves over, but {left}. With the law the held-out error "
-            f"falls from {torque(judged.before)} to {torque(judged.after)} (improvement {100 * judged.gain:.0f} %, 95 % interval "
-            f"{100 * judged.interval[0]:.0f} to {100 * judged.interval[1]:.0f} %) at a noise floor of {floor}. augmented.yaml has it "
-            "under 'laws'."
-        )
+        unseen = "From what size on an effect would have shown: detection_limits of diagnosis.json."
+        return headline.consistent(done, judged.before), f"{floor} {unseen}"
     if verdict == "unlisted_physics":
-        return (
-            f"The recalibrated model leaves {torque(judged.before)} on held-out data at a noise floor of {floor}, and no "
-            f"entry of the catalogue explains it: {left}. The physics is unlisted; see unexplained for where it lives."
-        )
-    names = " and ".join(f"{done.title(effect.id).lower()} ({effect.id})" for effect in effects)
+        if law:
+            rest = f"{left[:1].upper()}{left[1:]}."
+            return headline.lawful(law), f"{_gain(done, judged, 'the law')} {floor} {rest}"
+        return headline.unlisted(done, judged.before, left), f"{floor} Where it lives: unexplained in diagnosis.json."
+    told = headline.missing(done, effects, advice, not ended)
+    them = "it" if len(effects) == 1 else "them"
+    return told, " ".join([_gain(done, judged, them), floor, *_remarks(done, effects, judged, causal, left, ended)])
+
+
+def _gain(done: Finished, judged: Judged, with_: str) -> str:
+    low, high = judged.interval
+    return (
+        f"With {with_} the held-out error falls from {done.torque(judged.before)} to {done.torque(judged.after)} (improvement "
+        f"{100 * judged.gain:.0f} %, 95 % interval {100 * low:.0f} to {100 * high:.0f} %)."
+    )
+
+
+def _remarks(
+    done: Finished, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str, ended: Sequence[str]
+) -> list[str]:
+    """What limits named effects, one sentence each."""
+    remarks = [f"Without looking ahead, as the live node must, the error on all samples is {done.torque(causal)}."]
+    if judged.rotated:
+        remarks.append("Each third of the data was held out in turn, since one alone hardly shows it.")
     ties = [
         f"{effect.id} cannot be told from {', '.join(effect.indistinguishable_from)}"
         for effect in effects
         if effect.indistinguishable_from
     ]
-    ends = [
-        f"{effect.id} with {name} = {value:.3g} {unit}"
-        for effect in effects
-        for name, value, unit in at_end(effect, done.problem.size)
-    ]
-    last = done.problem.runs[-1].name
-    bounds = calibrations_at_bounds(done)
-    return (
-        f"The model leaves out {names}. With {'it' if len(effects) == 1 else 'them'} the held-out error falls "
-        f"from {torque(judged.before)} to {torque(judged.after)} "
-        f"(improvement {100 * judged.gain:.0f} %, 95 % interval "
-        f"{100 * judged.interval[0]:.0f} to {100 * judged.interval[1]:.0f} %) at a noise floor of {floor}. "
-        f"Without looking ahead, as the live node must, the error on all samples is {torque(causal)}."
-        + (" Each third of the data was held out in turn, since one alone hardly shows it." if judged.rotated else "")
-        + (f" With these data {'; '.join(ties)}." if ties else "")
-        + (f" At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another." if ends else "")
-        + (f" Recalibrated as far as is allowed, so perhaps another machine or another law: {', '.join(bounds)}." if bounds else "")
-        + (f" {' and '.join(ended)} does not act in {last}, the last recording: augmented.yaml is without." if ended else "")
-        + (f" Structure is left: {left}." if left else "")
-    )
+    if ties:
+        remarks.append(f"With these data {'; '.join(ties)}.")
+    size = done.problem.size
+    ends = [f"{effect.id} with {name} = {words.quantity(value, unit)}" for effect in effects for name, value, unit in at_end(effect, size)]
+    if ends:
+        remarks.append(f"At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another.")
+    if bounds := calibrations_at_bounds(done):
+        remarks.append(f"Recalibrated as far as is allowed, so perhaps another machine or another law: {', '.join(bounds)}.")
+    if ended:
+        verb = "does" if len(ended) == 1 else "do"
+        last = done.problem.runs[-1].name
+        remarks.append(f"{' and '.join(ended)} {verb} not act in {last}, the last recording: augmented.yaml is without.")
+    if left:
+        remarks.append(f"Structure is left: {left}.")
+    return remarks

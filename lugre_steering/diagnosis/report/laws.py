@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.report import plots
+from lugre_steering.diagnosis.report import shown
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects import laws
 from lugre_steering.report import words
+from lugre_steering.report.chart import Chart, Panel, Series
 from lugre_steering.vehicle import Vehicle
 
 _DEGREES = 180.0 / np.pi
@@ -44,7 +45,7 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
     numbers = ", ".join(f"{name} = {words.number(value, 4)}{between(name)}" for name, value in law["values"].items())
     ties = "; ".join(f"{tie['channel']} over {tie['coordinate']}" for tie in law["ties"])
     return [
-        ("channel", f"{law['channel']} [{units.label(vehicle, laws.CHANNELS[law['channel']])}]"),
+        ("channel", words.labelled(law["channel"].replace("_", " "), units.label(vehicle, laws.CHANNELS[law["channel"]]))),
         ("depends on", law["coordinate"] + (f", {law['memory']} of {law['memory_size']:.3g}" if law["memory"] != "none" else "")),
         ("form, SI units", f"{law['form']}: {numbers}" if numbers else f"{law['form']}, see augmented.yaml"),
         ("at most", f"{words.number(law['largest_Nm'], 3)} {unit}, {words.percent(law['largest_share'])} of the torque"),
@@ -55,25 +56,19 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def plot(vehicle: Vehicle, law: Mapping[str, Any]) -> plots.Spec | None:
+def chart(vehicle: Vehicle, law: Mapping[str, Any], style: str) -> Chart | None:
     """f with its band, and the data in steps; None for a law of one number."""
     if law["coordinate"] == "none":
         return None
     (label, scale), f = _axis(vehicle, law), law["f"]
     at, value, band = (np.array(f[key]) for key in ("at", "f", "band"))
-    x = plots.rounded(scale * at)
-    edge = {"type": "scatter", "mode": "lines", "x": x, "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
-    data = [
-        {**edge, "y": plots.rounded(value - band)},
-        {**edge, "y": plots.rounded(value + band), "fill": "tonexty", "fillcolor": "rgba(214,39,40,0.18)"},
-        {"type": "scatter", "mode": "lines", "name": "f with its 95 % band", "x": x, "y": plots.rounded(value),
-         "line": {"color": plots.AUGMENTED, "width": 2.2}},
-        {"type": "scatter", "mode": "markers", "name": "the data, in steps", "x": plots.rounded(scale * np.array(f["points_at"])),
-         "y": plots.rounded(np.array(f["points"])), "marker": {"color": plots.MEASURED, "size": 6}},
-    ]  # fmt: skip
-    unit = units.label(vehicle, laws.CHANNELS[law["channel"]])
-    layout = plots.plot_layout(xaxis=plots.plot_axis(label), yaxis=plots.plot_axis(f"f [{unit}]"), height=360)
-    return {"data": data, "layout": layout}
+    x = scale * at
+    series = [
+        Series("95 % band of f", style, value + band, x, low=value - band),
+        Series("f", style, value, x),
+        Series("the data, in steps", "measured", np.array(f["points"]), scale * np.array(f["points_at"]), dots=True),
+    ]
+    return Chart(label, [Panel("f", units.label(vehicle, laws.CHANNELS[law["channel"]]), series, size=3.0)])
 
 
 def draw_law(diagnosis: Diagnosis, law: Mapping[str, Any], file: Path) -> None:
@@ -83,11 +78,11 @@ def draw_law(diagnosis: Diagnosis, law: Mapping[str, Any], file: Path) -> None:
     (label, scale), f = _axis(diagnosis.vehicle, law), law["f"]
     at, value, band = (np.array(f[key]) for key in ("at", "f", "band"))
     caption = f"{law['title']}. Line: f with its 95 % band. Points: what the data say within steps of the coordinate."
-    with figure(1, 1, caption, file, row_inches=3.4, words=partial(units.words, diagnosis.vehicle)) as axes:
+    with figure(1, 1, caption, file, row_inches=3.4, words=partial(units.words, diagnosis.vehicle), made=diagnosis.provenance) as axes:
         ax = axes[0, 0]
-        ax.plot(scale * np.array(f["points_at"]), f["points"], "o", markersize=4, color=plots.MEASURED, label="the data, in steps")
-        ax.plot(scale * at, value, color=plots.AUGMENTED, label="f with its 95 % band")
-        ax.fill_between(scale * at, value - band, value + band, color=plots.AUGMENTED, alpha=0.2, linewidth=0)
+        ax.plot(scale * np.array(f["points_at"]), f["points"], "o", markersize=4, color=shown.MEASURED, label="the data, in steps")
+        ax.plot(scale * at, value, color=shown.AUGMENTED, label="f with its 95 % band")
+        ax.fill_between(scale * at, value - band, value + band, color=shown.AUGMENTED, alpha=0.2, linewidth=0)
         ax.set_xlabel(label)
         ax.set_ylabel(f"f ({units.label(diagnosis.vehicle, laws.CHANNELS[law['channel']])})")
         ax.legend(loc="best")

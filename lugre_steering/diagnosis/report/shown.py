@@ -4,13 +4,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from lugre_steering.diagnosis.result import BagTrace
 
 EFFECT_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31")
-"""One per named effect; apart from the black, blue and red of measured, baseline and augmented torque."""
+"""One per named effect in pictures, in the order of the page's series; apart from the black, blue and red of the torques."""
+MEASURED, BASELINE, AUGMENTED, QUIET = "#111111", "#1f4fb4", "#d62728", "#8a8f98"
+
+
+def effect_colours(ids: Sequence[str]) -> dict[str, str]:
+    """Colour of each finding in pictures."""
+    return {name: EFFECT_COLOURS[i % len(EFFECT_COLOURS)] for i, name in enumerate(ids)}
 
 WIDESPREAD = 0.6
 """Share of a bag's duration above which shading would cover nearly everything."""

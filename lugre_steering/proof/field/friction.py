@@ -292,3 +292,35 @@ def turn_track(
             mean += heat[c] / count
         temperature[i] = mean
     return Turned(friction, aligning, temperature)
+
+
+class Standing(NamedTuple):
+    """A track between two steps of ``turn_step``: bristles, branches, heat, memories (``state``), all cells in their places."""
+
+    z: Array
+    m: Array
+    heat: Array
+    state: Array
+    level: Array
+    factor: Array
+
+
+def standing(cells: Cells, ground: Ground) -> Standing:
+    """A track that has not turned yet."""
+    count = cells.strength.size
+    return Standing(
+        np.zeros(count), np.zeros((1 + len(RELAXING_S), count)), np.full(count, ground.rubber_degC),
+        np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.empty(count), np.empty(count),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def turn_step(theta: float, rate: float, h: float, track: Standing, ground: Ground, rubber: Ratios, cells: Cells, hide: Inside) -> float:
+    """Torque [N m] of one track, contact and kingpin, after a step of ``h`` [s] to the angle [rad] at that rate; nothing hidden in it."""
+    _strengths(0.0, theta, abs(rate), track.state, track.heat, ground, rubber, hide, track.level, track.factor)
+    before = track.z.copy()
+    part, _ = _bristles(rate, h, ground, cells, track.factor, track.level, 0.0, track.z, track.m)
+    slip, _ = _warm(0.0, h, rate, before, track.z, track.m, track.heat, ground.rubber_degC, ground, cells, track.factor, hide)
+    _follow(0.0, h, rate, slip, track.state, ground, hide)
+    value: float = part + ground.aligning_Nm * np.sin(theta)
+    return value

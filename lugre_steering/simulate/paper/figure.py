@@ -20,7 +20,14 @@ from lugre_steering.simulate.paper.outcome import Outcome
 def draw_outcome(outcome: Outcome, file: Path) -> None:
     """All panels one below the other; what was calibrated, what was checked and where it disagrees stands in the
     picture."""
-    from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure  # needs matplotlib
+    from lugre_steering.report.style import (  # needs matplotlib
+        IMPROVED,
+        MEASURED,
+        ORIGINAL,
+        family,
+        figure,
+        whole_ticks,
+    )
 
     styles: dict[str, dict[str, Any]] = {
         "test": MEASURED,
@@ -31,11 +38,13 @@ def draw_outcome(outcome: Outcome, file: Path) -> None:
     }
     with figure(len(outcome.panels), 1, outcome.caption, file) as axes:
         for ax, panel in zip(axes[:, 0], outcome.panels, strict=True):
-            colours = iter(SERIES)
+            colours = iter(family([curve.label for curve in panel.curves if not styles[curve.style]]))
             for curve in panel.curves:
                 style = styles[curve.style] or {"color": next(colours)}
                 marker = {"marker": "o", "markersize": 4} if 2 < len(curve.x) < 10 and curve.style != "points" else {}
                 ax.plot(curve.x, curve.y, label=curve.label, **style, **marker)
+            if all(float(x).is_integer() for curve in panel.curves for x in curve.x):
+                whole_ticks(ax.xaxis)  # what is counted has no halves
             ax.set_title(panel.title)
             ax.set_xlabel(panel.x_label)
             ax.set_ylabel(panel.y_label)

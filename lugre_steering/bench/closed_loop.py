@@ -1,0 +1,263 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What feed-forward is worth: a hydraulic steering axle in closed loop with the real node, over real topics.
+
+The node runs in simulated time and in step with the plant: each period (5 ms) the plant sends its angles, the node answers with
+its feed-forward, and the controller acts upon it in the next period. So the figures do not depend on how busy the computer is. The
+plan is published as steering/command; the node looks one period and the valve's delay ahead. Compared: no feed-forward; a friction of
+constant size against the planned motion; the original LuGre model (no heating) and the improved one, both calibrated on a recording of
+the same plant; the improved one with the physics that the recording hides (a rubber stop) in its vehicle file; and a wrong model
+(twice the friction), without and with the limit of value that the node keeps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
+from lugre_steering.bench.neighbour import SECOND, NodeProcess
+from lugre_steering.calibration.library import calibrate
+from lugre_steering.proof.field.hydraulics import gains
+from lugre_steering.proof.field.motion import strokes
+from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
+from lugre_steering.recording import NODE, Array
+from lugre_steering.simulate.plant import with_effects
+from lugre_steering.vehicle import Vehicle, load, save
+from lugre_steering.vehicle.model import baseline_parameters
+
+PERIOD_S = 0.005
+AHEAD_S = 0.02
+PLAN_S, PLAN_EVERY = 0.5, 20
+ANSWER_S = 2.0
+T0_NS = 1_000 * SECOND
+NONE, STATIC = "none", "constant friction"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One closed-loop run: tracking error of both sides, energy from the supply, sign changes of the valve command."""
+
+    feed_forward: str
+    rms_deg: float
+    peak_deg: float
+    energy_kJ: float
+    reversals: int
+    late: int
+    time: Array
+    wanted: Array
+    error_deg: Array
+    torque: Array
+
+
+def reference(limit: float, seconds: float) -> tuple[Array, Array, Array]:
+    """Times (n,) [s], wanted angle and rate of both sides: wide strokes into the stop, small reversals, holds."""
+    share = np.array([0.5, -0.5, 0.95, -0.95, 0.6, 0.4, 0.55, -0.3, 0.9, 0.0])
+    mean = strokes(limit * share, np.radians([6.0, 9.0, 12.0, 12.0, 9.0, 4.0, 4.0, 12.0, 9.0, 9.0]), np.full(share.size, 0.6))
+    fine = 2e-3 * np.arange(mean.size)
+    time_s = np.arange(0.0, min(seconds, fine[-1]), PERIOD_S)
+    wanted = np.interp(time_s, fine, mean)
+    return time_s, wanted, np.gradient(wanted, PERIOD_S)
+
+
+class Controller:
+    """The node's neighbour in step with it: angles, clock and plans out, feed-forward in."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        import rclpy
+        from rclpy.qos import QoSProfile, qos_profile_sensor_data
+        from rosgraph_msgs.msg import Clock
+        from sensor_msgs.msg import JointState
+        from trajectory_msgs.msg import JointTrajectory
+
+        self._rclpy, self._topics = rclpy, vehicle.topics
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, args=[])
+        self.node = rclpy.create_node("controller", context=self._context)
+        self._executor = rclpy.executors.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        topics = vehicle.topics.left, vehicle.topics.right
+        self._angle = [self.node.create_publisher(JointState, topic, QoSProfile(depth=10)) for topic in topics]
+        self._clock = self.node.create_publisher(Clock, "/clock", qos_profile_sensor_data)
+        self._plan = self.node.create_publisher(JointTrajectory, "steering/command", QoSProfile(depth=10))
+        self._heard: tuple[int, list[float]] = (0, [0.0, 0.0])
+        self.node.create_subscription(JointState, f"/{NODE}/feed_forward", self._keep, QoSProfile(depth=50))
+
+    def _keep(self, message: Any) -> None:
+        self._heard = message.header.stamp.sec * SECOND + message.header.stamp.nanosec, list(message.effort)
+
+    def join(self) -> None:
+        """Until the node has joined the topics."""
+        end = time.monotonic() + 60.0
+        while any(p.get_subscription_count() == 0 for p in (*self._angle, self._clock, self._plan)) and time.monotonic() < end:
+            time.sleep(0.02)
+        time.sleep(0.5)
+
+    def close(self) -> None:
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def ask(self, stamp_ns: int, angles: list[float]) -> list[float] | None:
+        """The feed-forward [N m] for these angles; None if none came in time."""
+        from builtin_interfaces.msg import Time
+        from rosgraph_msgs.msg import Clock
+        from sensor_msgs.msg import JointState
+
+        stamp = Time(sec=stamp_ns // SECOND, nanosec=stamp_ns % SECOND)
+        self._clock.publish(Clock(clock=stamp))
+        for publisher, joint, angle in zip(self._angle, (self._topics.left_joint, self._topics.right_joint), angles, strict=True):
+            message = JointState(name=[joint], position=[angle])
+            message.header.stamp = stamp
+            publisher.publish(message)
+        end = time.monotonic() + ANSWER_S
+        while self._heard[0] < stamp_ns and time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.05)
+        return self._heard[1] if self._heard[0] >= stamp_ns else None
+
+    def plan(self, stamp_ns: int, angles: Array) -> None:
+        """Publish the angles (n,) wanted from now on, one period apart, for both joints."""
+        from builtin_interfaces.msg import Duration, Time
+        from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+        message = JointTrajectory(joint_names=[self._topics.left_joint, self._topics.right_joint])
+        message.header.stamp = Time(sec=stamp_ns // SECOND, nanosec=stamp_ns % SECOND)
+        for i, angle in enumerate(angles.tolist()):
+            ahead_ns = round(i * PERIOD_S * SECOND)
+            message.points.append(JointTrajectoryPoint(positions=[angle, angle], time_from_start=Duration(nanosec=ahead_ns)))
+        self._plan.publish(message)
+
+
+def drive(name: str, setting: Setting, seconds: float, controller: Controller | None, constant_Nm: float) -> Run:
+    """The whole manoeuvre; without a controller nothing is fed forward but a constant friction against the planned motion."""
+    time_s, wanted, rate = reference(setting.machine.limit, seconds)
+    drive_ = setting.drives[0]
+    ground = setting.ground._replace(rubber_degC=drive_.rubber_degC, air_degC=drive_.air_degC)
+    par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
+    sides = [Side(par, ground, setting.ratios, cells) for cells in setting.cells]
+    rng = np.random.default_rng(1)
+    angles, torques, commands, late = np.zeros((2, time_s.size)), np.zeros(time_s.size), np.zeros((2, time_s.size)), 0
+    fed = [0.0, 0.0]
+    for i in range(time_s.size):
+        stamp_ns = T0_NS + round(time_s[i] * SECOND)
+        if controller is None:
+            fed = [constant_Nm * float(np.tanh(rate[i] / np.radians(0.3)))] * 2
+        for j, side in enumerate(sides):
+            commands[j, i] = side.command(wanted[i], rate[i], fed[j], PERIOD_S)
+            side.advance(commands[j, i], PERIOD_S)
+            angles[j, i] = side.angle
+        torques[i] = fed[0]
+        if controller is not None:
+            if i % PLAN_EVERY == 0:
+                controller.plan(stamp_ns, wanted[i : i + round(PLAN_S / PERIOD_S)])
+            seen = [side.angle + np.radians(0.01) * float(rng.standard_normal()) for side in sides]
+            answer = controller.ask(stamp_ns, seen)
+            late += answer is None
+            fed = answer or fed
+    error = np.degrees(wanted - angles)
+    energy = sum(float(side.state[5]) for side in sides) * 1e-3
+    turns = int((np.diff(np.sign(commands), axis=1) != 0).sum())
+    return Run(
+        name, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()), energy, turns, late, time_s, wanted, error[0], torques
+    )
+
+
+def models(setting: Setting, folder: Path) -> Mapping[str, tuple[Vehicle, tuple[str, ...]]]:
+    """Vehicle files to compare and the node's arguments, calibrated on a recording of the same machine."""
+    bags = simulate(setting, []).write(folder / "bags", folder / "unseen")
+    sheet = load(folder / "bags" / "vehicle.yaml")
+    improved = calibrate(bags, sheet).calibrated
+    drive_ = setting.drives[0]
+    assert improved.initial is not None
+    improved = improved.replace(
+        initial=dataclasses.replace(improved.initial, rubber_temperature_degC=drive_.rubber_degC, air_temperature_degC=drive_.air_degC)
+    )
+    par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
+    found = with_effects(improved, [f"end_stop:engage_angle={par.stop_angle:.6g},stiffness={par.stop_stiffness:.6g}"])
+    axle = improved.axle
+    assert axle is not None
+    wrong = improved.replace(axle=dataclasses.replace(axle, load_N=2.0 * axle.load_N))
+    limit = 1.1 * float(baseline_parameters(improved)["static_torque"])
+    return {
+        "original LuGre": (improved.replace(rubber=None), ()),
+        "improved": (improved, ()),
+        "with the effect": (found, ()),
+        "wrong model": (wrong, ()),
+        "wrong model, limited": (wrong, ("-p", f"feed_forward_limit_Nm:={limit:.1f}")),
+    }
+
+
+def campaign(seed: int, seconds: float) -> list[Run]:
+    """All runs."""
+    setting = draw_setting(seed, "clean", "white")
+    runs = [drive(NONE, setting, seconds, None, 0.0)]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        compared = models(setting, folder)
+        parameters = baseline_parameters(compared["improved"][0])
+        runs.append(drive(STATIC, setting, seconds, None, float(parameters["coulomb_torque"])))
+        for label, (vehicle, arguments) in compared.items():
+            file = folder / f"{label.replace(' ', '_').replace(',', '')}.yaml"
+            save(vehicle, file)
+            common = ("-p", "use_sim_time:=true", "-p", f"feed_forward_horizon_s:={AHEAD_S}", "-p", "recovery_ramp_s:=0.2")
+            node = NodeProcess(file, folder / "node.log", *common, *arguments)
+            controller = Controller(vehicle)
+            try:
+                controller.join()
+                runs.append(drive(label, setting, seconds, controller, 0.0))
+            finally:
+                controller.close()
+                node.stop(signal.SIGTERM)
+    return runs
+
+
+def draw(runs: list[Run], file: Path) -> None:
+    """The picture: wanted angle, torque fed forward, tracking error."""
+    from lugre_steering.report.style import SERIES, figure
+
+    with figure(3, 1, "Closed loop with the live node: what feed-forward is worth", file) as axes:
+        axes[0, 0].plot(runs[0].time, np.degrees(runs[0].wanted), color="black")
+        for run_, colour in zip(runs, SERIES, strict=True):
+            axes[1, 0].plot(run_.time, 1e-3 * run_.torque, color=colour, linewidth=1.0)
+            axes[2, 0].plot(run_.time, run_.error_deg, color=colour, linewidth=1.0)
+            axes[0, 0].plot([], [], color=colour, label=f"{run_.feed_forward}: {run_.rms_deg:.2f} deg")
+        titles = "wanted angle [deg]", "torque fed forward, left [kN m]", "tracking error, left [deg]"
+        for ax, words in zip(axes[:, 0], titles, strict=True):
+            ax.set_ylabel(words)
+            ax.set_xlabel("time [s]")
+        axes[0, 0].legend(loc="upper right", fontsize=8)
+
+
+def run(argv: list[str]) -> None:
+    """``python -m lugre_steering.bench closed_loop``: a table, and a picture with --out; or JSON."""
+    parser = argparse.ArgumentParser(prog="bench closed_loop", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0, help="of the manoeuvre, at most")
+    parser.add_argument("--seed", type=int, default=11, help="of the machine")
+    parser.add_argument("--out", type=Path, help="file of the picture (.png)")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    options = parser.parse_args(argv)
+    os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
+    runs = campaign(options.seed, options.seconds)
+    if options.out is not None:
+        draw(runs, options.out)
+    if options.json:
+        shown = ("feed_forward", "rms_deg", "peak_deg", "energy_kJ", "reversals", "late")
+        json.dump([{key: asdict(run_)[key] for key in shown} for run_ in runs], sys.stdout, indent=2)
+        print()
+        return
+    print(f"{'feed-forward':22} {'rms deg':>8} {'peak deg':>9} {'energy kJ':>10} {'reversals':>10} {'no answer':>10}")
+    for run_ in runs:
+        print(
+            f"{run_.feed_forward:22} {run_.rms_deg:8.3f} {run_.peak_deg:9.3f} {run_.energy_kJ:10.0f} {run_.reversals:10d} {run_.late:10d}"
+        )

@@ -1,0 +1,418 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A campaign of faults against the live node over real DDS, with a scoreboard.
+
+A vehicle steers to and fro at 100 Hz with feed-forward commands on. Each fault comes while the joint moves and lasts 0.8 s. Asked
+of each: every output finite and inside the limits of value and rate; flagged in /diagnostics within 0.2 s of its first sample (both
+by header stamps); no exception; 1 s after its end the torque is that of a vehicle that never had the fault (to 5 % of the
+static friction) and the feed-forward is not held back any more; the torque equals a replay of the same messages.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.bench.neighbour import SECOND, Fault, Neighbour, NodeProcess, Sample, as_it_is
+from lugre_steering.estimator import Estimator
+from lugre_steering.recording import NODE, Kind
+from lugre_steering.resources import config_folder
+from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.vehicle.model import baseline_parameters
+
+FAULT_S, REST_S = 0.8, 1.8
+TOLD_S, RECOVERED_S = 0.2, 1.0
+NEAR = 0.05
+NOTHING: tuple[str, ...] = ()
+"""Nothing need be told."""
+ANEW = ("clock an hour ahead", "clock an hour back")
+"""After these the estimator begins anew, and so does what it is compared with."""
+ARGUMENTS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5", "-p", "max_rate_rad_s:=2.0")
+
+
+def _of(vehicle: Vehicle, kinds: tuple[Kind, ...], change: Callable[[int, Sample], Any], only: int | None = None) -> Fault:
+    """``change`` for the samples of some kinds (of one channel only); a sample, or several, or none."""
+
+    def fault(tick: int, sample: Sample) -> Any:
+        if vehicle.channels[sample.channel].kind not in kinds or only not in (None, sample.channel):
+            return (sample,)
+        changed = change(tick, sample)
+        return (changed,) if isinstance(changed, Sample) else changed
+
+    return fault
+
+
+def _held() -> Callable[[int, Sample], Sample]:
+    """Every channel keeps its first value."""
+    first: dict[int, float] = {}
+    return lambda _, sample: sample._replace(value=first.setdefault(sample.channel, sample.value))
+
+
+def _gathered(count: int) -> Callable[[int, Sample], list[Sample]]:
+    """Nothing, and then ``count`` messages at once."""
+    kept: dict[int, list[Sample]] = {}
+
+    def change(_: int, sample: Sample) -> list[Sample]:
+        waiting = kept.setdefault(sample.channel, [])
+        waiting.append(sample)
+        if len(waiting) < count:
+            return []
+        kept[sample.channel] = []
+        return waiting
+
+    return change
+
+
+def _late(count: int) -> Callable[[int, Sample], list[Sample]]:
+    """Every message so many ticks later."""
+    kept: dict[int, list[Sample]] = {}
+
+    def change(_: int, sample: Sample) -> list[Sample]:
+        waiting = kept.setdefault(sample.channel, [])
+        waiting.append(sample)
+        return [waiting.pop(0)] if len(waiting) > count else []
+
+    return change
+
+
+def _swapped() -> Callable[[int, Sample], list[Sample]]:
+    """Each pair of messages in the wrong order."""
+    kept: dict[int, Sample] = {}
+
+    def change(_: int, sample: Sample) -> list[Sample]:
+        if sample.channel in kept:
+            return [sample, kept.pop(sample.channel)]
+        kept[sample.channel] = sample
+        return []
+
+    return change
+
+
+def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[Fault, tuple[str, ...]]]:
+    """What is sent in place of the sensors' samples, and words of which one must be told."""
+    angle, pressure, air = (Kind.ANGLE,), (Kind.PRESSURE,), (Kind.AIR_TEMPERATURE,)
+    line = next(i for i, channel in enumerate(vehicle.channels) if channel.kind is Kind.PRESSURE)
+    hour = 3600 * SECOND
+
+    def value(change: Callable[[float], float]) -> Callable[[int, Sample], Sample]:
+        return lambda _, sample: sample._replace(value=change(sample.value))
+
+    def stamp(change: Callable[[int], int]) -> Callable[[int, Sample], Sample]:
+        return lambda _, sample: sample._replace(stamp_ns=change(sample.stamp_ns))
+
+    def spike(samples: int) -> Callable[[int, Sample], Sample]:
+        return lambda tick, sample: sample._replace(value=sample.value + (1.0 if tick % 20 < samples else 0.0))
+
+    def silent(_: int, __: Sample) -> tuple[()]:
+        return ()
+
+    jumped = ("angle jumped", "spike")
+    frozen, stale, unlike = ("angle frozen",), ("stale",), ("residual", "frozen", "pressure")
+    return {
+        "both angles frozen": (_of(vehicle, angle, _held()), frozen),
+        "left angle frozen": (_of(vehicle, angle, _held(), 0), frozen),
+        "right angle frozen": (_of(vehicle, angle, _held(), 1), frozen),
+        "both angles dropped": (_of(vehicle, angle, silent), stale),
+        "left angle dropped": (_of(vehicle, angle, silent, 0), stale),
+        "one pressure dropped": (_of(vehicle, pressure, silent, line), stale),
+        "all pressures dropped": (_of(vehicle, pressure, silent), stale),
+        "everything dropped": (_of(vehicle, (*angle, *pressure, *air), silent), stale),
+        "everything 0.5 s late": (_of(vehicle, (*angle, *pressure), _late(50)), ("stamps are not close", *stale)),
+        "stamps 0.5 s behind": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns - SECOND // 2)), ("not close", "backward")),
+        "everything twice": (_of(vehicle, (*angle, *pressure), lambda _, sample: [sample, sample]), ("duplicate",)),
+        "everything in wrong order": (_of(vehicle, (*angle, *pressure), _swapped()), ("backward",)),
+        "ten messages at once": (_of(vehicle, (*angle, *pressure), _gathered(10)), NOTHING),
+        "angles are no number": (_of(vehicle, angle, value(lambda _: math.nan)), ("not_finite",)),
+        "left angle infinite": (_of(vehicle, angle, value(lambda _: math.inf), 0), ("not_finite",)),
+        "angles out of range": (_of(vehicle, angle, value(lambda _: 4.0)), ("absurd",)),
+        "angles in degrees": (_of(vehicle, angle, value(math.degrees)), (*jumped, "absurd")),
+        "both signs flipped": (_of(vehicle, angle, value(lambda angle: 0.3 - angle)), jumped),
+        "left angle 0.5 rad off": (_of(vehicle, angle, value(lambda angle: angle + 0.5), 0), jumped),
+        "spikes of two samples": (_of(vehicle, angle, spike(2)), jumped),
+        "spikes of five samples": (_of(vehicle, angle, spike(5)), jumped),
+        "noise of one degree": (
+            _of(vehicle, angle, value(lambda angle: angle + math.radians(1.0) * float(rng.standard_normal()))), ("noisy", *jumped)
+        ),
+        "rates that contradict": (_of(vehicle, angle, lambda _, sample: sample._replace(rate=50.0)), ("absurd_rate",)),
+        "another joint's name": (_of(vehicle, angle, lambda _, sample: sample._replace(joint="boom")), ("without a wanted joint", *stale)),
+        "zero stamps": (_of(vehicle, (*angle, *pressure), stamp(lambda _: 0)), ("zero_stamp",)),
+        "clock an hour ahead": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns + hour)), ("time_jump",)),
+        "clock an hour back": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns - hour)), ("time_jump",)),
+        "pressures are no number": (_of(vehicle, pressure, value(lambda _: math.nan)), ("not_finite",)),
+        "pressures out of range": (_of(vehicle, pressure, value(lambda _: 1e9)), ("absurd",)),
+        "pressures in bar": (_of(vehicle, pressure, value(lambda p: 1e-5 * p)), unlike),
+        "pressures negative": (_of(vehicle, pressure, value(lambda p: -p)), unlike),
+        "pressures frozen": (_of(vehicle, pressure, _held()), unlike),
+        "air of 95 degC": (_of(vehicle, air, value(lambda _: 95.0)), ("absurd",)),
+        "air is no number": (_of(vehicle, air, value(lambda _: math.nan)), ("not_finite",)),
+    }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Score:
+    """What came of one fault; times [s], NaN where it never came."""
+
+    fault: str
+    finite: bool
+    inside_limits: bool
+    told_s: float
+    recovered_s: float
+    held_back_s: float
+    exceptions: bool
+    largest_step_Nm: float
+    off_replay_Nm: float
+    words: str
+
+    @property
+    def passed(self) -> bool:
+        quick = self.told_s <= TOLD_S and self.recovered_s <= RECOVERED_S and self.held_back_s <= RECOVERED_S
+        return self.finite and self.inside_limits and not self.exceptions and quick and self.off_replay_Nm <= 1e-6
+
+
+class Campaign:
+    """One node and its neighbour; faults one after the other."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self.vehicle_file = config_folder() / "test_vehicle.yaml"
+        self.vehicle = load(self.vehicle_file)
+        self.log, self.rng = folder / "node.log", np.random.default_rng(seed)
+        parameters = baseline_parameters(self.vehicle)
+        self.friction = float(parameters["static_torque"]) * len(self.vehicle.sides)
+        self.limit = 3.0 * float(parameters["static_torque"])
+        self.slope = float(parameters["sigma_0"])
+        self.node = NodeProcess(self.vehicle_file, self.log, *ARGUMENTS)
+        self.neighbour = Neighbour(self.vehicle, seed)
+        self.neighbour.wait_for_node()
+        time.sleep(2.0)
+
+    def close(self) -> None:
+        self.neighbour.close()
+        if self.node.process.poll() is None:
+            self.node.stop(signal.SIGTERM)
+
+    def samples(self, name: str, fault: Fault, words: tuple[str, ...]) -> Score:
+        """A fault of the sensors' samples."""
+        neighbour = self.neighbour
+
+        def begin() -> None:
+            neighbour.fault = fault
+
+        def end() -> None:
+            neighbour.fault = as_it_is
+
+        return self.judge(name, begin, end, words)
+
+    def judge(self, name: str, begin: Callable[[], None], end: Callable[[], None], words: tuple[str, ...]) -> Score:
+        """Let a fault happen and judge it."""
+        neighbour = self.neighbour
+        neighbour.wait_until_it_moves()
+        mark = len(neighbour.commands), len(neighbour.told)
+        begin_ns = time.time_ns()
+        begin()
+        time.sleep(FAULT_S)
+        end()
+        end_ns = time.time_ns()
+        if name in ANEW:
+            neighbour.clean.clear()
+        time.sleep(REST_S)
+        told = neighbour.told[mark[1] :]
+        when = [ns for ns, text in told if ns >= begin_ns and any(word in text for word in words)]
+        commands = neighbour.commands[mark[0] :]
+        steps = [abs(b - a) for (_, a), (_, b) in itertools.pairwise(commands)]
+        reach = [self.slope * max(0.05, tb - ta) for (ta, _), (tb, _) in itertools.pairwise(commands)]
+        values = [value for _, value in (*commands, *neighbour.torque, *neighbour.feed_forward)]
+        wanted = dict(neighbour.left)
+        held = [ns for ns, value in neighbour.feed_forward if ns > end_ns and abs(value - wanted.get(ns, value)) > NEAR * self.friction]
+        return Score(
+            fault=name,
+            finite=all(map(math.isfinite, values)),
+            inside_limits=all(abs(value) <= self.limit for _, value in commands) and all(map(float.__le__, steps, reach)),
+            told_s=(min(when) - begin_ns) / SECOND if when else (math.nan if words else 0.0),
+            recovered_s=self._recovered_s(end_ns),
+            held_back_s=(max(held, default=end_ns) - end_ns) / SECOND,
+            exceptions="exception" in " ".join(text for _, text in told),
+            largest_step_Nm=max(steps, default=0.0),
+            off_replay_Nm=self._off_replay(end_ns),
+            words=next((text for ns, text in told if when and ns == min(when)), ""),
+        )
+
+    def _recovered_s(self, end_ns: int) -> float:
+        """When after the fault's end the torque is, and stays, that of a vehicle without the fault."""
+        clean = torques(self.vehicle, self.neighbour.clean)
+        after = [(ns, value) for ns, value in self.neighbour.torque if ns > end_ns and ns in clean]
+        off = [ns for ns, value in after if abs(value - clean[ns]) > NEAR * self.friction]
+        if not after or (off and off[-1] == after[-1][0]):
+            return math.nan
+        return max(after[0][0] - end_ns, (max(off, default=end_ns) - end_ns)) / SECOND
+
+    def _off_replay(self, end_ns: int) -> float:
+        """Largest difference [N m] between what the node said after the fault and a replay of what it was sent."""
+        replayed = torques(self.vehicle, self.neighbour.sent)
+        off = [abs(value - replayed[ns]) for ns, value in self.neighbour.torque if ns > end_ns and ns in replayed]
+        return max(off, default=math.nan)
+
+
+def torques(vehicle: Vehicle, samples: list[Sample]) -> dict[int, float]:
+    """Total torque [N m] by stamp, of the messages pushed without ROS."""
+    from lugre_steering.estimator import Options
+
+    table = np.array([(s.channel, s.stamp_ns) for s in samples], np.int64).reshape(-1, 2)
+    values = np.array([(s.value, s.rate) for s in samples]).reshape(-1, 2)
+    estimator = Estimator(vehicle, Options(max_rate_rad_s=2.0, recovery_ramp_s=0.5))
+    estimates, _ = estimator.push_block(table[:, 0], table[:, 1].copy(), values[:, 0].copy(), values[:, 1].copy())
+    return {int(row["stamp_ns"]): float(row["total"]) for row in estimates}
+
+
+def _plan(neighbour: Neighbour, points: int, angle: float) -> Any:
+    from builtin_interfaces.msg import Duration
+    from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+    topics = neighbour.vehicle.topics
+    message = JointTrajectory(joint_names=[topics.left_joint, topics.right_joint])
+    message.points = [
+        JointTrajectoryPoint(positions=[angle, angle], time_from_start=Duration(sec=i // 1000, nanosec=i % 1000 * 1_000_000))
+        for i in range(points)
+    ]
+    return message
+
+
+def events_of(campaign: Campaign) -> Mapping[str, tuple[Callable[[], None], Callable[[], None], tuple[str, ...]]]:
+    """Faults that are no samples: begin, end, words of which one must be told."""
+    from rclpy.serialization import serialize_message
+
+    neighbour = campaign.neighbour
+    def again(do: Callable[[], None], period_s: float) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Do it in every so many ticks, in the sensors' own thread."""
+        every = max(1, round(period_s / neighbour.period_s))
+        count = itertools.count()
+
+        def moved(_: float) -> None:
+            if next(count) % every == 0:
+                do()
+
+        def begin() -> None:
+            neighbour.moved = moved
+
+        def end() -> None:
+            neighbour.moved = lambda _: None
+
+        return begin, end
+
+    huge, far, wild = serialize_message(_plan(neighbour, 20_000, 0.0)), _plan(neighbour, 10, 3.0), _plan(neighbour, 10, math.nan)
+    publish = neighbour.command.publish
+    garbage = bytes(campaign.rng.integers(0, 256, 200, np.uint8))
+
+    def restart() -> None:
+        neighbour.restart = True
+
+    def nothing() -> None:
+        pass
+
+    return {
+        "plans far from the angle": (*again(lambda: publish(far), 0.05), ("present angle", "faster")),
+        "plans of no numbers": (*again(lambda: publish(wild), 0.05), ("not a number",)),
+        "plans of garbage bytes": (*again(lambda: publish(garbage), 0.05), ("malformed",)),
+        # The middleware itself throws them away.
+        "angles of garbage bytes": (*again(lambda: neighbour.publishers[0].publish(garbage), 0.05), NOTHING),
+        "a flood of huge plans": (*again(lambda: publish(huge), 0.1), ("more than",)),
+        "sensors restart": (restart, nothing, ("stale",)),
+    }
+
+
+def parameters_set_wrongly(campaign: Campaign) -> bool:
+    """Whether every wrong value is refused and the node goes on."""
+    from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+    from rcl_interfaces.srv import SetParametersAtomically
+
+    client = campaign.neighbour.node.create_client(SetParametersAtomically, f"/{NODE}/set_parameters_atomically")
+    wrong = {
+        "angle_timeout_s": ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=math.nan),
+        "when_stale": ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="loud"),
+        "max_gap_s": ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=1),
+        "executor": ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="single"),
+    }
+    refused = []
+    for name, value in wrong.items():
+        future = client.call_async(SetParametersAtomically.Request(parameters=[Parameter(name=name, value=value)]))
+        end = time.monotonic() + 5.0
+        while not future.done() and time.monotonic() < end:
+            time.sleep(0.01)
+        refused.append(future.done() and not future.result().result.successful)
+    return all(refused)
+
+
+def killed(campaign: Campaign, number: int) -> tuple[bool, float]:
+    """Stop the node and start it again: whether its last command was zero (a node that is killed cannot say it), start [s]."""
+    neighbour = campaign.neighbour
+    neighbour.wait_until_it_moves()
+    campaign.node.stop(number)
+    time.sleep(0.2)
+    zero = neighbour.commands[-1][1] == 0.0
+    begin = time.monotonic()
+    campaign.node = NodeProcess(campaign.vehicle_file, campaign.log, *ARGUMENTS)
+    ready_s = time.monotonic() - begin
+    neighbour.wait_for_node()
+    return zero, ready_s
+
+
+HEAD = f"{'fault':28} {'told s':>7} {'back s':>7} {'free s':>7} {'step N m':>9} {'off replay':>11}  passed"
+
+
+def line_of(score: Score) -> str:
+    return (
+        f"{score.fault:28} {score.told_s:7.3f} {score.recovered_s:7.3f} {score.held_back_s:7.3f} {score.largest_step_Nm:9.0f} "
+        f"{score.off_replay_Nm:11.2g}  {'yes' if score.passed else 'NO'}"
+    )
+
+
+def run(argv: list[str]) -> None:
+    """``python -m lugre_steering.bench faults``: a line a fault, or JSON."""
+    parser = argparse.ArgumentParser(prog="bench faults", description=__doc__)
+    parser.add_argument("--only", default="", help="only faults with this in their names")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    options = parser.parse_args(argv)
+    os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
+    scores = []
+    if not options.json:
+        print(HEAD)
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = Campaign(Path(folder), options.seed)
+        others: dict[str, Any] = {}
+        try:
+            for name, (fault, words) in faults_of(campaign.vehicle, campaign.rng).items():
+                if options.only in name:
+                    scores.append(campaign.samples(name, fault, words))
+                    if not options.json:
+                        print(line_of(scores[-1]), flush=True)
+            for name, (begin, end, words) in events_of(campaign).items():
+                if options.only in name:
+                    scores.append(campaign.judge(name, begin, end, words))
+                    if not options.json:
+                        print(line_of(scores[-1]), flush=True)
+            if not options.only:
+                others["wrong parameters refused"] = parameters_set_wrongly(campaign)
+                others["SIGTERM: last command is zero"], others["then ready after [s]"] = killed(campaign, signal.SIGTERM)
+                _, others["SIGKILL: ready after [s]"] = killed(campaign, signal.SIGKILL)
+        finally:
+            campaign.close()
+    if options.json:
+        json.dump({"faults": [{**asdict(score), "passed": score.passed} for score in scores], **others}, sys.stdout, indent=2)
+        print()
+        return
+    print(f"passed: {sum(score.passed for score in scores)} of {len(scores)}")
+    for what, came in others.items():
+        print(f"{what}: {came if isinstance(came, bool) else f'{came:.2f}'}")

@@ -1,0 +1,94 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The first words of a verdict, for an engineer: what, where, how much of the torque, and what to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.result import Experiment, NamedEffect
+from lugre_steering.report import words
+
+CHECKS = {
+    "motion": "check angle sensors, joints and linkage",
+    "measurement": "check the pressure sensors, lines and valves",
+}
+"""What to look at on the machine, by stage of the chain; elsewhere the place that is told says it."""
+NEARLY_ALWAYS = 0.9
+"""Share of the recorded time from which a place is no news."""
+NOT_A_PLACE = frozenset({"time", "direction"})
+"""Coordinates whose range says nothing that the share of the time does not say better."""
+
+
+def missing(done: Finished, effects: Sequence[NamedEffect], advice: Experiment | None, kept: bool) -> str:
+    """What the model leaves out, and what to do; ``kept``: augmented.yaml has all of it."""
+    them = "it" if len(effects) == 1 else "them"
+    found = "; and ".join(_found(done, effect) for effect in effects)
+    acts = [f"Use augmented.yaml, which has {them}, in replay and in the live node"] if kept else []
+    acts += dict.fromkeys(CHECKS[effect.stage] for effect in effects if effect.stage in CHECKS)
+    if advice is not None:
+        acts.append(f"drive {advice.manoeuvre.split(':')[0]} next, which tells apart what may be confused")
+    return f"Missing from the model: {found}. {_sentence(acts)}"
+
+
+def lawful(said: str) -> str:
+    """For a law that nobody had listed, as ``said``."""
+    return f"Missing from the model: {said}; no entry of the catalogue is that. Use augmented.yaml, which has it under 'laws'."
+
+
+def unlisted(done: Finished, error: float, said: str) -> str:
+    """For structure without a name or a law: ``error`` [N m] is left on held-out data."""
+    return (
+        f"The model misses {done.torque(error)} ({_share(error / done.amplitude)}), and neither an entry of the catalogue nor a law "
+        f"explains it: {said}. Look there on the machine, and drive the next experiment."
+    )
+
+
+def consistent(done: Finished, error: float) -> str:
+    """For a model that leaves nothing but noise: ``error`` [N m] on held-out data."""
+    return (
+        f"No missing physics is seen: recalibrated, the model explains the torque to {done.torque(error)} "
+        f"({_share(error / done.amplitude)}). Use augmented.yaml, the recalibrated vehicle file."
+    )
+
+
+def _sentence(acts: Sequence[str]) -> str:
+    text = ", and ".join(acts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def _found(done: Finished, effect: NamedEffect) -> str:
+    title = done.title(effect.id)
+    name = title if title[1:2].isupper() else title[:1].lower() + title[1:]
+    parts = [f"{name} ({effect.id})", *_where(done, effect)]
+    if effect.largest_Nm is not None and effect.largest_share is not None:
+        parts.append(f"up to {done.torque(effect.largest_Nm)} ({_share(effect.largest_share)})")
+    return ", ".join(parts)
+
+
+def _share(share: float) -> str:
+    return f"{words.percent(share)} of the torque"
+
+
+def _where(done: Finished, effect: NamedEffect) -> list[str]:
+    """Where it acts, over all recordings: the range of its coordinate, and how much of the time."""
+    if not effect.where:
+        return []
+    recorded = sum(float(run.time[-1] - run.time[0]) for run in done.problem.runs)
+    active = sum(end - start for place in effect.where for start, end in place.intervals_s) / recorded
+    often = "all the time" if active > NEARLY_ALWAYS else f"{words.percent(active)} of the time"
+    (name, *others), ends = {place.coordinate for place in effect.where}, [end for place in effect.where for end in place.range]
+    low, high = min(_numbers(ends), default=math.nan), max(_numbers(ends), default=math.nan)
+    if others or name in NOT_A_PLACE or not low < high:
+        return [often]
+    axis = words.coordinate_axis(done.problem.vehicle, name)
+    from_, to = (words.number(axis.scale * end, 3) for end in (low, high))
+    if name.startswith("|"):
+        return [f"mostly beyond {from_} {axis.unit} of {axis.name.strip('|')} to either side ({often})"]
+    return [f"at {words.with_article(axis.name)} of {from_} to {to} {axis.unit}".rstrip() + f" ({often})"]
+
+
+def _numbers(ends: Sequence[float | None]) -> list[float]:
+    return [end for end in ends if end is not None]

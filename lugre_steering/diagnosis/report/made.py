@@ -1,0 +1,72 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sections of the report about the baseline it was judged against, how the result came about, and how to read it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lugre_steering import units
+from lugre_steering.calibration.calibrate import KEYS
+from lugre_steering.diagnosis.result import Diagnosis
+from lugre_steering.fitting.problem import calibrations_for
+from lugre_steering.report import words
+from lugre_steering.report.markup import code, pairs, table, text
+
+
+def baseline(diagnosis: Diagnosis) -> str:
+    """Recalibrated values beside those of the sheet."""
+    vehicle, sheet, rows = diagnosis.vehicle, diagnosis.sheet, []
+    calibrated = {calibration.name for calibration in calibrations_for(vehicle)}
+    for key in KEYS:
+        now = key.read(vehicle)
+        if key.calibration not in calibrated or now is None:
+            continue
+        unit, before = units.label(vehicle, key.unit), key.read(sheet) if sheet is not None else None
+        change = f"{100.0 * (now / before - 1.0):+.1f} %" if before else ""
+        rows.append([code(key.key), words.number(before), words.number(now), text(change), "" if unit == "1" else text(unit)])
+    sentence = (
+        "Nothing was fitted: these are the values of the vehicle file, as they were."
+        if diagnosis.json["verdict"] == "insufficient_data"
+        else "The published model with the fitted values is what missing physics was judged against, so that a wrong friction "
+        "level is never reported as physics. They stand in <code>augmented.yaml</code>."
+    )
+    header = ["key of the vehicle file", "sheet", "fitted", "change", "unit"]
+    return f"<p>{sentence}</p>\n" + (table(header, rows, (1, 2, 3), narrow=True) if rows else "")
+
+
+def origin(diagnosis: Diagnosis) -> str:
+    """Version, date, options and hashes, and what the vehicle file says of itself."""
+    made = [(name.replace("_", " "), _plain(value)) for name, value in diagnosis.vehicle.provenance.items()]
+    if (by := diagnosis.provenance) is None:
+        return pairs(made)
+    files = [("vehicle file", by.vehicle)] if by.vehicle is not None else []
+    files += [("bag", bag) for bag in by.bags]
+    rows = [[text(kind), text(source.path), text(name), code(digest)] for kind, source in files for name, digest in source.sha256.items()]
+    run = pairs([("made by", text(f"{by.tool} {by.command}")), ("date (UTC)", text(by.date)), ("options", _plain(by.options))])
+    return run + (table(["", "given as", "file", "SHA-256"], rows) if rows else "") + pairs(made)
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{text(key)}: {_plain(item)}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_plain(item) for item in value)
+    return words.number(value) if isinstance(value, float) else text(value)
+
+
+GLOSSARY = pairs(
+    [
+        ("recalibrated baseline", "the published model with friction level, stiffness and heat values fitted to these recordings"),
+        ("augmented", "the recalibrated baseline with the found effects in it"),
+        ("residual", "measured torque minus the model's torque"),
+        ("of the torque", "share of the amplitude of the measured torque, which one sample in a hundred exceeds"),
+        ("held out", "stretches that neither the search nor the fit saw; only they say whether a finding is real"),
+        ("noise alone", "what sensor noise and the error of the estimated motion alone would leave as residual"),
+        ("energy share", "share of the residual's energy that the effect explains"),
+        ("masked share", "share of an effect's trace that recalibrating the baseline imitates, and so hides"),
+        ("held-out gain", "by how much the fit that tried it, with the effects accepted before it, lowers the held-out error"),
+        ("p", "chance that noise of this kind explains as much, all variants of the effect tried being paid for"),
+        ("95 % interval", "from the scatter between stretches of the recording, so that slowly varying errors count in full"),
+    ]
+)

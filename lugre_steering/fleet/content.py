@@ -1,0 +1,69 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a result hangs on: the bytes of the bag, the vehicle, the options, the program."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from lugre_steering.bag.reader import SUFFIXES
+from lugre_steering.effects.registry import ORIGINS
+from lugre_steering.version import __version__
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_SHOWN = ("bench", "fleet", "live", "report")
+"""Rooms that only show or arrange what others compute."""
+_STEP = 1 << 20
+
+State = list[list[Any]]
+"""Name, size and time of change [ns] of each file of a bag."""
+
+
+def files_of(bag: Path) -> list[Path]:
+    """The files whose bytes are the recording."""
+    if not bag.is_dir():
+        return [bag]
+    return sorted(file for file in bag.iterdir() if file.name.endswith(SUFFIXES) or file.name == "metadata.yaml")
+
+
+def state(bag: Path) -> State:
+    """How its files stand now: while this stays, so do their bytes."""
+    found = []
+    for file in files_of(bag):
+        status = file.stat()
+        found.append([file.name, status.st_size, status.st_mtime_ns])
+    return found
+
+
+def digest_of(bag: Path) -> str:
+    """SHA-256 of the bytes of all files of a bag, wherever it lies and whatever the folder is called."""
+    whole = hashlib.sha256()
+    for file in files_of(bag):
+        part = hashlib.sha256()
+        with file.open("rb") as stream:
+            while piece := stream.read(_STEP):
+                part.update(piece)
+        whole.update(part.digest())
+    return whole.hexdigest()
+
+
+def key_of(bag_sha256: str, vehicle_sha256: str, options: Mapping[str, Any]) -> str:
+    """The name under which results of these inputs are kept, those of every version."""
+    foreign = {name: origin.sha256 for name, origin in ORIGINS.items()}
+    inputs = [bag_sha256, vehicle_sha256, dict(options), foreign]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:40]
+
+
+@lru_cache(maxsize=1)
+def code_version() -> str:
+    """The version and, as that stands still between releases, a hash of the code that computes."""
+    code = hashlib.sha256()
+    for file in sorted(_PACKAGE.rglob("*.py")):
+        if file.relative_to(_PACKAGE).parts[0] not in _SHOWN:
+            code.update(file.read_bytes())
+    return f"{__version__}+{code.hexdigest()[:10]}"

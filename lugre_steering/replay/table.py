@@ -1,0 +1,50 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The result of a replay on a terminal: one table over all recordings, what is to be known about each, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
+    """The summary as a table, and remarks below it."""
+    unit = summary["torque_unit"]
+    table = Table(title="replay: estimate against measured torque", title_justify="left")
+    table.add_column("recording", overflow="fold")
+    for column in ("seconds", "torques", f"RMSE [{unit}]", "R2", f"bias [{unit}]"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for bag in summary["bags"]:
+        table.add_row(bag["name"], f"{bag['duration_s']:.1f}", str(bag["estimates"]), *_fit(bag["fit"]))
+    if len(summary["bags"]) > 1:
+        seconds, torques = (sum(bag[key] for bag in summary["bags"]) for key in ("duration_s", "estimates"))
+        table.add_section()
+        table.add_row("all", f"{seconds:.1f}", str(torques), *_fit(summary["overall"]))
+    console.print(table)
+    for line in _remarks(summary):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def _fit(fit: Mapping[str, Any] | None) -> tuple[str, str, str]:
+    if fit is None:
+        return "-", "-", "-"
+    r2 = "-" if fit["r2"] is None else f"{fit['r2']:.4f}"
+    return f"{fit['rmse_Nm']:.1f}", r2, f"{fit['bias_Nm']:+.1f}"
+
+
+def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:
+    for bag in summary["bags"]:
+        if bag["fit_note"]:
+            yield f"{bag['name']}: {bag['fit_note']}"
+        for label, counts in bag["samples"].items():
+            if counts["rejected"]:
+                reasons = ", ".join(f"{count} {reason}" for reason, count in counts["rejected"].items())
+                yield f"{bag['name']}: {label}: {counts['used']} used; rejected: {reasons}"
+        for finding in bag["findings"]:
+            yield f"{bag['name']}: {finding['finding']}: {finding['topic']} {finding['statement']}".replace(":  ", ": ")
+    for left in summary["skipped"]:
+        yield f"skipped: {left['bag']}: {left['reason']}"

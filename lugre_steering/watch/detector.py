@@ -1,0 +1,154 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A sequential detector of residuals that are no longer what they were: scores of each manoeuvre, pre-whitened, against what is usual.
+
+A manoeuvre is a stretch of motion over ``MANOEUVRE`` breakaway angles; standing still counts for nothing. Its scores are the logarithms
+of the root mean square and of the largest residual, and the mean residual in the direction of motion as a share of the static
+friction: more error, a kick at some place, another level. What is usual of each (level, scatter and the memory of one manoeuvre for
+the next) is learned from the machine itself: robustly, from the latest ``KEPT`` manoeuvres but for the newest ``LAG``, which an onset
+may already have spoiled. The squares of the innovations, cut at ``CUT`` standard deviations, go into a cumulative sum (Page 1954,
+Biometrika 41, 100-115), which forgets ``SLACK`` a manoeuvre.
+
+How often it speaks although nothing has changed is measured, not computed: ``python -m lugre_steering.bench watch``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from lugre_steering.chain.step import Records
+from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import baseline_parameters
+
+MANOEUVRE = 2.0
+FLOOR_SHARE = 1e-3
+"""Of the static friction: residuals below are no news however they grow."""
+LEARN, KEPT, LAG, AGAIN = 60, 2000, 40, 20
+"""Scores needed before anything is judged, kept (some hours: days are unlike), too new to count; after so many it is taken anew."""
+CUT, SLACK = 3.0, 2.0
+SCORES = 3
+WIDE, WIDE_SIGMA = 0.95, 1.96
+"""Quantile of the deviations that tells their scatter, and what it is of a normal one: days of two kinds have two humps."""
+LEAST_SCATTER = (0.1, 0.01, 0.1)
+"""A tenth more or less error, or a hundredth of the friction, is never unusual."""
+THRESHOLD = 30.0
+"""Of the cumulative sum, for one false alarm in about 1000 h; see ``bench watch``."""
+
+RING = KEPT + LAG
+STATE = np.dtype(
+    [
+        ("scores", np.float64, (RING, SCORES)),
+        ("count", np.int64),
+        ("level", np.float64, (SCORES,)),
+        ("scatter", np.float64, (SCORES,)),
+        ("memory", np.float64, (SCORES,)),
+        ("sum", np.float64),
+        ("raised", np.int64),  # manoeuvres since the sum left zero
+    ]
+)
+
+
+@njit(cache=True)
+def _learn(s):
+    """Level, scatter and memory of the scores that are old enough."""
+    known = min(s.count, RING)
+    old = known - LAG if known - LAG >= LEARN else min(known, LEARN)
+    series = np.empty(old)
+    for k in range(SCORES):
+        for i in range(old):
+            series[i] = s.scores[(s.count - known + i) % RING, k]
+        level = np.median(series)
+        away = series - level
+        scatter = max(LEAST_SCATTER[k], np.quantile(np.abs(away), WIDE) / WIDE_SIGMA)
+        cut = np.minimum(np.maximum(away, -CUT * scatter), CUT * scatter)
+        s.level[k], s.scatter[k] = level, scatter
+        s.memory[k] = min(max(np.sum(cut[1:] * cut[:-1]) / max(np.sum(cut * cut), 1e-12), 0.0), 0.9)
+
+
+@njit(cache=True)
+def weigh(s, scores):
+    """The cumulative sum after the scores of one more manoeuvre; 0 while the usual is not known."""
+    now, before = s.count % RING, (s.count - 1) % RING
+    for k in range(SCORES):
+        s.scores[now, k] = scores[k]
+    s.count += 1
+    if s.count < LEARN:
+        return 0.0
+    if s.count == LEARN or s.count % AGAIN == 0:
+        _learn(s)
+    squares = 0.0
+    for k in range(SCORES):
+        innovation = s.scores[now, k] - s.level[k] - s.memory[k] * (s.scores[before, k] - s.level[k])
+        squares += min(CUT**2, innovation**2 / (s.scatter[k] ** 2 * (1.0 - s.memory[k] ** 2)))
+    s.sum = max(0.0, s.sum + squares / SCORES - SLACK)
+    s.raised = s.raised + 1 if s.sum > 0.0 else 0
+    return s.sum
+
+
+class Watch:
+    """The detector of one vehicle, fed with what the estimator returns."""
+
+    def __init__(self, vehicle: Vehicle, threshold: float = THRESHOLD) -> None:
+        parameters = baseline_parameters(vehicle)
+        self._travel = MANOEUVRE * float(parameters["static_torque"]) / float(parameters["sigma_0"])
+        self._friction = len(vehicle.sides) * float(parameters["static_torque"])
+        self._threshold = threshold
+        self._state: Records = np.zeros(1, STATE)
+        self._angle, self._gone, self._fresh = math.nan, 0.0, False
+        self._squares, self._directed, self._largest, self._count, self._direction = 0.0, 0.0, 0.0, 0, 0.0
+        self._begins: list[int] = []
+        self.since_ns = 0
+        """Stamp from which the model seems not to match, as long as it does not; 0 while it does."""
+        self.scores: list[tuple[float, ...]] = []
+        """Scores of the manoeuvres that have come since somebody took them."""
+
+    @property
+    def learning(self) -> bool:
+        """Whether the usual is still unknown."""
+        return int(self._state[0]["count"]) < LEARN
+
+    def turned(self, angle: float) -> None:
+        """The mean steering angle [rad] is there now."""
+        if math.isnan(self._angle):
+            self._angle = angle
+        way = angle - self._angle
+        # Noise turns nothing: a step counts when it is larger than a hundredth of a breakaway angle.
+        if abs(way) > 0.005 * self._travel:
+            self._gone += abs(way)
+            self._angle, self._direction, self._fresh = angle, math.copysign(1.0, way), True
+
+    def add(self, stamp_ns: int, residual: float) -> bool:
+        """One more residual [N m]; whether an alarm begins with it."""
+        if self._fresh or self._count:
+            self._squares += residual * residual
+            self._directed += self._direction * residual
+            self._largest = max(self._largest, abs(residual))
+            self._count += 1
+        if self._gone < self._travel or self._count == 0:
+            return False
+        floor = FLOOR_SHARE * self._friction
+        rms = math.sqrt(self._squares / self._count)
+        scores = (
+            math.log(math.hypot(rms, floor)),
+            self._directed / self._count / self._friction,
+            math.log(math.hypot(self._largest, floor)),
+        )
+        self._gone, self._squares, self._directed, self._largest, self._count = 0.0, 0.0, 0.0, 0.0, 0
+        self._fresh = False
+        self.scores = [*self.scores[-LAG:], scores]
+        return self._judge(stamp_ns, scores)
+
+    def _judge(self, stamp_ns: int, scores: tuple[float, ...]) -> bool:
+        state = self._state[0]
+        level = float(weigh(state, scores))
+        self._begins = [*self._begins[-RING:], stamp_ns]
+        if level == 0.0:
+            self.since_ns = 0
+        elif level > self._threshold and not self.since_ns:
+            raised = min(int(state["raised"]), len(self._begins) - 1)
+            self.since_ns = self._begins[-1 - raised]
+            return True
+        return False

@@ -1,0 +1,117 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Window files: the samples around an instant at which the model was found not to match, as ``diagnose --window`` reads them."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lugre_steering.chain.step import Records
+from lugre_steering.errors import DataError
+from lugre_steering.files import replacing
+from lugre_steering.recording import Array, Channel, IntArray, Kind, Recording, Signal
+from lugre_steering.vehicle import Vehicle
+
+SCHEMA = "lugre_steering/window/1"
+CAPACITY = 1 << 19
+LARGEST_BYTES = 64 * CAPACITY
+SAMPLE = np.dtype([("channel", np.int64), ("stamp_ns", np.int64), ("value", np.float64), ("rate", np.float64)])
+
+
+class Samples:
+    """The latest ``CAPACITY`` samples of all channels, in a ring."""
+
+    def __init__(self) -> None:
+        self._ring: Records = np.zeros(CAPACITY, SAMPLE)
+        self._count = 0
+
+    def add(self, channel: int, stamp_ns: int, value: float, rate: float) -> None:
+        self._ring[self._count % CAPACITY] = channel, stamp_ns, value, rate
+        self._count += 1
+
+    def since(self, stamp_ns: int) -> Records:
+        """A copy of those stamped then or later, in order of arrival."""
+        kept = min(self._count, CAPACITY)
+        rows = self._ring[np.arange(self._count - kept, self._count) % CAPACITY]
+        return rows[rows["stamp_ns"] >= stamp_ns]
+
+
+@dataclass(frozen=True)
+class Window:
+    """What was written, and why."""
+
+    reason: str
+    recording: Recording
+
+
+def _label(channel: Channel) -> str:
+    return f"{channel.kind.name.lower()}/{channel.name}"
+
+
+def write_window(file: Path, vehicle: Vehicle, reason: str, samples: Records) -> None:
+    """Write samples and reason; ``OSError`` if that is not possible."""
+    about = {"schema": SCHEMA, "vehicle": vehicle.name, "reason": reason, "channels": [_label(channel) for channel in vehicle.channels]}
+    with replacing(file) as stream:
+        np.savez_compressed(stream, about=np.array(json.dumps(about)), samples=samples)
+
+
+def read_window(file: Path, channels: Sequence[Channel]) -> Window:
+    """A window as a recording; ``DataError`` if it is none, damaged, or of a vehicle with other channels."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            if sum(item.file_size for item in archive.infolist()) > LARGEST_BYTES:
+                raise DataError(f"{file}: larger than any window, expected at most {LARGEST_BYTES} bytes")
+        with np.load(file, allow_pickle=False) as content:
+            about, samples = json.loads(str(content["about"])), content["samples"]
+        known = about["schema"] == SCHEMA and samples.dtype == SAMPLE and samples.ndim == 1
+        reason, labels = str(about["reason"]), [str(label) for label in about["channels"]]
+    except OSError as error:
+        raise DataError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
+        raise DataError(f"{file}: is damaged or no window file, expected one that the live node wrote") from error
+    if not known:
+        raise DataError(f"{file}: is of another version, expected {SCHEMA}")
+    wanted = [_label(channel) for channel in channels]
+    if labels != wanted:
+        raise DataError(f"{file}: holds {', '.join(labels)}, expected {', '.join(wanted)} as the vehicle file says")
+    return Window(reason, _recording(file, channels, samples))
+
+
+def _recording(file: Path, channels: Sequence[Channel], samples: Records) -> Recording:
+    kept = samples[(samples["stamp_ns"] > 0) & np.isfinite(samples["value"])]
+    if not kept.size:
+        raise DataError(f"{file}: holds no sample, expected some")
+    start_ns = int(kept["stamp_ns"].min())
+    angle: dict[str, Signal] = {}
+    rate: dict[str, Signal] = {}
+    pressure: dict[str, Signal] = {}
+    others: dict[Kind, Signal] = {}
+    for number, channel in enumerate(channels):
+        rows = kept[kept["channel"] == number]
+        stamps, first = np.unique(rows["stamp_ns"], return_index=True)
+        if not stamps.size:
+            continue
+        signal = _signal(stamps, rows["value"][first], start_ns)
+        if channel.kind is Kind.ANGLE:
+            angle[channel.name] = signal
+            given = np.isfinite(rows["rate"][first])
+            if given.any():
+                rate[channel.name] = _signal(stamps[given], rows["rate"][first][given], start_ns)
+        elif channel.kind is Kind.PRESSURE:
+            pressure[channel.name] = signal
+        else:
+            others[channel.kind] = signal
+    return Recording(
+        name=file.stem, start_ns=start_ns, angle=angle, pressure=pressure, rate=rate,
+        air_temperature=others.get(Kind.AIR_TEMPERATURE), measured_torque=others.get(Kind.TORQUE),
+    )  # fmt: skip
+
+
+def _signal(stamps: IntArray, value: Array, start_ns: int) -> Signal:
+    return Signal(np.asarray((stamps - start_ns) * 1e-9, np.float64), np.asarray(value, np.float64))

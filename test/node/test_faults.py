@@ -1,0 +1,44 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The short form of the campaign of faults: three of them, over DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from lugre_steering.bench import faults
+from lugre_steering.bench.soak import compressed
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Iterator[faults.Campaign]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", "78")
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv("PYTHONPATH", str(Path(faults.__file__).parents[2]))
+        made = faults.Campaign(tmp_path_factory.mktemp("campaign"), 1)
+        yield made
+        made.close()
+
+
+@pytest.mark.parametrize("name", ["left angle frozen", "noise of one degree", "pressures in bar"])
+def test_a_fault_is_told_limited_and_recovered(campaign: faults.Campaign, name: str) -> None:
+    score = campaign.samples(name, *faults.faults_of(campaign.vehicle, campaign.rng)[name])
+    assert score.passed, score
+
+
+def test_a_node_that_is_killed_comes_back(campaign: faults.Campaign) -> None:
+    assert faults.parameters_set_wrongly(campaign)
+    last_command_is_zero, _ready_s = faults.killed(campaign, 15)
+    assert last_command_is_zero
+
+
+def test_many_samples_in_compressed_time() -> None:
+    came = compressed(400_000, 1)
+    assert came["finite"]
+    assert came["live_minus_replay_Nm"] == 0.0

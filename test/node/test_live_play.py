@@ -1,0 +1,122 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A bag played to the live node, and the node watched: three processes as a user starts them."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from lugre_steering.cli import app
+from lugre_steering.live.seen import Seen
+from lugre_steering.live_view import BARS, spark, view
+from lugre_steering.node import arguments_of
+
+PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+VEHICLE = PACKAGE_ROOT / "config" / "test_vehicle.yaml"
+
+
+def text_of(state: Seen, now_s: float, width: int = 80) -> str:
+    console = Console(width=width, no_color=True)
+    with console.capture() as capture:
+        console.print(view(state, now_s))
+    return capture.get()
+
+
+def test_the_view_shows_numbers_their_last_minute_and_health() -> None:
+    state = Seen("/a/steering_torque_estimator")
+    assert "nothing has come yet" in text_of(state, 5.0)
+    for k in range(100):
+        state.add("torque", "N m", 0.5 * k, -48_200.0 + 900.0 * k)
+    state.add("left_track_steer_joint", "deg", 49.6, 12.345)
+    state.diagnosed(49.7, [("inputs", 2, "angle/left stale"), ("latency", 0, "fine")])
+    shown = text_of(state, 50.0)
+    for words in ("/a/steering_torque_estimator", "torque", "40\u2009900", "-48\u2009200", "N m", "12.3", "error", "angle/left stale"):
+        assert words in shown, shown
+    assert "…" not in shown
+    assert "silent" not in shown
+    assert "silent for 30 s" in text_of(state, 80.0)
+
+
+def test_a_line_of_characters() -> None:
+    assert spark([0.0, float("nan"), 7.0, 3.0]) == f"{BARS[0]} {BARS[7]}{BARS[3]}"
+    assert spark([2.0, 2.0]) == BARS[3] * 2
+    assert spark([]) == ""
+
+
+def test_arguments_of_the_node() -> None:
+    made = arguments_of(Path("v.yaml"), Path("p.yaml"), ["angle_timeout_s:=0.3"], ["a:=b"])
+    assert made == [
+        "estimator", "--ros-args", "--params-file", "p.yaml", "-p", "vehicle_file:=v.yaml", "-p", "angle_timeout_s:=0.3", "-r", "a:=b",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", [("play", "bag"), ("watch",), ("node", "--vehicle", "v.yaml")])
+def test_without_ros_it_is_one_line(monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "rclpy" else find(name, *rest))
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "lugre_steering[ros]" in done.stderr
+
+
+def test_stamps_are_moved_and_nothing_else() -> None:
+    pytest.importorskip("rclpy")
+    from lugre_steering.bag import cdr
+    from lugre_steering.live.play import moved
+
+    stamp = np.array([1_700_000_000_900_000_000])
+    raw, later = (cdr.encode_fluid_pressure(stamp + shift, "frame", np.array([1e6])).tobytes() for shift in (0, 200_000_000))
+    assert moved(raw, 200_000_000) == later
+    assert moved(later, -200_000_000) == raw
+    unset = raw[:4] + bytes(8) + raw[12:]
+    assert moved(unset, 200_000_000) == unset
+    assert moved(raw[:8], 5) == raw[:8]
+
+
+def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy")
+    from live_harness import environment
+
+    from lugre_steering.bench.replay import write_cycle
+
+    write_cycle(tmp_path / "run", 6.0)
+    command = [sys.executable, "-m", "lugre_steering.cli"]
+    node = subprocess.Popen([*command, "node", "--vehicle", VEHICLE], env=environment(), stderr=subprocess.PIPE, text=True)
+    try:
+        assert node.stderr is not None
+        while "ready, executor" not in node.stderr.readline():
+            assert node.poll() is None
+        seen = subprocess.Popen([*command, "watch", "--seconds", "9"], env=environment(), stdout=subprocess.PIPE, text=True)
+        time.sleep(1.5)
+        begun = time.monotonic()
+        bag = [*command, "play", tmp_path / "run", "--json"]
+        played = subprocess.run(bag, env=environment(), capture_output=True, text=True, check=True)
+        assert time.monotonic() - begun > 5.9  # its own timing
+        result = json.loads(played.stdout)
+        assert set(result["messages"].values()) == {600}
+        assert len(result["messages"]) == 6
+        shown, _ = seen.communicate(timeout=30)
+    finally:
+        node.terminate()
+        node.communicate(timeout=30)
+    for words in ("torque", "residual", "rubber left", "left_track_steer_joint", "health", "inputs"):
+        assert words in shown, shown
+    assert "nothing has come" not in shown
+
+
+def test_what_cannot_be_played_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy")
+    done = CliRunner().invoke(app, ["play", str(tmp_path / "absent")])
+    assert done.exit_code == 2
+    assert "no such file" in done.stderr

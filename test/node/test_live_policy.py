@@ -1,0 +1,35 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The shipped SROS 2 policy against the topics and services of the running node."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from live_harness import NAME, PACKAGE_ROOT, LiveNode, World
+
+POLICY = PACKAGE_ROOT / "config" / "sros2_policy.xml"
+
+
+def allowed(tag: str, way: str) -> set[str]:
+    """Full names that the policy allows the node."""
+    profile = ET.parse(POLICY).getroot().find(".//profile")
+    assert profile is not None
+    found = [item.text or "" for group in profile.findall(tag) if group.get(way) == "ALLOW" for item in group]
+    return {name.replace("~", NAME) for name in found}
+
+
+def test_the_policy_allows_what_the_node_does_and_no_more() -> None:
+    with LiveNode("-p", "publish_commands:=true", "-p", "use_sim_time:=true") as _, World() as world:
+        node, own = world.node, (NAME[1:], "/")
+        world.wait(lambda: bool(world.heard["diagnostics"]))
+        published = {name for name, _ in node.get_publisher_names_and_types_by_node(*own)}
+        subscribed = {name for name, _ in node.get_subscriber_names_and_types_by_node(*own)}
+        offered = {name for name, _ in node.get_service_names_and_types_by_node(*own)}
+    assert published == allowed("topics", "publish")
+    assert subscribed == allowed("topics", "subscribe")
+    assert offered == allowed("services", "reply")

@@ -1,0 +1,33 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The window that the live node writes when asked for it, over DDS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from live_harness import NAME, Driver, LiveNode, World, call
+from std_srvs.srv import Trigger
+
+from lugre_steering.watch.window import read_window
+
+
+def test_a_marked_window_is_written(tmp_path: Path) -> None:
+    with LiveNode("-p", f"watch_folder:={tmp_path}", "-p", "watch_before_s:=60.0") as _, World() as world:
+        Driver(world).steer(2.0)
+        answer = call(world, Trigger, f"{NAME}/mark", Trigger.Request())
+        assert answer.success, answer.message
+        recording = read_window(Path(answer.message), world.vehicle.channels).recording
+        assert recording.angle["left"].value.size == 200
+        assert recording.angle["right"].value.size == 200
+
+
+def test_without_a_folder_there_is_none() -> None:
+    with LiveNode() as _, World() as world:
+        answer = call(world, Trigger, f"{NAME}/mark", Trigger.Request())
+        assert not answer.success
+        assert "watch_folder" in answer.message

@@ -1,0 +1,61 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The hydraulic plant of the closed loop: its friction, its statics, its controller; without the node."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from lugre_steering.bench.closed_loop import NONE, PERIOD_S, drive, reference
+from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
+from lugre_steering.proof.field.friction import Inside, standing, turn_step, turn_track
+from lugre_steering.proof.field.hydraulics import gains
+from lugre_steering.proof.field.simulator import Setting, draw_setting
+
+
+@pytest.fixture(scope="module")
+def setting() -> Setting:
+    return draw_setting(11, "clean", "white")
+
+
+def side_of(setting: Setting) -> Side:
+    par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
+    return Side(par, setting.ground, setting.ratios, setting.cells[0])
+
+
+def test_step_by_step_the_track_turns_as_it_does_at_once(setting: Setting) -> None:
+    step = 2e-3
+    angle = 0.2 * np.sin(0.8 * step * np.arange(4000))
+    ones = np.ones(angle.size)
+    whole = turn_track(angle, step, setting.ground, setting.ratios, setting.cells[0], Inside(), ones, ones)
+    track = standing(setting.cells[0], setting.ground)
+    single = [
+        turn_step(after, (after - before) / step, step, track, setting.ground, setting.ratios, setting.cells[0], Inside())
+        for before, after in itertools.pairwise(angle)
+    ]
+    # The kingpin's torque follows the sum of the rates there, the angle itself here.
+    assert np.abs(np.array(single) - (whole.friction + whole.aligning)[1:]).max() < 1e-6 * setting.torque_scale
+
+
+def test_a_closed_valve_holds_and_an_open_one_turns_the_track(setting: Setting) -> None:
+    still, moving = side_of(setting), side_of(setting)
+    for _ in range(400):
+        still.advance(0.0, PERIOD_S)
+        moving.advance(0.3, PERIOD_S)
+    assert abs(still.angle) < 1e-6
+    assert moving.angle > 0.1
+    par = moving.par
+    load_torque = par.displacement * moving.state[2]
+    assert 0.7 * setting.ground.sliding_Nm < load_torque < 1.6 * setting.ground.sliding_Nm  # what friction needs while it slides
+
+
+def test_without_feed_forward_the_loop_is_stable_but_off(setting: Setting) -> None:
+    run = drive(NONE, setting, 8.0, None, 0.0)
+    time_s, wanted, _ = reference(setting.machine.limit, 8.0)
+    assert run.time.size == time_s.size
+    assert 0.05 < run.rms_deg < 2.0
+    assert np.degrees(np.ptp(wanted)) > 10.0
+    assert run.energy_kJ > 0.0

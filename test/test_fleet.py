@@ -1,0 +1,274 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A fleet with real worker processes: kept by content, killed and gone on with, bad bags in quarantine, tables that others read."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import jsonschema
+import pyarrow.parquet as pq
+import pytest
+from test_batch import of_another_machine
+from typer.testing import CliRunner
+
+import lugre_steering
+from lugre_steering.bench.replay import write_cycle
+from lugre_steering.cli import app
+from lugre_steering.errors import DataError, LugreSteeringError, VehicleFileError
+from lugre_steering.fleet.result import Fleet
+from lugre_steering.fleet.run import run
+from lugre_steering.fleet.tables import KINDS
+from lugre_steering.fleet.vehicles import member_of, read_members
+from lugre_steering.fleet.work import Options
+from lugre_steering.resources import config_folder
+from lugre_steering.schemas import schema_of
+
+VEHICLE = config_folder() / "test_vehicle.yaml"
+BAGS = Path(__file__).parents[1] / "bags"
+QUICK = Options(diagnose=False)
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four recordings, a robot's, one cut in two and not what it says."""
+    folder = tmp_path_factory.mktemp("data") / "runs"
+    for number in range(4):
+        write_cycle(folder / f"run_{number}", 5.0 + number)
+    of_another_machine(folder / "robot")
+    write_cycle(folder / "corrupt", 5.0)
+    whole = next((folder / "corrupt").glob("*.mcap"))
+    whole.write_bytes(whole.read_bytes()[:50] + b"\xff" * 5000)
+    return folder
+
+
+def bags_of(runs: Path) -> list[Path]:
+    return sorted(path for path in runs.iterdir() if path.is_dir())
+
+
+def table(out: Path, name: str) -> list[dict]:
+    return pq.read_table(out / f"{name}.parquet").to_pylist()
+
+
+@pytest.fixture(scope="module")
+def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("fleet") / "out"
+    run(bags_of(runs), VEHICLE, out, options=QUICK, jobs=2, version="1")
+    return out
+
+
+def test_bad_bags_are_in_quarantine_and_stop_nobody(done: Path) -> None:
+    result = json.loads((done / "fleet.json").read_text())
+    assert (result["finished"], result["examined"], result["cached"]) == (True, 6, 0)
+    assert {Path(one["bag"]).name for one in result["quarantine"]} == {"robot", "corrupt"}
+    assert all(one["reason"] for one in result["quarantine"])
+    assert [(one["recordings"], one["quarantined"]) for one in result["vehicles"]] == [(4, 2)]
+
+
+def test_the_record_keeps_to_its_schema(done: Path) -> None:
+    jsonschema.validate(json.loads((done / "fleet.json").read_text()), schema_of(Fleet))
+
+
+def test_tables_are_what_they_say(done: Path, runs: Path) -> None:
+    for name, columns in KINDS.items():
+        assert pq.read_schema(done / f"{name}.parquet").names == list(columns)
+    scores = {Path(row["bag"]).name: row for row in table(done, "scores")}
+    assert scores["run_0"]["rmse_Nm"] > 0.0
+    assert scores["run_0"]["duration_s"] == pytest.approx(5.0, abs=0.1)
+    assert scores["robot"]["quarantine"] is not None
+    single = CliRunner().invoke(app, ["replay", str(runs / "run_3"), "--vehicle", str(VEHICLE), "--out", str(done.parent / "replay")])
+    assert single.exit_code == 0
+    known = json.loads((done.parent / "replay" / "summary.json").read_text())["overall"]
+    assert scores["run_3"]["rmse_Nm"] == pytest.approx(known["rmse_Nm"], rel=1e-12)
+
+
+def test_the_page_says_what_was_left_out_and_loads_nothing(done: Path) -> None:
+    page = (done / "report.html").read_text()
+    assert "corrupt" in page
+    assert "robot" in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert "https://" not in page
+
+
+def test_what_is_known_is_not_done_again(done: Path, runs: Path, tmp_path: Path) -> None:
+    out, data = shutil.copytree(done, tmp_path / "out"), shutil.copytree(runs, tmp_path / "runs")
+    again = run(bags_of(runs), VEHICLE, out, options=QUICK, jobs=1, version="1")
+    assert (again.examined, again.cached) == (0, 6)
+    moved = run(bags_of(data), VEHICLE, out, options=QUICK, jobs=1, version="1")  # the same bytes elsewhere
+    assert (moved.examined, moved.cached) == (0, 6)
+    shutil.rmtree(data / "run_0")
+    write_cycle(data / "run_0", 5.5)
+    changed = run(bags_of(data), VEHICLE, out, options=QUICK, jobs=1, version="1")
+    assert (changed.examined, changed.cached) == (1, 5)
+    sheet = tmp_path / "other.yaml"
+    text = VEHICLE.read_text().replace("rubber_dma", f"{VEHICLE.parent}/rubber_dma")
+    sheet.write_text(f"# the same\n{text}")
+    assert run(bags_of(data)[:2], sheet, out, options=QUICK, jobs=1, version="1").cached == 2  # a sheet is what it says
+
+
+def test_two_versions_are_compared(done: Path, runs: Path, tmp_path: Path) -> None:
+    out = shutil.copytree(done, tmp_path / "out")
+    bags = bags_of(runs)[:3]
+    same = run(bags, VEHICLE, out, options=QUICK, jobs=1, version="2")
+    assert (same.examined, same.other_version, same.changes) == (3, "1", ())
+    for file in (out / "recordings").glob("*/2.json"):
+        record = json.loads(file.read_text())
+        if record["score"]:
+            record["score"]["rmse_Nm"] *= 2.0
+            file.write_text(json.dumps(record))
+    changed = run(bags, VEHICLE, out, options=QUICK, jobs=1, version="3")
+    assert changed.other_version == "2"
+    assert {(Path(one.bag).name, one.what) for one in changed.changes} == {("run_0", "rmse_Nm")}
+    assert len(table(out, "changes")) == 1
+    assert "Nothing differs" not in (out / "report.html").read_text()
+
+
+def children(process: int) -> list[int]:
+    """Processes that it has started, but for the one that watches shared memory."""
+    found = []
+    for thread in Path(f"/proc/{process}/task").glob("*/children"):
+        found += [int(child) for child in thread.read_text().split()]
+    return [child for child in found if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+def waiting(condition: object, seconds: float = 120.0) -> Iterator[None]:
+    end = time.monotonic() + seconds
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < end, "nothing has happened for too long"
+        yield
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are looked up in /proc")
+def test_workers_may_be_killed_and_then_the_whole_run(done: Path, runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "lugre_steering.cli", "fleet", runs, "--vehicle", VEHICLE, "--out", out, "--no-diagnose", "-j", "2"]
+    first = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE)
+    for _ in waiting(lambda: len(children(first.pid)) == 2):
+        pass
+    os.kill(children(first.pid)[0], signal.SIGKILL)  # whatever it has is done by another
+    for _ in waiting(lambda: len(list((out / "recordings").glob("*/*.json"))) >= 2):
+        assert first.poll() is None
+    workers = children(first.pid)
+    first.kill()
+    first.communicate()
+    for _ in waiting(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers)):
+        pass  # none is left behind
+    assert json.loads((out / "fleet.json").read_text())["finished"] is False
+    second = subprocess.run([*command, "--json"], env=ENVIRONMENT, capture_output=True, check=True)
+    result = json.loads(second.stdout)
+    assert result["cached"] >= 2
+    assert result["cached"] + result["examined"] == 6
+    whole = {Path(row["bag"]).name: (row["rmse_Nm"], row["quarantine"]) for row in table(done, "scores")}
+    assert {Path(row["bag"]).name: (row["rmse_Nm"], row["quarantine"]) for row in table(out, "scores")} == whole
+
+
+def test_a_bag_that_grows_is_left_for_the_next_run(tmp_path: Path) -> None:
+    """A recorder at work: the file gets longer while it is read."""
+    write_cycle(tmp_path / "whole", 6.0)
+    content = next((tmp_path / "whole").glob("*.mcap")).read_bytes()
+    growing = tmp_path / "now" / "now.mcap"
+    growing.parent.mkdir()
+    growing.write_bytes(content[:-20_000])
+    stop = threading.Event()
+
+    def record() -> None:
+        with growing.open("ab") as file:
+            for place in range(len(content) - 20_000, len(content), 40):
+                file.write(content[place : place + 40])
+                file.flush()
+                if stop.wait(0.02):
+                    file.write(content[place + 40 :])
+                    return
+
+    recorder = threading.Thread(target=record)
+    recorder.start()
+    try:
+        first = run([growing.parent], VEHICLE, tmp_path / "out", options=QUICK, jobs=1)
+    finally:
+        stop.set()
+        recorder.join()
+    assert ["still being written" in one.reason for one in first.quarantine] == [True]
+    assert growing.read_bytes() == content
+    second = run([growing.parent], VEHICLE, tmp_path / "out", options=QUICK, jobs=1)
+    assert (second.quarantine, second.examined, second.vehicles[0].recordings) == ((), 1, 1)
+
+
+def test_a_map_says_which_vehicle_made_which_bag(runs: Path, tmp_path: Path) -> None:
+    file = tmp_path / "map.yaml"
+    text = "vehicles:\n  seven: {file: %s, bags: ['*_0', '*_1']}\n  nine: {file: %s, bags: ['*_1', '*_2']}\n"
+    file.write_text(text % (VEHICLE, VEHICLE))
+    members = read_members(file)
+    told = [member_of(runs / f"run_{number}", members) for number in range(4)]
+    assert [one if isinstance(one, str) else one.name for one in told] == [
+        "seven", "its path fits seven and nine of the map of vehicles, expected one", "nine", "its path fits no vehicle of the map",
+    ]  # fmt: skip
+    result = run([runs / "run_0", runs / "run_3"], file, tmp_path / "out", options=QUICK, jobs=1)
+    assert [(one.name, one.recordings) for one in result.vehicles] == [("seven", 1), ("nine", 0)]
+    assert [Path(one.bag).name for one in result.quarantine] == ["run_3"]
+    for wrong in ("vehicles: {}\n", "vehicles: {a: {file: x.yaml}}\n", f"vehicles: {{a: {{file: '{VEHICLE}', bags: []}}}}\n"):
+        file.write_text(wrong)
+        with pytest.raises(VehicleFileError, match=r"map\.yaml"):
+            read_members(file)
+
+
+def test_nothing_of_others_is_replaced(runs: Path, tmp_path: Path) -> None:
+    (tmp_path / "scores.parquet").write_bytes(b"somebody's")
+    with pytest.raises(DataError, match="not part of an earlier result"):
+        run([runs / "run_0"], VEHICLE, tmp_path, options=QUICK, jobs=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["scores.parquet"]
+
+
+@pytest.mark.parametrize(("module", "options"), [("pyarrow", ()), ("distributed", ("--scheduler", "tcp://127.0.0.1:1"))])
+def test_what_is_missing_is_named(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, options: tuple[str, ...]
+) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == module else find(name, *rest))
+    arguments = ["fleet", str(runs / "run_0"), "--vehicle", str(VEHICLE), "--out", str(tmp_path / "out"), "--no-diagnose", *options]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 2
+    assert "lugre_steering[fleet]" in done.stderr
+
+
+def test_one_is_diagnosed_and_its_physics_stands(tmp_path: Path) -> None:
+    """The bundled hidden stop."""
+    out = tmp_path / "out"
+    arguments = ["fleet", BAGS / "synthetic_hidden_stop_a", "--vehicle", VEHICLE, "--out", out, "-j", "1", "--fail-on", "effect"]
+    assert CliRunner().invoke(app, [str(argument) for argument in arguments]).exit_code == 1
+    assert {row["effect"] for row in table(out, "effects")} == {"end_stop"}
+    assert [(row["kind"], row["effect"]) for row in table(out, "claims") if row["q_value"] < 0.05] == [("recording", "end_stop")]
+    estimates = {row["effect"]: row for row in table(out, "estimates")}
+    assert len(estimates) > 15
+    assert all(row["sd"] > 0.0 for row in estimates.values())
+    assert "Elastic end stop" in (out / "report.html").read_text()
+
+
+@pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="Dask is not installed")
+def test_a_dask_cluster_does_the_same(done: Path, runs: Path, tmp_path: Path) -> None:
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        result = run(bags_of(runs), VEHICLE, tmp_path / "out", options=QUICK, scheduler=cluster.scheduler_address, version="1")
+        assert (result.examined, len(result.quarantine)) == (6, 2)
+    strip = {"seconds": None}
+    assert [row | strip for row in table(tmp_path / "out", "scores")] == [row | strip for row in table(done, "scores")]
+
+
+@pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="Dask is not installed")
+def test_no_scheduler_is_one_line(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lugre_steering.fleet.cluster.PATIENCE", "1s")
+    with pytest.raises(LugreSteeringError, match="no Dask scheduler answers"):
+        run([runs / "run_0"], VEHICLE, tmp_path / "out", options=QUICK, scheduler="tcp://127.0.0.1:1")
+    assert not (tmp_path / "out" / "report.html").exists()

@@ -1,0 +1,134 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The online watch: alarms on made-up scores, and window files there and back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lugre_steering.bench.neighbour import Strokes
+from lugre_steering.cli import app
+from lugre_steering.errors import DataError
+from lugre_steering.recording import Array
+from lugre_steering.vehicle import load
+from lugre_steering.watch.detector import LEARN, SCORES, STATE, THRESHOLD, Watch, weigh
+from lugre_steering.watch.window import CAPACITY, Samples, read_window, write_window
+
+FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
+VEHICLE = load(FILE)
+T0 = 1_790_000_000_000_000_000
+
+
+def coloured(count: int, seed: int) -> Array:
+    """Scores (count, SCORES) with memory: an AR(1) of 0.5 about levels of their own."""
+    rng, x = np.random.default_rng(seed), np.zeros((count, SCORES))
+    for i in range(1, count):
+        x[i] = 0.5 * x[i - 1] + 0.2 * rng.standard_normal(SCORES)
+    return np.asarray(x + np.array([7.0, 0.0, 8.0]))
+
+
+def sums(scores: Array) -> Array:
+    state = np.zeros(1, STATE)[0]
+    return np.array([weigh(state, row) for row in scores])
+
+
+def test_scores_that_only_scatter_raise_no_alarm() -> None:
+    assert sums(coloured(20_000, 1)).max() < THRESHOLD
+
+
+@pytest.mark.parametrize("changed", [[0, 2], [0, 1, 2]])
+def test_a_change_is_told_and_not_before(changed: list[int]) -> None:
+    """More error and larger kicks, with another level or without."""
+    scores = coloured(600, 2)
+    scores[400:, changed] += 5.0 * 0.23
+    level = sums(scores)
+    assert level[:400].max() < THRESHOLD
+    assert level[400:480].max() > THRESHOLD
+
+
+def test_the_watch_learns_tells_once_and_knows_since_when() -> None:
+    """Residuals of noise, five times as large from the 1500th second on; a stroke of 0.3 rad takes 3.5 s."""
+    watch, rng, alarms = Watch(VEHICLE), np.random.default_rng(3), []
+    for i in range(40_000):
+        t = 0.05 * i
+        watch.turned(0.3 * math.sin(0.9 * t))
+        if watch.add(T0 + round(t * 1e9), (2000.0 if t > 1500.0 else 400.0) * float(rng.standard_normal())):
+            alarms.append(t)
+            since_s = (watch.since_ns - T0) * 1e-9
+        if i == 100:
+            assert watch.learning
+    assert not watch.learning
+    assert len(alarms) == 1
+    assert 1500.0 < alarms[0] < 1600.0
+    assert since_s == pytest.approx(1500.0, abs=60.0)
+
+
+def test_a_standing_vehicle_is_not_judged() -> None:
+    watch, rng = Watch(VEHICLE), np.random.default_rng(4)
+    for i in range(20_000):
+        watch.turned(1e-4 * float(rng.standard_normal()))
+        assert not watch.add(T0 + i, 1e5 * i)
+    assert watch.learning
+    assert LEARN > 0
+
+
+def filled(seconds: float) -> Samples:
+    strokes, samples = Strokes(VEHICLE), Samples()
+    for i in range(round(100 * seconds)):
+        for channel, value in enumerate(strokes.at(0.01 * i).tolist()):
+            samples.add(channel, T0 + i * 10_000_000, value, math.nan)
+    return samples
+
+
+def test_a_window_comes_back_as_it_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "window.npz"
+    write_window(file, VEHICLE, "marked", filled(3.0).since(T0 + 1_000_000_000))
+    window = read_window(file, VEHICLE.channels)
+    assert window.reason == "marked"
+    assert window.recording.start_ns == T0 + 1_000_000_000
+    assert set(window.recording.pressure) == {"main_a", "main_b", "aux_a", "aux_b"}
+    expected = [Strokes(VEHICLE).at(0.01 * i)[0] for i in range(100, 300)]
+    assert window.recording.angle["left"].value.tolist() == expected
+    assert window.recording.angle["left"].time_s[-1] == pytest.approx(1.99)
+
+
+def test_the_ring_keeps_the_latest() -> None:
+    samples = Samples()
+    for i in range(CAPACITY + 10):
+        samples.add(0, i + 1, float(i), math.nan)
+    rows = samples.since(0)
+    assert rows.size == CAPACITY
+    assert (rows["stamp_ns"][0], rows["stamp_ns"][-1]) == (11, CAPACITY + 10)
+
+
+def test_bad_windows_are_refused_in_words(tmp_path: Path) -> None:
+    file = tmp_path / "window.npz"
+    write_window(file, VEHICLE, "marked", filled(1.0).since(0))
+    whole = file.read_bytes()
+    for content in (b"", b"no window", whole[: len(whole) // 2], whole[:200] + bytes(100) + whole[300:]):
+        file.write_bytes(content)
+        with pytest.raises(DataError, match="damaged"):
+            read_window(file, VEHICLE.channels)
+    file.write_bytes(whole)
+    with pytest.raises(DataError, match="expected"):
+        read_window(file, load(FILE.with_name("single_joint_example.yaml")).channels)
+    with pytest.raises(DataError, match="cannot be read"):
+        read_window(tmp_path / "none.npz", VEHICLE.channels)
+
+
+def test_diagnose_reads_a_window(tmp_path: Path) -> None:
+    file = tmp_path / "window.npz"
+    write_window(file, VEHICLE, "marked", filled(4.0).since(0))
+    arguments = ["diagnose", "--vehicle", str(FILE), "--out", str(tmp_path / "out"), "--no-report"]
+    done = CliRunner().invoke(app, [*arguments, "--window", str(file)])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "out" / "diagnosis.json").exists()
+    assert '"window"' in (tmp_path / "out" / "diagnosis.json").read_text()
+    assert CliRunner().invoke(app, arguments).exit_code == 2
+    file.write_bytes(b"nothing")
+    assert CliRunner().invoke(app, [*arguments, "--window", str(file)]).exit_code == 2
