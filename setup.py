@@ -9,6 +9,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = "lugre_steering"
 VERSION = "0.1.0"
+DOCS = ["mkdocs>=1.6,<2", "mkdocs-material>=9.5"]
 
 setup(
     name=PACKAGE,
@@ -54,8 +55,10 @@ setup(
         "frame": ["pandas>=2.0"],
         "fleet": ["pyarrow>=14.0", "distributed>=2023.9"],
         "report": ["matplotlib>=3.6"],
+        "docs": DOCS,
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
+            *DOCS,
             "pytest>=7.4",
             "pytest-xdist>=3.3",
             "hypothesis>=6.80",

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from lugre_steering.calibration.result import Calibration
     from lugre_steering.diagnosis.library import diagnose, write_report
     from lugre_steering.diagnosis.result import Diagnosis
+    from lugre_steering.effects.registry import add_files as add_effects
     from lugre_steering.errors import BagError, DataError, LugreSteeringError, VehicleFileError
     from lugre_steering.estimator import Estimator, Options
     from lugre_steering.recording import Recording
@@ -39,8 +40,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BagError", "Calibration", "DataError", "Diagnosis", "Estimator", "LugreSteeringError", "Options", "Recording", "Replay",
-    "Simulation", "Vehicle", "VehicleFileError", "calibrate", "diagnose", "load_vehicle", "replay", "save_vehicle", "simulate",
-    "write_report",
+    "Simulation", "Vehicle", "VehicleFileError", "add_effects", "calibrate", "diagnose", "load_vehicle", "replay", "save_vehicle",
+    "simulate", "write_report",
 ]  # fmt: skip
 
 _PLACES = {
@@ -49,7 +50,9 @@ _PLACES = {
     "Replay": "replay.result", "Simulation": "simulate.result", "Vehicle": "vehicle", "VehicleFileError": "errors",
     "calibrate": "calibration.library", "diagnose": "diagnosis.library", "write_report": "diagnosis.library",
 }  # fmt: skip
-_RENAMED = {"load_vehicle": ("vehicle", "load"), "save_vehicle": ("vehicle", "save")}
+_RENAMED = {
+    "load_vehicle": ("vehicle", "load"), "save_vehicle": ("vehicle", "save"), "add_effects": ("effects.registry", "add_files"),
+}  # fmt: skip
 _ROOMS = ("replay", "simulate")
 """Called themselves; see ``callable_room``."""
 

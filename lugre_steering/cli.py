@@ -327,15 +327,23 @@ def simulate(
 def vehicle_(
     file: Annotated[Path, typer.Argument(help="vehicle file (YAML)")],
     out: Annotated[Path | None, typer.Option(help="folder for a picture of the footprint of one track")] = None,
+    new: Annotated[bool, typer.Option("--new", help="ask for what a sheet needs and write FILE first")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="with --new: ask nothing, take every value that is proposed")] = False,
     as_json: Json = False,
 ) -> None:
-    """Check a vehicle file and say what it amounts to.
+    """Check a vehicle file and say what it amounts to, or begin one.
 
     Loads, friction, heat, inputs and effects."""
     from lugre_steering.sheet.derived import derive
     from lugre_steering.sheet.show import draw_footprint, show_vehicle
     from lugre_steering.vehicle import load
 
+    if new:
+        from lugre_steering.sheet.new import begin_sheet
+
+        begin_sheet(file, lambda text, default: default if yes else typer.prompt(text, default, err=True), console().print)
+    elif yes:
+        raise DataError("vehicle --yes: answers the questions of --new; expected both")
     read = load(file)
     picture = draw_footprint(read, out) if out is not None else None
     result = {**derive(read), "picture": picture and str(picture)}

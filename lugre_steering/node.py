@@ -13,7 +13,7 @@ from pathlib import Path
 HELP = """usage: estimator --ros-args -p vehicle_file:=FILE [-p NAME:=VALUE ...] [--params-file FILE] [-r FROM:=TO ...]
 
 The live steering torque estimator. Its parameters: ros2 param describe /steering_torque_estimator NAME, while it runs;
-topics and a parameter file to copy: README of lugre_steering."""
+topics and a parameter file to copy: docs/ros.md of lugre_steering."""
 
 
 def arguments_of(vehicle: Path, parameters: Path | None, settings: Sequence[str], remaps: Sequence[str]) -> list[str]:

@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import difflib
+import inspect
 import math
+import textwrap
 import types
 import typing
 from collections.abc import Mapping, Sequence
@@ -23,6 +26,13 @@ from lugre_steering.files import read_text
 T = TypeVar("T")
 
 
+UNITS = {
+    "Nm_per_deg": "N m/deg", "J_kgK": "J/(kg K)", "W_m2K": "W/(m2 K)", "kg_m3": "kg/m3", "deg_s": "deg/s", "kgm2": "kg m2",
+    "degC": "degC", "Nms": "N m s", "deg": "deg", "Nm": "N m", "Pa": "Pa", "Hz": "Hz", "K": "K", "N": "N", "m": "m",
+}  # fmt: skip
+"""Unit of a key, by its ending."""
+
+
 def quantity(
     low: float = -math.inf, high: float = math.inf, *, open_low: bool = False, default: Any = dataclasses.MISSING
 ) -> Any:
@@ -35,6 +45,29 @@ def quantity(
 
 def positive(high: float = math.inf, *, default: Any = dataclasses.MISSING) -> Any:
     return quantity(0.0, high, open_low=True, default=default)
+
+
+def meanings_of(cls: type) -> dict[str, str]:
+    """What stands as a text below each attribute of a class."""
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    assert isinstance(body, ast.ClassDef)
+    return {
+        attribute.target.id: " ".join(below.value.value.split())
+        for attribute, below in zip(body.body, body.body[1:], strict=False)
+        if isinstance(attribute, ast.AnnAssign) and isinstance(attribute.target, ast.Name)
+        and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str)
+    }  # fmt: skip
+
+
+def section_in(hint: Any) -> type | None:
+    """The dataclass that a key of this type holds, also as entries of a list or mapping; None for plain values."""
+    held = (each for each in (hint, *typing.get_args(hint)) if dataclasses.is_dataclass(each))
+    return typing.cast("type | None", next(held, None))
+
+
+def unit_of(key: str) -> str:
+    """Unit that a key's ending names; empty if none does."""
+    return next((unit for ending, unit in UNITS.items() if key.endswith(f"_{ending}")), "")
 
 
 class Reader:

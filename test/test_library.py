@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 VEHICLE = ROOT / "config" / "test_vehicle.yaml"
 STOP = ROOT / "bags" / "synthetic_hidden_stop_a"
 DOUBLE_CYCLE = ROOT / "bags" / "synthetic_double_cycle"
-PAGE = (ROOT / "config" / "library.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
 
 
 # ------------------------------------------------------------------- import

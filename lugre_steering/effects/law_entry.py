@@ -17,24 +17,30 @@ from lugre_steering.schema import Reader, quantity, suggestion
 
 @dataclass(frozen=True)
 class LawEntry:
-    """A law that no entry of the catalogue is: channel x f(coordinate), see ``laws``; numbers in SI units.
-
-    ``range``: where the coordinate was seen; beyond, f is held (``laws.reach``). f is a closed ``form`` of ``values``, or a
-    table of equally spaced ``knots``. ``intervals`` (95 %) and ``heldout_gain`` (share of the missing energy that it
-    foretold) tell how sure it is.
-    """
+    """A law that no entry of the catalogue is: channel x f(coordinate); numbers in SI units."""
 
     channel: str
+    """What the law changes."""
     coordinate: str
+    """What it is a function of."""
     form: str
+    """Closed form of ``values``, or a table of ``knots``."""
     range: tuple[float, ...]
+    """Where the coordinate was seen; beyond, f is held."""
     values: dict[str, float] = field(default_factory=dict)
+    """Values of the closed form, by name."""
     knots: tuple[float, ...] = ()
+    """Values of f, equally spaced over the range."""
     memory: str = "none"
+    """What stands between the coordinate and f."""
     memory_size: float = quantity(0.0, 1e12, default=0.0)
+    """Of a lag: seconds; of a play or relay: half its width in the unit of the coordinate."""
     title: str | None = None
+    """What the law says of itself."""
     intervals: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    """95 % intervals of ``values``."""
     heldout_gain: float | None = None
+    """Share of the missing energy that it foretold on held-out data."""
 
 
 def law_fields(entry: LawEntry) -> dict[str, float | Array]:

@@ -84,14 +84,15 @@ def composed(ids: Iterable[str] | None = None, laws: int = 0) -> Composition:
     return compose([*(effect for effect in CATALOGUE.values() if effect.id in chosen), *map(slot, range(laws))])
 
 
-def add_files(files: Sequence[Path]) -> None:
+def add_files(files: Sequence[str | Path]) -> None:
     """Add users' physics to the catalogue, here and in processes that are started from here."""
-    for file in files:
+    paths = [Path(file) for file in files]
+    for file in paths:
         effects, sha256 = own.read_effects(file)
         _add(effects, Origin(file.name, sha256), str(file))
-    if files:
+    if paths:
         known = os.environ.get(VARIABLE, "").split(os.pathsep)
-        os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(file.resolve()) for file in files)]))
+        os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(path.resolve()) for path in paths)]))
 
 
 def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The scoreboard as tables: on a terminal, and in README."""
+"""The scoreboard as tables: on a terminal, and in the guide."""
 
 from __future__ import annotations
 
@@ -110,8 +110,8 @@ def _show_peers(console: Console, peers: Row) -> None:
     console.print(table)
 
 
-def readme_lines(board: Row) -> list[str]:
-    """What README shows, so that its numbers come from the kept scoreboard, simulator by simulator."""
+def page_lines(board: Row) -> list[str]:
+    """What docs/proof.md shows, so that its numbers come from the kept scoreboard, simulator by simulator."""
     lines: list[str] = []
     for number, part in board["simulators"].items():
         lines += [f"| simulator {number} | reached | target |", "|---|---|---|"]

@@ -19,7 +19,7 @@ from lugre_steering.cli import app
 from lugre_steering.errors import DataError
 from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, sizing
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
-from lugre_steering.proof.table import readme_lines
+from lugre_steering.proof.table import page_lines
 
 Row = dict[str, Any]
 
@@ -382,11 +382,11 @@ def test_blind_end_to_end() -> None:
 
 
 @pytest.mark.skipif(not KEPT_BOARD.exists(), reason="no full run has been kept yet")
-def test_readme_shows_the_kept_scoreboard() -> None:
+def test_the_guide_shows_the_kept_scoreboard() -> None:
     board = json.loads(KEPT_BOARD.read_text(encoding="utf-8"))
     if board["schema"] != scoreboard.SCHEMA:
-        pytest.skip("the kept run is of an earlier scoreboard; README is remade with the next full run")
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    missing = [line for line in readme_lines(board) if line not in readme]
-    assert not missing, "README's table differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)
-    assert board["made"]["command"] in readme
+        pytest.skip("the kept run is of an earlier scoreboard; docs/proof.md is remade with the next full run")
+    page = (ROOT / "docs/proof.md").read_text(encoding="utf-8")
+    missing = [line for line in page_lines(board) if line not in page]
+    assert not missing, "docs/proof.md differs from config/proof_scoreboard.json; it must have these lines:\n" + "\n".join(missing)
+    assert board["made"]["command"] in page
