@@ -60,7 +60,7 @@ setup(
         "test": [
             *DOCS,
             "pytest>=7.4",
-            "pytest-xdist>=3.3",
+            "pytest-xdist>=3.7",
             "hypothesis>=6.80",
             "jsonschema>=4.17",
             "mcap>=1.1",

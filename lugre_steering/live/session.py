@@ -22,6 +22,7 @@ from lugre_steering.live.outputs import Outputs
 from lugre_steering.live.parameters import Settings
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.watch import detector
 from lugre_steering.watch.detector import Watch
 from lugre_steering.watch.window import Samples, write_window
 
@@ -215,6 +216,7 @@ class Session:
 
 def warm_up(vehicle: Vehicle, options: Options) -> None:
     """Compile, or load from the cache, everything that callbacks call, on an estimator that is then thrown away."""
+    detector.warm_up()
     estimator = Estimator(vehicle, options, lean=True)
     for step in range(1, 200):
         stamp_ns = 1_000_000_000 + step * 10_000_000

@@ -88,6 +88,11 @@ def weigh(s, scores):
     return s.sum
 
 
+def warm_up() -> None:
+    """Compile, or load from the cache, what a manoeuvre calls."""
+    weigh(np.zeros(1, STATE)[0], (0.0,) * SCORES)
+
+
 class Watch:
     """The detector of one vehicle, fed with what the estimator returns."""
 

@@ -99,16 +99,16 @@ def test_without_the_right_entry_the_physics_is_unlisted(tmp_path: Path, monkeyp
     data, bags = made(tmp_path, Concealed("end_stop"))
     poorer = {key: entry for key, entry in CATALOGUE.items() if key != "end_stop"}
     monkeypatch.setattr(fingerprint, "CATALOGUE", poorer)
-    result = diagnose(bags, load(VEHICLE))
+    result = diagnose(bags[:1], load(VEHICLE))
     assert result.json["verdict"] == "unlisted_physics"
     assert result.json["effects"] == []
-    for entry, bag in zip(result.json["unexplained"]["where"], data.bags, strict=True):
+    for entry, bag in zip(result.json["unexplained"]["where"], data.bags[:1], strict=True):
         assert overlap(entry["intervals_s"], bag.intervals["end_stop"]) > 0.4
 
 
 def test_physics_outside_the_catalogue_is_unlisted(tmp_path: Path) -> None:
     _, bags = made(tmp_path, Concealed("gear_ripple"))
-    result = diagnose(bags, load(VEHICLE))
+    result = diagnose(bags[:1], load(VEHICLE))
     assert result.json["verdict"] == "unlisted_physics"
     assert result.json["unexplained"]["structured"]
     assert "theta" in result.json["unexplained"]["formula"]
