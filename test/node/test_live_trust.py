@@ -204,4 +204,5 @@ def test_a_vehicle_file_is_reloaded_without_a_gap_all_or_nothing(neighbour: tupl
     assert len(heard) == 150
     # No faster than both tracks' presliding stiffness makes of the motion; a busy machine makes gaps between the samples.
     fastest = 2.0 * math.degrees(5900.0) * 0.3 * 0.9
-    assert all(abs(b - a) < 2e3 + fastest * (later - sooner) * 1e-9 for (sooner, a), (later, b) in itertools.pairwise(heard))
+    at_once = (5900.0 / 5393.7 - 1.0) * 2.0 * 27.9e3  # the new stiffness meets the bristles of both tracks, at static friction at most
+    assert all(abs(b - a) < at_once + fastest * (later - sooner) * 1e-9 for (sooner, a), (later, b) in itertools.pairwise(heard))
