@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TypeVar
@@ -225,6 +226,13 @@ class Problem:
         air = [unknown if run.first_air is None else known for run in self.runs]
         deviation, low, high = np.array(excess + air).T
         return deviation, low, high
+
+    def with_known_weather(self) -> Problem:
+        """The same where every bag is known to have begun as warm as the vehicle file says, to a hundredth of a degree."""
+        known = copy(self)
+        deviation, coldest, warmest = self._weather
+        known._weather = (1e-3 * deviation, 1e-3 * coldest, 1e-3 * warmest)
+        return known
 
     def one_bag(self, x: Array) -> Array:
         """The calibration of x for another run alone, with bristle and weather of the vehicle file."""
