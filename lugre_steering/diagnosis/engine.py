@@ -15,7 +15,6 @@ from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.errors import DataError
@@ -85,24 +84,22 @@ def diagnose_recordings(
     if lacking := _lacking(problem, int(roles.fit.sum())):
         return _undetermined(qualities, vehicle, findings, problem, lacking)
     progress("recalibrating the baseline")
-    noise, roles, found = investigate(problem, seed, progress)
-    if (again := _other_clocks(pieces, clocks, found.final)) is not None:
+    done = investigate(problem, seed, progress)
+    if (again := _other_clocks(pieces, clocks, done.found.final)) is not None:
         clocks = again
-        problem = clocks.problem
-        noise, roles, found = investigate(problem, seed, progress)
+        done = investigate(clocks.problem, seed, progress)
     findings += _by_bag(clocks.findings)
-    left = problem.measured - found.final.prediction
+    problem = done.problem
+    left = problem.measured - done.found.final.prediction
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
         findings += _by_bag(disturbed)
-        problem = Problem(vehicle, runs)
-        noise, roles, found = investigate(problem, seed, progress)
-    if found.excess > WORTH_A_SHEET and (wrong := wrong_entry(problem, found.final.effects)) is not None:
+        done = investigate(Problem(vehicle, runs), seed, progress)
+    if done.found.excess > WORTH_A_SHEET and (wrong := wrong_entry(done.problem, done.found.final.effects)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
-    findings += _by_bag(weather_findings(problem, found.final))
+    findings += _by_bag(weather_findings(done.problem, done.found.final))
     progress("verifying on held-out data")
-    done = Finished(problem, noise, roles, found)
     return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
 
 

@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.search.build_up import Search, search
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.left_over import structured
+from lugre_steering.diagnosis.form import bent
+from lugre_steering.diagnosis.search.build_up import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem
@@ -20,12 +24,25 @@ NOISE_ROUNDS, QUIETER = 2, 0.8
 """Searches repeated, and the fall of the noise floor, once physics is found, that asks for it."""
 
 
-def investigate(
-    problem: Problem, seed: int, progress: Callable[[str], None] = lambda _: None
-) -> tuple[Noise, Split, Search]:
-    """Recalibrate and search; again if what was found shows that part of the noise had been physics."""
+def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = lambda _: None) -> Finished:
+    """Recalibrate and search; beside the friction law's own freedoms where names do not explain all to the noise.
+
+    Few values that explain everything need no further freedom; else the law is of another form somewhere, and names that only
+    make up for that are none.
+    """
     repeated = repeated_motion(problem, NULL_DRAWS, seed)
-    noise, roles, baseline = recalibrate(problem, repeated, seed)
+    done = _searched(problem, *recalibrate(problem, repeated, seed), repeated, seed, progress)
+    if not structured(done, done.found.final):
+        return done
+    progress("beside the friction law's own form")
+    return _beside_form(done, repeated, seed, progress)
+
+
+def _searched(
+    problem: Problem, noise: Noise, roles: Split, baseline: Fit, repeated: Sequence[Sequence[Run]], seed: int,
+    progress: Callable[[str], None],
+) -> Finished:
+    """Search; again if what was found shows that part of the noise had been physics."""
     found = search(problem, noise, roles, baseline, progress)
     for _ in range(NOISE_ROUNDS if found.found else 0):
         quieter = noise_model(problem, found.final.x, found.final.effects, repeated, seed=seed)
@@ -34,7 +51,22 @@ def investigate(
         noise = quieter
         baseline = fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=found.baseline.x)
         found = search(problem, noise, roles, baseline, progress)
-    return noise, roles, found
+    return Finished(problem, noise, roles, found)
+
+
+def _beside_form(
+    done: Finished, repeated: Sequence[Sequence[Run]], seed: int, progress: Callable[[str], None]
+) -> Finished:
+    """What is found beside the freedoms of the friction law, fitted without them, as a vehicle file can hold it."""
+    alone, roles = done.found, done.roles
+    freer = bent(done.problem, alone.baseline)
+    start = np.concatenate([alone.baseline.x, np.zeros(freer.bends.shape[1])])
+    baseline = fit(freer, done.fitted, start=start)
+    noise = noise_model(freer, baseline.x, (), repeated, seed=seed)
+    baseline = fit(freer, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=baseline.x)
+    beside = _searched(freer, noise, roles, baseline, repeated, seed, progress)
+    final = fit(done.problem, done.fitted, beside.found.final.effects, beside.found.final.x[: done.problem.nuisances])
+    return replace(done, found=replace(beside.found, baseline=alone.baseline, final=final), beside_form=beside)
 
 
 def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:

@@ -146,6 +146,8 @@ class _Vector:
     def _column(self, p: Array, j: int, base: Array) -> Array:
         """One column by a forward (or, at the upper bound, backward) difference of 2 % of the scale."""
         problem, step = self.problem, 0.02 if p[j] + 0.02 <= self.high[j] else -0.02
+        if problem.first_bend <= j < self.nuisances:
+            return np.asarray(problem.bends[:, j - problem.first_bend])
         moved = p.copy()
         moved[j] += step
         x, effects = self.values(moved)
@@ -182,15 +184,18 @@ class _Descent:
         else:
             first = self.vector.nuisances
             self.slope[:, first:] = self.vector.jacobian(self.p, self.base, first) * self.weight[:, None]
+        self.gram = self.slope.T @ self.slope
 
     def advance(self, tolerance: float) -> None:
         """Steps as long as they do what the linearisation foretells, by more than ``tolerance`` of the cost."""
         prior = self.vector.prior
         for age in range(STEPS):
             error = (self.base - self.vector.problem.measured) * self.weight
-            influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2) if self.robust else np.ones_like(error)
-            normal = self.slope.T @ (self.slope * influence[:, None]) + np.diag(prior**2)
-            gradient = self.slope.T @ (error * influence) + prior**2 * self.p
+            gram = self.gram
+            if self.robust:
+                influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2)
+                gram, error = self.slope.T @ (self.slope * influence[:, None]), error * influence
+            normal, gradient = gram + np.diag(prior**2), self.slope.T @ error + prior**2 * self.p
             trial, moved, fall = self._step(normal, gradient, exact=age == 0)
             if not fall > 0.0:
                 self.settled = self._whole and age == 0
@@ -201,7 +206,13 @@ class _Descent:
             self.settled = self._whole and age == 0 and fall < tolerance * self.left
             if fall < max(tolerance * self.left, FORETOLD * foretold):
                 return
-            self.slope += np.outer(secant - self.slope @ change, change / (change @ change))
+            self._correct(secant - self.slope @ change, change / (change @ change))
+
+    def _correct(self, missed: Array, along: Array) -> None:
+        """Broyden's correction: what a step missed (n,), per unit along it (q,); the normal matrix follows."""
+        cross = np.outer(self.slope.T @ missed, along)
+        self.gram = self.gram + cross + cross.T + (missed @ missed) * np.outer(along, along)
+        self.slope += missed[:, None] * along
 
     def _step(self, normal: Array, gradient: Array, exact: bool) -> tuple[Array, Array, float]:
         """A step within bounds, the prediction there and the fall of the cost; an ``exact`` linearisation is worth ever shorter ones."""

@@ -173,13 +173,17 @@ class Problem:
     """Several runs of one vehicle, and the vector x = (calibration, bristle at the start of each bag, weather, effect parameters).
 
     Weather, of a vehicle with rubber: what the rubber is warmer than the air at the start of each bag, beyond the vehicle file [K],
-    then what the air of each bag is warmer than recorded, or than the vehicle file says [K].
+    then what the air of each bag is warmer than recorded, or than the vehicle file says [K]. Last stand the sizes of ``bends``.
     """
 
     def __init__(
-        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None, *, more_laws: int = 0
+        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None, *, more_laws: int = 0,
+        bends: Array | None = None,
     ) -> None:
-        """``more_laws``: so many laws are tried in place of effects of the catalogue, of which only the vehicle's are there."""
+        """``more_laws``: so many laws are tried in place of effects of the catalogue, of which only the vehicle's are there.
+
+        ``bends`` (n, k): torques [N m] by which the friction law itself may be of another shape, each at its largest.
+        """
         self.vehicle = vehicle
         self.runs = list(runs)
         self.model: Model = build_model(vehicle, lean=more_laws > 0, more_laws=more_laws)
@@ -188,6 +192,7 @@ class Problem:
         self.valid = np.concatenate([run.valid for run in runs])
         self.bag = np.concatenate([np.full(run.time.size, i) for i, run in enumerate(runs)])
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
+        self.bends = np.zeros((self.measured.size, 0)) if bends is None else bends
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
         self.size = size_of(vehicle, self.runs)
@@ -196,24 +201,33 @@ class Problem:
 
     @property
     def nuisances(self) -> int:
-        """Calibration values, one initial bristle deflection per bag, and its weather."""
-        return len(self.calibrations) + len(self.runs) + self._weather[0].size
+        """Calibration values, one initial bristle deflection per bag, its weather, and bends."""
+        return self.first_bend + int(self.bends.shape[1])
+
+    @property
+    def first_bend(self) -> int:
+        """Where the sizes of the bends stand in x."""
+        return int(len(self.calibrations) + len(self.runs) + self._weather[0].size)
 
     def start(self) -> Array:
         return np.zeros(self.nuisances)
 
     def scales(self) -> Array:
         """Finite-difference and normalisation scale of the nuisance part of x."""
-        return np.concatenate([[c.prior for c in self.calibrations] + [1.0] * len(self.runs), self._weather[0]])
+        return np.concatenate(
+            [[c.prior for c in self.calibrations] + [1.0] * len(self.runs), self._weather[0], np.ones(self.bends.shape[1])]
+        )
 
     def prior_weights(self, priors: bool) -> Array:
         """Weight of the prior on each scaled nuisance; the sheet's off without ``priors``, but weather has no other source."""
-        return np.array([float(priors)] * len(self.calibrations) + [0.3] * len(self.runs) + [1.0] * self._weather[0].size)
+        own = [float(priors)] * len(self.calibrations) + [0.3] * len(self.runs)
+        return np.array(own + [1.0] * (self.nuisances - len(own)))
 
     def bounds(self) -> tuple[Array, Array]:
         _, coldest, warmest = self._weather
-        low = np.concatenate([[c.low for c in self.calibrations] + [-1.5] * len(self.runs), coldest])
-        high = np.concatenate([[c.high for c in self.calibrations] + [1.5] * len(self.runs), warmest])
+        far = np.ones(self.bends.shape[1])
+        low = np.concatenate([[c.low for c in self.calibrations] + [-1.5] * len(self.runs), coldest, -far])
+        high = np.concatenate([[c.high for c in self.calibrations] + [1.5] * len(self.runs), warmest, far])
         return low, high
 
     @cached_property
@@ -270,7 +284,7 @@ class Problem:
     def torque(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
     ) -> Array:
-        """Model torque of one bag (n,) with all effects, before the sensors; ``run`` in place of the bag's own motion."""
+        """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion."""
         run = run or self.runs[bag]
         record = self.model.parameters[0].copy()
         for field, value in self.fields(x).items():
@@ -304,7 +318,7 @@ class Problem:
 
         An effect that stands in the file and is given again counts as given.
         """
-        run = run or self.runs[bag]
+        run, own = run or self.runs[bag], slice(self.edges[bag], self.edges[bag + 1])
         here = [effect for effect in effects if effect[0].active_in(bag)]
         torque = self.torque(bag, x, here, run)
         given = {candidate.label for candidate, _ in here}
@@ -313,7 +327,7 @@ class Problem:
             if candidate.effect.hooks.keys() & SENSOR_HOOKS:
                 changed = self._through_sensor(run, candidate, values, torque, start)
                 torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
-        return torque / self.gain(x)
+        return torque / self.gain(x) + self.bends[own] @ x[self.first_bend : self.nuisances]
 
     def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array, start: float) -> Array:
         """Apply one sensor effect by its laws; errors of angles and arms act through the slopes and parts of the measured torque."""

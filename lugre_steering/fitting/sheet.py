@@ -31,6 +31,8 @@ SURPRISE = 10.0
 RELIEVED = 0.5
 """Share of the surprise that a hypothesis must leave at most, unless a value stands at its bound."""
 EDGE = 0.01
+ERROR_S = 1.0
+"""How long an error of the friction law's form lasts."""
 SAMPLES, RATE_HZ = 6000, 25.0
 """Samples and rate to which the hypotheses are fitted: enough to rank them."""
 SCALES = (0.5, 2.0)
@@ -99,7 +101,7 @@ def torque_ratio(product: float, square: float) -> float:
 
 def wrong_sheet(problem: Problem) -> WrongSheet | None:
     """Whether the recalibrated baseline needs more than nominal values allow, and another entry puts that right; else None."""
-    thin = thinned(problem)
+    thin, doubt = _doubted(thinned(problem))
     baseline = _fitted(thin)
     surprise = _surprise(thin, baseline)
     stuck = at_bounds(thin, baseline.x, LEVELS)
@@ -109,7 +111,7 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     if not found:
         return None
     suspect, _ = found[0]
-    floor = float(np.count_nonzero(thin.valid))
+    floor = float(np.count_nonzero(thin.valid)) / doubt
     fits = suspect.relative_error < PUT_RIGHT or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise:
         return None
@@ -152,6 +154,17 @@ def thinned(problem: Problem) -> Problem:
         step = float(run.time[1] - run.time[0])
         runs.append(_every(run, max(1, round(1.0 / RATE_HZ / step), -(-total // SAMPLES) if step < 0.1 else 1)))
     return Problem(problem.vehicle, runs, problem.calibrations)
+
+
+def _doubted(problem: Problem) -> tuple[Problem, float]:
+    """The same with errors as large as the baseline leaves, of which those of ERROR_S count once; and by what their energy has grown.
+
+    Friction of another form than the law's would else drive every value as far from its sheet as helps a little.
+    """
+    misfit = max(_fitted(problem).cost / max(int(np.count_nonzero(problem.valid)), 1), 1.0)
+    step = max(float(run.time[1] - run.time[0]) for run in problem.runs)
+    doubt = misfit * max(ERROR_S / step, 1.0)
+    return Problem(problem.vehicle, [replace(run, sigma=run.sigma * doubt**0.5) for run in problem.runs], problem.calibrations), doubt
 
 
 def _every(run: Run, stride: int) -> Run:

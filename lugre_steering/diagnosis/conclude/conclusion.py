@@ -14,7 +14,7 @@ from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.conclude.left_over import beside_laws, left_over
+from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.laws.find import find
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
@@ -48,7 +48,7 @@ def conclude(
     whole = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
-    left = left_over(done, final)
+    left = _left(done, final, named or clock)
     verdict: Verdict
     lawful, beside, laws, law = None, done, [], ""
     if left.structured and not named:
@@ -103,6 +103,14 @@ def conclude(
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
         sheet=problem.vehicle,
     ).in_words()
+
+
+def _left(done: Finished, final: Fit, named: bool) -> LeftOver:
+    """What is left by the final fit, or beside the freedoms of the friction law where these had to be given."""
+    beside = done.beside_form
+    if beside is None:
+        return left_over(done, final)
+    return left_over(beside, beside.found.final if named else beside.found.baseline)
 
 
 def _clocks_alone(final: Fit, bags: int) -> bool:

@@ -27,6 +27,8 @@ class Finished:
     noise: Noise
     roles: Split
     found: Search
+    beside_form: Finished | None = None
+    """The same beside the freedoms of the friction law (``form``), where names alone did not explain all to the noise."""
 
     @cached_property
     def weight(self) -> Array:

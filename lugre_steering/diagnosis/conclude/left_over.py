@@ -13,17 +13,14 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import unlisted
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.noise import slow_part
-from lugre_steering.fitting.sensors import beside_sensors
 from lugre_steering.recording import Array
 
-UNLISTED_EXCESS, FAST_EXCESS = 0.25, 1.0
-"""Energy left over, in noise variances, that makes a verdict: slow and above the doubt about slow noise, or of any kind."""
 FORETELLS = 0.1
 """Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
 TELLING = 0.5
@@ -42,15 +39,16 @@ class LeftOver(NamedTuple):
     structured: bool
 
 
+def structured(done: Finished, final: Fit) -> bool:
+    """Whether ``final`` leaves more than noise, or a pattern that foretells it."""
+    return loudness(done.problem, done.noise, final).loud or _pattern(done, final)[1] > FORETELLS
+
+
 def left_over(done: Finished, final: Fit) -> LeftOver:
     """Judge what ``final`` leaves of the measured torque."""
     residual = done.problem.measured - final.prediction
-    standardised = beside_sensors(done.problem, residual, done.weight, final.jacobian[:, : done.problem.nuisances])
-    slow, nothing = _slow_energy(done, standardised), _slow_energy(done, done.noise.draws * done.weight)
-    excess = float(np.mean(standardised[done.weight > 0.0] ** 2)) - 1.0
+    excess, slow, loud = loudness(done.problem, done.noise, final)
     pattern, gain = _pattern(done, final)
-    # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
-    loud = slow - nothing > max(UNLISTED_EXCESS, done.noise.slow_doubt) or excess > FAST_EXCESS
     if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
         return LeftOver(Unexplained(False, description), "", False)
@@ -75,7 +73,7 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     if proposal is not None:
         law = units.law(done.problem.vehicle, proposal.text)
         formula = f"{law} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
-    more = max(excess, slow - nothing)  # the level of the noise may be overstated
+    more = max(excess, slow)  # the level of the noise may be overstated
     text = (
         f"{100 * more / (1.0 + more):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
         f"({100 * share:.0f} % of the residual energy follows it)"
@@ -98,7 +96,10 @@ def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
     if final.effects or pattern is None:
         return None, 0.0
     before = cost(done.problem, done.found.baseline, done.held)
-    return pattern, 1.0 - pattern.cost(done.problem, done.held) / max(before, 1e-9)
+    after = pattern.cost(done.problem, done.held)
+    if before - after < FORM_LEFT * form_energy(done.problem, final, done.held):
+        return None, 0.0
+    return pattern, 1.0 - after / max(before, 1e-9)
 
 
 def _where(
@@ -121,13 +122,3 @@ def _where(
             between = locate.active_range(values[axis], piece)
             entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATES[axis])))
     return entries
-
-
-def _slow_energy(done: Finished, standardised: Array) -> float:
-    """Mean square per used sample of the slow part of (..., n) errors in noise standard deviations."""
-    problem = done.problem
-    pieces = [
-        slow_part(standardised[..., a:b], run.time[1] - run.time[0])
-        for run, a, b in zip(problem.runs, problem.edges[:-1], problem.edges[1:], strict=True)
-    ]
-    return float(np.mean(np.concatenate(pieces, axis=-1)[..., problem.valid] ** 2))

@@ -82,6 +82,11 @@ def free_law(problem: Problem, cell: Cell, place: int, pieces: Array) -> tuple[C
     return Candidate(effect, free=tuple(start)), start
 
 
+def given_law(cell: Cell, place: int, f: Array) -> tuple[Candidate, dict[str, float]]:
+    """The cell with a given f (KNOTS,), of which nothing is free."""
+    return Candidate(_law(cell, place, laws.TABLE, (), shape=lambda _: f)), {}
+
+
 VARIANTS: tuple[tuple[str, Mapping[str, float], tuple[str, ...]], ...] = (
     ("constant", {}, ()), ("linear", {"value": 0.0}, ()), ("linear", {}, ()),
     ("power", {}, ("exponent",)), ("hinge", {"value": 0.0, "below": 0.0}, ("at",)), ("hinge", {"value": 0.0, "above": 0.0}, ("at",)),

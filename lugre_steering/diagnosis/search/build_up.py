@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from lugre_steering.diagnosis.loudness import FORM_TAKEN, form_energy
 from lugre_steering.diagnosis.search import flexible, rig
 from lugre_steering.diagnosis.search.fingerprint import Score, screen
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
@@ -107,6 +108,9 @@ def search(
     baseline, start_cost = built.baseline, cost(problem, built.baseline, weight)
     excess = start_cost - samples
     final, found = _confirmed(problem, noise, weight, split, baseline, built.steps[:kept], samples, len(given), progress)
+    while len(found) > len(given) and min(item.gain for item in found[len(given) :]) < FORM_TAKEN * form_energy(problem, final, weight):
+        kept -= 1  # one that takes no more than the form of the friction law may leave
+        final, found = _confirmed(problem, noise, weight, split, baseline, built.steps[:kept], samples, len(given), progress)
     # What rings on at standstill passes for noise, so a pattern may be there though nothing seems left over.
     pattern = strongest(problem, baseline, weight) if not found or excess > PATTERN_EXCESS * samples else None
     if pattern is not None and found:
@@ -194,7 +198,8 @@ def _build_up(
             taken = [candidate.effect.id for candidate, _ in current.effects]
             scores = screen(problem, current, weight, noise.draws, taken)
             scores = _always(scores) if len(steps) > len(given) else scores
-            trials = _tried(problem, weight, current, scores, samples, progress)
+            hidden = cost(problem, current, weight) - samples > FORM_TAKEN * form_energy(problem, current, weight)
+            trials = _tried(problem, weight, current, scores, samples, progress) if hidden else []
         if len(steps) == len(given):
             first = _First(tuple(scores), tuple(trials))
         if not trials:
@@ -212,7 +217,8 @@ def _build_up(
                 baseline, start_cost = again, before - regained
             continue
         all_trials += trials
-        if before - best.cost < (_slight(start_cost, samples) if steps else OWN_ERROR * samples):
+        least = _slight(start_cost, samples) if steps else OWN_ERROR * samples
+        if before - best.cost < max(least, FORM_TAKEN * form_energy(problem, best.fit, weight)):
             break
         if any(_is_shape(problem, weight, current, best, i) for i in range(len(current.effects))):
             break

@@ -1,0 +1,96 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How else rubber may rub: small smooth freedoms of the friction law itself, each within what real rubber shows.
+
+No friction law is true to a percent. What such a freedom explains is no missing physics, so where names do not explain a
+recording to its noise they have to compete beside these. Each is a law in the chain, so that bristles and heat follow it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from lugre_steering.chain.lag import lagged
+from lugre_steering.diagnosis.laws.cells import Axis, Cell
+from lugre_steering.diagnosis.laws.refine import given_law
+from lugre_steering.effects import laws
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import Problem, in_threads
+from lugre_steering.recording import Array
+
+STRENGTHENING, STRIBECK = 0.04, 0.05
+"""Change of the friction level per e-fold of the rate, 1 to 4 % in tests of rubber; and at low rates, which is what Stribeck
+exponents from 0.5 to 2 make of a static level 15 % above the sliding one."""
+GROUND, PER_PRESLIDING = 0.04, 2.0
+"""That along the ground, twice the 1 to 2 % of even pavements; places per presliding length, since bristles blur what is shorter."""
+MOST_PLACES = 40
+SHARPER, ROUNDER, REACH = 0.3, 0.05, 6.0
+"""Presliding stiffness, and level, along the way since a reversal; up to so many presliding lengths."""
+WARMTH, WARMTH_K = 0.03, 20.0
+"""Level per so many kelvin, in which two samples of one rubber differ."""
+RELAXING, RELAXING_S = 0.05, (0.1, 1.0)
+"""Share of the torque that follows so many seconds late, as rubber is never quite elastic."""
+SMALL = 0.2
+"""Share of a freedom by which its effect on the torque is found: small enough to be linear."""
+
+
+class Freedom(NamedTuple):
+    """Shapes f (k, KNOTS) that a channel may have along a coordinate, at their largest."""
+
+    channel: str
+    coordinate: str
+    low: float
+    high: float
+    shapes: Array
+
+
+def bent(problem: Problem, fitted: Fit) -> Problem:
+    """The problem with these freedoms, as the chain shows them at a fit."""
+    lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=1)
+    place, x = len(problem.vehicle.laws), fitted.x[: problem.nuisances]
+    bags = range(len(problem.runs))
+    base = lawful.predict_all(x)
+
+    def column(freedom: Freedom, f: Array) -> Array:
+        law = given_law(Cell(freedom.channel, Axis(freedom.coordinate), freedom.low, freedom.high), place, SMALL * f)
+        return np.asarray((np.concatenate([lawful.predict(bag, x, [law]) for bag in bags]) - base) / SMALL)
+
+    shapes = [(freedom, f) for freedom in _freedoms(problem, fitted) for f in freedom.shapes]
+    columns = in_threads(lambda shape: column(*shape), shapes)
+    parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
+    late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
+    columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
+    return Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
+
+
+def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
+    own = {name: float(problem.model.parameters[0][0][name]) for name in ("stribeck_speed", "coulomb_torque", "sigma_0")}
+    own |= problem.fields(fitted.x)
+    presliding = own["coulomb_torque"] / own["sigma_0"]
+    low, high = min(float(run.theta.min()) for run in problem.runs), max(float(run.theta.max()) for run in problem.runs)
+    fast, far = max(float(np.abs(run.omega).max()) for run in problem.runs), REACH * presliding
+    rate, way = np.linspace(0.0, fast, laws.KNOTS) / own["stribeck_speed"], np.linspace(0.0, far, laws.KNOTS) / presliding
+    # Places that crowd around the reversal, where the presliding bends most.
+    near = np.array([np.interp(np.sqrt(way), np.linspace(0.0, np.sqrt(REACH), 7), hat) for hat in np.eye(7)])
+    found = [
+        Freedom("friction_level", "abs_rate", 0.0, fast, np.array([STRENGTHENING * np.log1p(rate), STRIBECK * np.exp(-rate)])),
+        Freedom("friction_level", "angle", low, high, GROUND * _places(low, high, presliding)),
+        Freedom("presliding_stiffness", "since_reversal", 0.0, far, SHARPER * near[:4]),
+        Freedom("friction_level", "since_reversal", 0.0, far, ROUNDER * near[:5]),
+    ]
+    if problem.vehicle.rubber is not None:
+        cold, hot = -60.0, 140.0
+        warmer = (np.linspace(cold, hot, laws.KNOTS) - problem.temperatures(0, fitted.x)[0]) / WARMTH_K
+        shapes = WARMTH * np.array([warmer, 0.5 * warmer * np.abs(warmer)])
+        found.append(Freedom("friction_level", "rubber_temperature", cold, hot, shapes))
+    return found
+
+
+def _places(low: float, high: float, presliding: float) -> Array:
+    """Smooth pieces (k, KNOTS) that add up to one along the angles."""
+    count = int(np.clip(np.ceil(PER_PRESLIDING * (high - low) / presliding), 3, MOST_PLACES))
+    knots = np.concatenate([[low] * 3, np.linspace(low, high, count + 1), [high] * 3])
+    return np.asarray(BSpline.design_matrix(np.linspace(low, high, laws.KNOTS), knots, 3).toarray().T)

@@ -1,0 +1,61 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a fit leaves more than noise: slow structure above the doubt about slow noise, or much of any kind."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lugre_steering.fitting.fit import Fit, normalised
+from lugre_steering.fitting.noise import Noise, slow_part
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.sensors import beside_sensors
+from lugre_steering.recording import Array
+
+SLOW_EXCESS, FAST_EXCESS = 0.25, 1.0
+"""Energy left over, in noise variances, that is structure: slow and above the doubt about slow noise, or of any kind."""
+FORM_LEFT, FORM_TAKEN = 0.15, 0.05
+"""Shares of the energy that the freedoms of the friction law explain: what may be left beside them without being structure, since
+they too are of another form than nature, and what one name must take of that to be more than such a form."""
+
+
+class Loudness(NamedTuple):
+    """Energy per sample beyond noise, in noise variances: of all kinds, slow alone; and whether that is structure."""
+
+    excess: float
+    slow: float
+    loud: bool
+
+
+def loudness(problem: Problem, noise: Noise, result: Fit) -> Loudness:
+    """What ``result`` leaves on all valid samples, beside what sound sensors may do."""
+    weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
+    standardised = beside_sensors(
+        problem, problem.measured - result.prediction, weight, result.jacobian[:, : problem.nuisances]
+    )
+    slow = _slow_energy(problem, standardised) - _slow_energy(problem, noise.draws * weight)
+    excess = float(np.mean(standardised[weight > 0.0] ** 2)) - 1.0
+    doubt = FORM_LEFT * form_energy(problem, result, weight) / max(int(np.count_nonzero(weight)), 1)
+    # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
+    return Loudness(excess, slow, slow > max(SLOW_EXCESS, noise.slow_doubt, doubt) or excess > FAST_EXCESS + doubt)
+
+
+def form_energy(problem: Problem, result: Fit, weight: Array) -> float:
+    """Energy, in noise variances, that the freedoms of the friction law explain of what recalibration cannot."""
+    if not problem.bends.shape[1]:
+        return 0.0
+    used, first = weight > 0.0, problem.first_bend
+    bent = (problem.bends @ result.x[first : problem.nuisances] * weight)[used]
+    columns = normalised(result.jacobian[used, :first])
+    return float(np.sum((bent - columns @ np.linalg.lstsq(columns, bent, rcond=1e-8)[0]) ** 2))
+
+
+def _slow_energy(problem: Problem, standardised: Array) -> float:
+    """Mean square per used sample of the slow part of (..., n) errors in noise standard deviations."""
+    pieces = [
+        slow_part(standardised[..., a:b], run.time[1] - run.time[0])
+        for run, a, b in zip(problem.runs, problem.edges[:-1], problem.edges[1:], strict=True)
+    ]
+    return float(np.mean(np.concatenate(pieces, axis=-1)[..., problem.valid] ** 2))
