@@ -21,18 +21,18 @@ from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
 
-STRENGTHENING, STRIBECK = 0.04, 0.05
+STRENGTHENING, STRIBECK = 0.04, 0.06
 """Change of the friction level per e-fold of the rate, 1 to 4 % in tests of rubber; and at low rates, which is what Stribeck
 exponents from 0.5 to 2 make of a static level 15 % above the sliding one."""
-GROUND, PER_PRESLIDING = 0.04, 2.0
-"""That along the ground, twice the 1 to 2 % of even pavements; places per presliding length, since bristles blur what is shorter."""
-MOST_PLACES = 40
-SHARPER, ROUNDER, REACH = 0.3, 0.05, 6.0
-"""Presliding stiffness, and level, along the way since a reversal; up to so many presliding lengths."""
-WARMTH, WARMTH_K = 0.03, 20.0
-"""Level per so many kelvin, in which two samples of one rubber differ."""
-RELAXING, RELAXING_S = 0.05, (0.1, 1.0)
-"""Share of the torque that follows so many seconds late, as rubber is never quite elastic."""
+GROUND, PER_PRESLIDING, MOST_PLACES = 0.06, 2.0, 40
+"""That along the ground, three times the 1 to 2 % of even pavements; and places per presliding length, as bristles blur what is shorter."""
+SHARPER, ROUNDER, REACH = 0.4, 0.08, 6.0
+"""Presliding stiffness, and level, along the way since a reversal, up to so many presliding lengths: between rounder and sharper than
+an exponential."""
+WARMTH, WARMTH_K = 0.05, 20.0
+"""Level per so many kelvin, in which batches of one rubber differ."""
+RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
+"""Share of the torque that follows so many seconds late: the loss factor of treads."""
 SMALL = 0.2
 """Share of a freedom by which its effect on the torque is found: small enough to be linear."""
 

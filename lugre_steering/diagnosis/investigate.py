@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,13 +13,18 @@ from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import structured
 from lugre_steering.diagnosis.form import bent
+from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy, loudness
 from lugre_steering.diagnosis.search.build_up import search
+from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
 
 NULL_DRAWS = 16
+FORM_SAMPLES = 8000
+"""Samples on which names compete beside the form of the friction law, which is slow."""
 NOISE_ROUNDS, QUIETER = 2, 0.8
 """Searches repeated, and the fall of the noise floor, once physics is found, that asks for it."""
 
@@ -31,42 +36,52 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
     make up for that are none.
     """
     repeated = repeated_motion(problem, NULL_DRAWS, seed)
-    done = _searched(problem, *recalibrate(problem, repeated, seed), repeated, seed, progress)
-    if not structured(done, done.found.final):
-        return done
-    progress("beside the friction law's own form")
-    return _beside_form(done, repeated, seed, progress)
-
-
-def _searched(
-    problem: Problem, noise: Noise, roles: Split, baseline: Fit, repeated: Sequence[Sequence[Run]], seed: int,
-    progress: Callable[[str], None],
-) -> Finished:
-    """Search; again if what was found shows that part of the noise had been physics."""
-    found = search(problem, noise, roles, baseline, progress)
+    noise, roles, baseline = recalibrate(problem, repeated, seed)
+    form = _Form.of(problem, noise, roles, baseline) if loudness(problem, noise, baseline).loud else None
+    again = form is None or not form.explains_most
+    found = search(problem, noise, roles, baseline, progress, again=again)
     for _ in range(NOISE_ROUNDS if found.found else 0):
         quieter = noise_model(problem, found.final.x, found.final.effects, repeated, seed=seed)
         if quieter.floor > QUIETER * noise.floor:
             break
         noise = quieter
         baseline = fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=found.baseline.x)
-        found = search(problem, noise, roles, baseline, progress)
-    return Finished(problem, noise, roles, found)
+        found = search(problem, noise, roles, baseline, progress, again=again)
+    done = Finished(problem, noise, roles, found)
+    if not structured(done, found.final):
+        return done
+    progress("beside the friction law's own form")
+    form = _Form.of(problem, noise, roles, found.baseline)
+    beside = Finished(form.problem, form.noise, form.roles, search(form.problem, form.noise, form.roles, form.baseline, progress))
+    # A vehicle file can hold names, not the freedoms.
+    final = fit(problem, done.fitted, beside.found.final.effects, beside.found.final.x[: problem.nuisances])
+    return replace(done, found=replace(beside.found, baseline=found.baseline, final=final), beside_form=beside)
 
 
-def _beside_form(
-    done: Finished, repeated: Sequence[Sequence[Run]], seed: int, progress: Callable[[str], None]
-) -> Finished:
-    """What is found beside the freedoms of the friction law, fitted without them, as a vehicle file can hold it."""
-    alone, roles = done.found, done.roles
-    freer = bent(done.problem, alone.baseline)
-    start = np.concatenate([alone.baseline.x, np.zeros(freer.bends.shape[1])])
-    baseline = fit(freer, done.fitted, start=start)
-    noise = noise_model(freer, baseline.x, (), repeated, seed=seed)
-    baseline = fit(freer, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=baseline.x)
-    beside = _searched(freer, noise, roles, baseline, repeated, seed, progress)
-    final = fit(done.problem, done.fitted, beside.found.final.effects, beside.found.final.x[: done.problem.nuisances])
-    return replace(done, found=replace(beside.found, baseline=alone.baseline, final=final), beside_form=beside)
+@dataclass(frozen=True)
+class _Form:
+    """A problem with the freedoms of the friction law, of few samples, and its recalibrated baseline."""
+
+    problem: Problem
+    noise: Noise
+    roles: Split
+    baseline: Fit
+
+    @staticmethod
+    def of(problem: Problem, noise: Noise, roles: Split, baseline: Fit) -> _Form:
+        thin, kept = thinned(problem, FORM_SAMPLES)
+        freer = bent(thin, baseline)
+        noise = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
+        roles = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
+        start = np.concatenate([baseline.x, np.zeros(freer.bends.shape[1])])
+        return _Form(freer, noise, roles, fit(freer, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=start))
+
+    @property
+    def explains_most(self) -> bool:
+        """Whether there is hardly more than these freedoms."""
+        weight = np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0)
+        left = cost(self.problem, self.baseline, weight) - float(self.roles.fit.sum())
+        return left < FORM_LEFT * form_energy(self.problem, self.baseline, weight)
 
 
 def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:

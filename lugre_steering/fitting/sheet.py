@@ -18,7 +18,7 @@ import numpy as np
 from lugre_steering.data.dataset import Run, motion, with_hydraulics
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Calibration, Candidate, Problem, Values
-from lugre_steering.recording import Array, BagFinding
+from lugre_steering.recording import Array, BagFinding, IntArray
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.loads import vertical_load
@@ -101,7 +101,7 @@ def torque_ratio(product: float, square: float) -> float:
 
 def wrong_sheet(problem: Problem) -> WrongSheet | None:
     """Whether the recalibrated baseline needs more than nominal values allow, and another entry puts that right; else None."""
-    thin, doubt = _doubted(thinned(problem))
+    thin, doubt = _doubted(thinned(problem)[0])
     baseline = _fitted(thin)
     surprise = _surprise(thin, baseline)
     stuck = at_bounds(thin, baseline.x, LEVELS)
@@ -120,7 +120,7 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
 
 def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = ()) -> WrongSheet | None:
     """Whether one wrong bore, arm or pair of lines, or another vehicle, explains what the baseline leaves, and better than ``effects``."""
-    thin = thinned(problem)
+    thin, _ = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
     found = sorted((suspect for suspect, _ in _off((*_levels(thin), *_geometries(thin, baseline)))), key=lambda item: item.cost)
@@ -146,14 +146,16 @@ def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
     ]  # fmt: skip
 
 
-def thinned(problem: Problem) -> Problem:
-    """The same with few samples: hypotheses are far apart."""
+def thinned(problem: Problem, most: int = SAMPLES) -> tuple[Problem, IntArray]:
+    """The same with few samples, ``most`` unless they are slow, and which these are: hypotheses are far apart."""
     total = sum(run.time.size for run in problem.runs)
-    runs = []
-    for run in problem.runs:
+    runs, kept = [], []
+    for run, first in zip(problem.runs, problem.edges, strict=False):
         step = float(run.time[1] - run.time[0])
-        runs.append(_every(run, max(1, round(1.0 / RATE_HZ / step), -(-total // SAMPLES) if step < 0.1 else 1)))
-    return Problem(problem.vehicle, runs, problem.calibrations)
+        stride = max(1, round(1.0 / RATE_HZ / step), -(-total // most) if step < 0.1 else 1)
+        runs.append(_every(run, stride))
+        kept.append(first + np.arange(0, run.time.size, stride))
+    return Problem(problem.vehicle, runs, problem.calibrations), np.concatenate(kept)
 
 
 def _doubted(problem: Problem) -> tuple[Problem, float]:

@@ -99,7 +99,7 @@ def conclude(
         next_experiment=advice,
         laws=tuple(laws),
         traces=traces(beside, whole, final, None if judged.rotated else found.final if named else final),
-        evidence=evidence(done, effects),
+        evidence=evidence(done.compared, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
         sheet=problem.vehicle,
     ).in_words()
@@ -107,10 +107,10 @@ def conclude(
 
 def _left(done: Finished, final: Fit, named: bool) -> LeftOver:
     """What is left by the final fit, or beside the freedoms of the friction law where these had to be given."""
-    beside = done.beside_form
-    if beside is None:
+    if done.beside_form is None:
         return left_over(done, final)
-    return left_over(beside, beside.found.final if named else beside.found.baseline)
+    there = done.beside_form.found
+    return left_over(done.beside_form, there.final if named else there.baseline)
 
 
 def _clocks_alone(final: Fit, bags: int) -> bool:
@@ -138,7 +138,8 @@ def _whole(done: Finished, final: Fit) -> Fit:
 
 def _limits(done: Finished, named: Sequence[str]) -> dict[str, Limit]:
     """Smallest amplitude of each effect that this recording would have revealed."""
-    found = limits.smallest(done.problem, done.found.baseline, done.fitted, done.found.first_scores, named)
+    where = done.compared
+    found = limits.smallest(where.problem, where.found.baseline, where.fitted, where.found.first_scores, named)
     return {
         effect: Limit(parameter.name, value, done.unit(parameter.unit))
         for effect, (parameter, value) in found.items()

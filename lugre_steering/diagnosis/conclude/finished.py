@@ -30,6 +30,11 @@ class Finished:
     beside_form: Finished | None = None
     """The same beside the freedoms of the friction law (``form``), where names alone did not explain all to the noise."""
 
+    @property
+    def compared(self) -> Finished:
+        """Where the names were compared."""
+        return self.beside_form or self
+
     @cached_property
     def weight(self) -> Array:
         """Of all valid samples."""

@@ -83,9 +83,10 @@ class Search:
 
 
 def search(
-    problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None
+    problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None,
+    *, again: bool = True,
 ) -> Search:
-    """Build up from the best first effect, and where that does not stand from those with the best fingerprints."""
+    """Build up from the best first effect, and (``again``) where that does not stand from those with the best fingerprints."""
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
     samples, doubt = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt
 
@@ -96,7 +97,7 @@ def search(
     built = _build_up(problem, noise, split, baseline, None, progress, given)
     first, tried, needed, kept = built.first, built.trials, bool(built.steps), standing(built)
     builds = [built]
-    for opening in _others(problem, weight, built) if needed and not kept else ():
+    for opening in _others(problem, weight, built) if again and needed and not kept else ():
         progress(f"building up again from {opening.trials[0].candidate.label}")
         built = _build_up(problem, noise, split, built.baseline, opening, progress)
         tried, kept = tried + built.trials, standing(built)
