@@ -14,7 +14,7 @@ import pytest
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import TorqueSensor, Vehicle, load
+from lugre_steering.vehicle import EffectEntry, TorqueSensor, Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
 T0 = 1_790_000_000_000_000_000
@@ -109,8 +109,9 @@ def test_columns_that_do_not_belong_together_are_refused() -> None:
 
 def test_the_snapshot_of_another_model_is_refused() -> None:
     estimator = Estimator(VEHICLE)
+    other = VEHICLE.replace(effects=(EffectEntry("end_stop", {"engage_angle": 0.4, "stiffness": 9e4}),))
     with pytest.raises(DataError, match="not the snapshot of this model"):
-        estimator.restore(Estimator(VEHICLE.replace(sides=("left",))).snapshot())
+        estimator.restore(Estimator(other).snapshot())
 
 
 def test_residual_by_hand() -> None:
