@@ -227,11 +227,11 @@ def _usable(
     low, high = LIMITS[channel.kind]
     reject("zero_stamp", stamp[use] <= 0)
     reject("not_finite", ~np.isfinite(value[use]))
-    reject("absurd_value", (value[use] < low) | (value[use] > high))
+    reject("absurd", (value[use] < low) | (value[use] > high))
     if len(use):
         # The offset of a real message: halfway between two clocks, as a plain median may lie, there is none.
         usual = np.percentile(offset[use], 50.0, method="lower")
-        reject("absurd_stamp", np.abs(offset[use] - usual) > STRAY_NS)
+        reject("time_jump", np.abs(offset[use] - usual) > STRAY_NS)
     if len(use):
         s = stamp[use]
         believed = confirmed(s)

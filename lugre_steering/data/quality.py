@@ -192,7 +192,7 @@ def _rejected(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     for topic, reasons in recording.rejected.items():
         count = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in reasons.items())
         statement = f"{topic}: {sum(reasons.values())} messages cannot be used ({count}); look at the driver and its clock"
-        if topic in air and "absurd_value" in reasons:
+        if topic in air and "absurd" in reasons:
             statement += ", and at the unit: degC is expected, kelvin is more by 273.15"
         found.append(Finding("rejected_samples", topic, statement))
     return found

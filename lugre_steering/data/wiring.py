@@ -160,7 +160,7 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
     for side, topic in _topics(vehicle, Kind.ANGLE).items():
         signal = recording.angle.get(side)
         count = 0 if signal is None else signal.time_s.size
-        absurd = recording.rejected.get(topic, {}).get("absurd_value", 0)
+        absurd = recording.rejected.get(topic, {}).get("absurd", 0)
         turned = 0.0 if signal is None or not count else float(np.abs(signal.value).max())
         if absurd > ABSURD_SHARE * (count + absurd) or (vehicle.track is not None and turned > TURNED_RAD):
             wrong.append(topic)
