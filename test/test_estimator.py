@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lugre_steering.errors import DataError
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
 from lugre_steering.recording import Array
-from lugre_steering.vehicle import TorqueSensor, Vehicle, load
+from lugre_steering.vehicle import EffectEntry, TorqueSensor, Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
 T0 = 1_790_000_000_000_000_000
@@ -87,6 +88,30 @@ def test_single_pushes_equal_a_block() -> None:
         residual += list(r["residual"])
     np.testing.assert_array_equal(torque, estimates["total"])
     np.testing.assert_array_equal(residual, residuals["residual"])
+
+
+@pytest.mark.parametrize("channel", [-1, len(VEHICLE.channels), 50_000, 10**9])
+def test_a_channel_that_there_is_not_is_refused(channel: int) -> None:
+    """The compiled loop checks no bounds: it wrote beside its memory, or took the process with it."""
+    estimator = Estimator(VEHICLE)
+    with pytest.raises(DataError, match=rf"channel: got {channel}, expected 0 to {len(VEHICLE.channels) - 1}"):
+        estimator.push(channel, T0, 0.1)
+    stamps, values = np.array([T0, T0]), np.zeros(2)
+    with pytest.raises(DataError, match=rf"channel: got {channel}, expected 0 to"):
+        estimator.push_block(np.array([0, channel]), stamps, values, values)
+    assert not any(counts["accepted"] for counts in estimator.counters.values())
+
+
+def test_columns_that_do_not_belong_together_are_refused() -> None:
+    with pytest.raises(DataError, match=r"got arrays of shapes \(4,\), \(1,\), \(1,\), \(1,\), expected \(n,\) of all"):
+        Estimator(VEHICLE).push_block(np.array([0, 1, 0, 1]), np.array([T0]), np.zeros(1), np.zeros(1))
+
+
+def test_the_snapshot_of_another_model_is_refused() -> None:
+    estimator = Estimator(VEHICLE)
+    other = VEHICLE.replace(effects=(EffectEntry("end_stop", {"engage_angle": 0.4, "stiffness": 9e4}),))
+    with pytest.raises(DataError, match="not the snapshot of this model"):
+        estimator.restore(Estimator(other).snapshot())
 
 
 def test_residual_by_hand() -> None:

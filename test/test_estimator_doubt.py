@@ -252,6 +252,12 @@ def plan_of(times_s: list[float], angles: list[float]) -> tuple[Array, Array]:
         ([0.0, 1.0], [0.9, 0.9], "more than 0.2 rad from the present angle"),
         ([-0.5, 0.5], [0.1, 1.1], "more than 0.2 rad from the present angle"),
         ([0.01, 1.0], [0.9, 0.9], "more than 0.2 rad from the present angle"),
+        ([0.0, 1.0], [0.1, math.nan], "not a number from -pi to pi"),
+        ([0.0, 1.0], [0.1, math.inf], "not a number from -pi to pi"),
+        ([0.0, 0.0], [0.1, 0.1], "not in order of time"),
+        ([1.0, 0.0], [0.1, 0.1], "not in order of time"),
+        ([0.0, 1.0], [0.1, 0.1, 0.1], "2 times and angles of shape"),
+        ([1e-3 * i for i in range(2000)], [0.1] * 2000, "more than 1024 points"),
     ],
 )
 def test_a_plan_that_this_vehicle_cannot_follow_is_refused(times_s: list[float], angles: list[float], reason: str) -> None:

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +38,52 @@ SET_BACK_RUN = 5  # messages in a row between others: no mere lateness
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 
-_Columns = tuple[IntArray, IntArray, Array, Array]  # stamp, log time, value, rate
-_Samples = tuple[IntArray, Array, Array]  # stamp, value, rate of what is usable
-_NOTHING: _Columns = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
+_Samples = tuple[IntArray, Array, Array]  # stamp, value, rate of what is usable; no rates where none is given
+
+
+class _Column:
+    """Numbers that arrive in pieces, in one growing array: thousands of small ones would leave holes in the memory."""
+
+    def __init__(self, dtype: type[np.generic]) -> None:
+        self._values: NDArray[Any] = np.empty(0, dtype)
+        self._count = 0
+
+    def append(self, piece: NDArray[Any]) -> None:
+        end = self._count + piece.size
+        if end > self._values.size:
+            self._values.resize(end + end // 8, refcheck=False)
+        self._values[self._count : end] = piece
+        self._count = end
+
+    def __len__(self) -> int:
+        return self._count
+
+    def taken(self) -> NDArray[Any]:
+        """All of them, for good: nothing may be added afterwards."""
+        self._values.resize(self._count, refcheck=False)
+        return self._values
+
+
+class _Gathered:
+    """One channel of a bag: stamp [ns], its distance from the log time [ns] (to minutes; ``STRAY_NS`` is a day), value, and
+    rates from the first that is given."""
+
+    def __init__(self) -> None:
+        self.stamp, self.offset, self.value, self.rate = (_Column(t) for t in (np.int64, np.float32, np.float64, np.float64))
+        self.rated = False
+
+    def append(self, block: Block, i: int) -> None:
+        """The rows of channel ``i``."""
+        rows = block.channel == i
+        stamp, rate = block.stamp_ns[rows], block.rate[rows]
+        if not self.rated and np.isfinite(rate).any():
+            self.rated = True
+            self.rate.append(np.full(len(self.value), np.nan))
+        self.stamp.append(stamp)
+        self.offset.append((stamp - block.log_ns[rows]).astype(np.float32))
+        self.value.append(block.value[rows])
+        if self.rated:
+            self.rate.append(rate)
 
 
 def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
@@ -47,27 +91,28 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
     with Bag(path) as bag:
         topics = bag.match(channels)
         # Only columns are kept: the serialised messages of a long recording would fill the memory.
-        pieces: list[list[_Columns]] = [[] for _ in channels]
+        gathered = [_Gathered() for _ in channels]
         for block in bag.blocks(channels):
-            for i, piece in enumerate(pieces):
-                piece.append(_of_channel(block, i))
+            for i, columns in enumerate(gathered):
+                columns.append(block, i)
         name, malformed = bag.name, bag.malformed
         findings = list(bag.findings)
         found = shortened(sorted(bag.topics)) or "none"
     rejected: dict[str, Counter[str]] = {topic: Counter(malformed=count) for topic, count in malformed.items()}
     clean: dict[Channel, _Samples] = {}
-    for i, channel in enumerate(channels):
+    gathered.reverse()
+    for channel in channels:
+        columns = gathered.pop()  # its memory goes with it
         if channel in topics:
-            stamp, log, value, rate = map(np.concatenate, zip(_NOTHING, *pieces[i], strict=True))
-            pieces[i].clear()
-            use, reasons, reordered = _usable(channel, stamp, log, value)
+            stamp, value, rate = columns.stamp.taken(), columns.value.taken(), columns.rate.taken()
+            use, reasons, reordered = _usable(channel, stamp, columns.offset.taken(), value)
             # Both joints may come in one message, which is lost once.
             rejected[topics[channel]] = rejected.get(topics[channel], Counter()) | Counter(reasons)
             if reordered:
                 statement = f"{reordered} messages were recorded out of order and put back in order"
                 findings.append(Finding("out_of_order", topics[channel], statement))
             if len(use):
-                clean[channel] = stamp[use], value[use], rate[use]
+                clean[channel] = stamp[use], value[use], rate[use] if columns.rated else rate
     if not clean:
         raise _nothing_usable(path, channels, found, rejected, findings)
     return _recording(name, clean, rejected, findings)
@@ -92,16 +137,17 @@ def _nothing_usable(
 
 def _recording(
     name: str,
-    clean: Mapping[Channel, _Samples],
+    clean: dict[Channel, _Samples],
     rejected: Mapping[str, Mapping[str, int]],
     findings: Sequence[Finding],
 ) -> Recording:
-    """The usable samples in seconds since the first of them."""
+    """The usable samples in seconds since the first of them; ``clean`` is used up, so that no sample stands in memory twice."""
     start_ns = min(int(stamp[0]) for stamp, _, _ in clean.values())
     signals: dict[Kind, dict[str, Signal]] = {kind: {} for kind in Kind}
     rates: dict[str, Signal] = {}
-    for channel, (stamp, value, rate) in clean.items():
-        time_s = ((stamp - start_ns) * 1e-9).astype(np.float64)
+    for channel in list(clean):
+        stamp, value, rate = clean.pop(channel)
+        time_s: Array = (stamp - start_ns) * np.float64(1e-9)
         signals[channel.kind][channel.name] = Signal(time_s, value)
         given = np.abs(rate) < RATE_LIMIT  # False for NaN
         if given.any():
@@ -162,13 +208,13 @@ def _signals(recording: Recording) -> dict[tuple[Kind, str], Signal]:
     return found if recording.measured_torque is None else {**found, (Kind.TORQUE, ""): recording.measured_torque}
 
 
-def _of_channel(block: Block, i: int) -> _Columns:
-    rows = block.channel == i
-    return block.stamp_ns[rows], block.log_ns[rows], block.value[rows], block.rate[rows]
+def _usable(
+    channel: Channel, stamp: IntArray, offset: NDArray[np.float32], value: Array
+) -> tuple[IntArray, Counter[str], int]:
+    """Indices of usable messages by increasing stamp, the count of each reason for the others, how many were late.
 
-
-def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> tuple[IntArray, Counter[str], int]:
-    """Indices of usable messages by increasing stamp, the count of each reason for the others, how many were late."""
+    ``offset``: stamp less log time [ns].
+    """
     reasons: Counter[str] = Counter()
     use: IntArray = np.arange(len(stamp))
 
@@ -181,12 +227,11 @@ def _usable(channel: Channel, stamp: IntArray, log: IntArray, value: Array) -> t
     low, high = LIMITS[channel.kind]
     reject("zero_stamp", stamp[use] <= 0)
     reject("not_finite", ~np.isfinite(value[use]))
-    reject("absurd_value", (value[use] < low) | (value[use] > high))
+    reject("absurd", (value[use] < low) | (value[use] > high))
     if len(use):
-        offset = stamp[use] - log[use]
         # The offset of a real message: halfway between two clocks, as a plain median may lie, there is none.
-        usual = np.percentile(offset, 50.0, method="lower")
-        reject("absurd_stamp", np.abs(offset - usual) > STRAY_NS)
+        usual = np.percentile(offset[use], 50.0, method="lower")
+        reject("time_jump", np.abs(offset[use] - usual) > STRAY_NS)
     if len(use):
         s = stamp[use]
         believed = confirmed(s)

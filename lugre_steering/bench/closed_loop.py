@@ -30,6 +30,7 @@ import numpy as np
 from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
 from lugre_steering.bench.neighbour import SECOND, NodeProcess
 from lugre_steering.calibration.library import calibrate
+from lugre_steering.proof.field.hidden import IN_SERVICE
 from lugre_steering.proof.field.hydraulics import gains
 from lugre_steering.proof.field.motion import strokes
 from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
@@ -44,6 +45,8 @@ PLAN_S, PLAN_EVERY = 0.5, 20
 ANSWER_S = 2.0
 T0_NS = 1_000 * SECOND
 NONE, STATIC = "none", "constant friction"
+STOP = IN_SERVICE["an end stop"]
+"""The catalogue's name of what the loop hides."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +187,7 @@ def models(setting: Setting, folder: Path) -> Mapping[str, tuple[Vehicle, tuple[
         initial=dataclasses.replace(improved.initial, rubber_temperature_degC=drive_.rubber_degC, air_temperature_degC=drive_.air_degC)
     )
     par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
-    found = with_effects(improved, [f"end_stop:engage_angle={par.stop_angle:.6g},stiffness={par.stop_stiffness:.6g}"])
+    found = with_effects(improved, [f"{STOP}:engage_angle={par.stop_angle:.6g},stiffness={par.stop_stiffness:.6g}"])
     axle = improved.axle
     assert axle is not None
     wrong = improved.replace(axle=dataclasses.replace(axle, load_N=2.0 * axle.load_N))

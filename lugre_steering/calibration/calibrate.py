@@ -44,7 +44,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.fitting.apply import apply_calibration, seen_range
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
-from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Calibration, Problem, calibrations_for
+from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Problem, SheetValue, calibrations_for
 from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
@@ -131,7 +131,7 @@ class Calibrated:
 
 def chosen(
     vehicle: Vehicle, free: Sequence[str] = (), fix: Sequence[str] = (), prior: Mapping[str, float] | None = None
-) -> tuple[Calibration, ...]:
+) -> tuple[SheetValue, ...]:
     """The values to fit: the standard set, plus ``free``, minus ``fix``, with ``prior`` in place of the sheet's."""
     optional = [KINGPIN] if vehicle.axle is not None and vehicle.axle.kingpin_lever_arm_m != 0.0 else []
     if vehicle.hydraulics is not None:
@@ -167,7 +167,7 @@ def chosen(
 def calibrate_recordings(
     recordings: Sequence[Recording],
     vehicle: Vehicle,
-    calibrations: Sequence[Calibration] | None = None,
+    calibrations: Sequence[SheetValue] | None = None,
     *,
     priors: bool = True,
     progress: Progress = lambda _: None,

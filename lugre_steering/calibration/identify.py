@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.calibration.estimate import Estimate, physical_jacobian
-from lugre_steering.fitting.problem import GAIN, KINGPIN, Calibration, Problem
+from lugre_steering.fitting.problem import GAIN, KINGPIN, Problem, SheetValue
 from lugre_steering.recording import Array
 
-SENSITIVITY = Calibration("temperature_sensitivity", (), 0.15, -0.6, 0.6)
+SENSITIVITY = SheetValue("temperature_sensitivity", (), 0.15, -0.6, 0.6)
 """Exponent on the rubber table's ratios: how strongly stiffness and friction follow the temperature."""
 WEAK = 0.5
 """A combination is undetermined when the data alone leave more than this share of the sheet's uncertainty."""
@@ -50,7 +50,7 @@ class Assumed:
     shifts: dict[str, float]
 
 
-def assumed_calibrations(problem: Problem) -> list[Calibration]:
+def assumed_calibrations(problem: Problem) -> list[SheetValue]:
     """What the fit takes from the sheet although it may be wrong."""
     fitted = {calibration.name for calibration in problem.calibrations}
     found = [SENSITIVITY] if problem.vehicle.rubber is not None else []
@@ -124,7 +124,7 @@ def _information(curvature: Array, score: Array, kept: int) -> Array:
     return np.asarray(whole[:kept, :kept] - cross @ np.linalg.pinv(whole[kept:, kept:], hermitian=True) @ cross.T)
 
 
-def _column(problem: Problem, result: Estimate, calibration: Calibration) -> Array:
+def _column(problem: Problem, result: Estimate, calibration: SheetValue) -> Array:
     """Change of the predicted torque per relative change of one sheet value (n,) [N m]."""
     moved = copy.copy(problem)
     if calibration is SENSITIVITY:

@@ -9,7 +9,7 @@ and coarsely quantised recordings stay silent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,9 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
 from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
+from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.sensing import worse_than_said
-from lugre_steering.data.wiring import BLOCKING, inspect_wiring
+from lugre_steering.data.wiring import BLOCKING, inspect_wiring, span
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import build_model
@@ -79,7 +80,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
         others = [other for c, other in looks.items() if c is not channel and c.kind is channel.kind]
         found, keep = _examine(channel, look, others, vehicle.sensors.pressure_range_Pa)
         findings += found
-        clean[channel] = Signal(look.time[keep], look.value[keep])
+        clean[channel] = signals[channel] if keep.all() else Signal(look.time[keep], look.value[keep])
     for finding in _memory_lost(clean, vehicle):
         findings.append(finding)
         for channel, signal in clean.items():
@@ -88,11 +89,30 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
     usable = _with_signals(recording, clean)
     lost = tuple(_held_long(findings, looks))
     # What no sensor shows has no wiring to look at; angles in another unit have its noise too.
-    wrong = lost or inspect_dead(usable, vehicle) or inspect_wiring(usable, vehicle) or inspect_angles(usable, vehicle)
+    wrong = lost or _against_model(usable, vehicle)
     if not wrong:
         findings += [finding for channel, look in looks.items() for finding in _sensor(channel, clean[channel], look, vehicle)]
     # One angle sensor for both tracks would say everything twice.
     return Quality(tuple(dict.fromkeys((*findings, *wrong))), usable)
+
+
+def _against_model(usable: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """What the nominal model and the other channels say; of a long recording, about the pieces that will be examined."""
+    pieces, _ = in_pieces([usable])
+    found: dict[tuple[str, str], Finding] = {}
+    for finding in _each(inspect_dead, pieces, vehicle) or inspect_wiring(pieces, vehicle) or _each(inspect_angles, pieces, vehicle):
+        first = found.setdefault((finding.finding, finding.topic), finding)
+        if first is not finding:
+            found[finding.finding, finding.topic] = replace(first, intervals_s=(*first.intervals_s, *finding.intervals_s))
+    return tuple(found.values())
+
+
+def _each(
+    check: Callable[[Recording, Vehicle], tuple[Finding, ...]], pieces: Sequence[Recording], vehicle: Vehicle
+) -> tuple[Finding, ...]:
+    """A check of every piece; where the recording has several, its findings say in which."""
+    found = [(finding, piece) for piece in pieces for finding in check(piece, vehicle)]
+    return tuple(replace(f, intervals_s=f.intervals_s or span(piece)) if len(pieces) > 1 else f for f, piece in found)
 
 
 def _held_long(findings: Sequence[Finding], looks: Mapping[Channel, _Look]) -> Iterator[Finding]:
@@ -146,7 +166,7 @@ def _with_signals(recording: Recording, clean: Mapping[Channel, Signal]) -> Reco
     rate = {}
     for name, signal in recording.rate.items():
         kept = np.isin(signal.time_s, of[Kind.ANGLE].get(name, signal).time_s)
-        rate[name] = Signal(signal.time_s[kept], signal.value[kept])
+        rate[name] = signal if kept.all() else Signal(signal.time_s[kept], signal.value[kept])
     return replace(
         recording, rate=rate, angle={**recording.angle, **of[Kind.ANGLE]}, pressure={**recording.pressure, **of[Kind.PRESSURE]},
         measured_torque=next(iter(of[Kind.TORQUE].values()), recording.measured_torque),
@@ -172,7 +192,7 @@ def _rejected(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     for topic, reasons in recording.rejected.items():
         count = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in reasons.items())
         statement = f"{topic}: {sum(reasons.values())} messages cannot be used ({count}); look at the driver and its clock"
-        if topic in air and "absurd_value" in reasons:
+        if topic in air and "absurd" in reasons:
             statement += ", and at the unit: degC is expected, kelvin is more by 273.15"
         found.append(Finding("rejected_samples", topic, statement))
     return found

@@ -9,7 +9,7 @@ hypotheses that agree equally well are named together, and none may leave the an
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -105,27 +105,39 @@ class _Hypothesis:
 Faults = tuple[_Fault, ...]
 
 
-def inspect_wiring(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """Findings about signs, units, exchanged channels, clocks and zeros; ``recording`` without bad samples."""
-    whole = _span(recording)
-    found = _angle_unit(recording, vehicle)
-    if not found:
-        try:
-            run = prepare(recording, vehicle)
-        except DataError:
-            return ()
-        if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
-            return ()
-        total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
-        if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))):
-            return ()
-        found = _wrong(recording, vehicle, run)
-    if found:
-        return tuple(Finding(fault.finding, ", ".join(fault.topics), fault.statement, whole) for fault in found)
-    return tuple(replace(finding, intervals_s=whole) for check in (_skew, _drifts) for finding in check(vehicle, run))
+def inspect_wiring(pieces: Sequence[Recording], vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Findings about signs, units, exchanged channels, clocks and zeros; ``pieces`` of one recording, without bad samples."""
+    wrong: list[Finding] = []
+    skewed: list[Finding] = []
+    runs: list[Run] = []
+    for piece in pieces:
+        whole = span(piece)
+        found = _angle_unit(piece, vehicle)
+        run = None if found else _telling(piece, vehicle)
+        if run is not None and not (found := _wrong(piece, vehicle, run)):
+            runs.append(run)
+            skewed += (replace(finding, intervals_s=whole) for finding in _skew(vehicle, run))
+        wrong += (Finding(fault.finding, ", ".join(fault.topics), fault.statement, whole) for fault in found)
+    if wrong:
+        return tuple(wrong)
+    every = tuple(interval for piece in pieces for interval in span(piece))
+    return (*skewed, *(replace(finding, intervals_s=every) for finding in _drifts(vehicle, runs)))
 
 
-def _span(recording: Recording) -> tuple[tuple[float, float], ...]:
+def _telling(piece: Recording, vehicle: Vehicle) -> Run | None:
+    """What the nominal model can be compared with; None where nothing moves, or the nominal torque has no shape."""
+    try:
+        run = prepare(piece, vehicle)
+    except DataError:
+        return None
+    if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
+        return None
+    total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
+    return None if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))) else run
+
+
+def span(recording: Recording) -> tuple[tuple[float, float], ...]:
+    """Start and end [s] of all that was measured, as the intervals of a finding."""
     signals = [*recording.angle.values(), *recording.pressure.values()]
     signals += [recording.measured_torque] if recording.measured_torque is not None else []
     ends = [(float(s.time_s[0]), float(s.time_s[-1])) for s in signals if s.time_s.size]
@@ -148,7 +160,7 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
     for side, topic in _topics(vehicle, Kind.ANGLE).items():
         signal = recording.angle.get(side)
         count = 0 if signal is None else signal.time_s.size
-        absurd = recording.rejected.get(topic, {}).get("absurd_value", 0)
+        absurd = recording.rejected.get(topic, {}).get("absurd", 0)
         turned = 0.0 if signal is None or not count else float(np.abs(signal.value).max())
         if absurd > ABSURD_SHARE * (count + absurd) or (vehicle.track is not None and turned > TURNED_RAD):
             wrong.append(topic)
@@ -502,23 +514,24 @@ def _lowest(values: Array) -> float:
     return at + 0.5 * (before - after) / max(before - 2.0 * here + after, 1e-30)
 
 
-def _drifts(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
-    """Lines whose level drifts while the other side of their cylinders does the work."""
-    if vehicle.hydraulics is None:
+def _drifts(vehicle: Vehicle, runs: Sequence[Run]) -> Iterator[Finding]:
+    """Lines whose level drifts over the runs, one after the other, while the other side of their cylinders does the work."""
+    if vehicle.hydraulics is None or not runs:
         return
-    expected = _torques(build_model(vehicle), run).sum(axis=0)
+    model = build_model(vehicle)
+    expected = np.concatenate([_torques(model, run).sum(axis=0) for run in runs])
+    time, valid = (np.concatenate([getattr(run, name) for run in runs]) for name in ("time", "valid"))
+    pressures, gains = (np.concatenate([getattr(run, name) for run in runs], axis=1) for name in ("pressure", "torque_per_line"))
     limit = max(DRIFT_SHARE * vehicle.sensors.pressure_range_Pa, 10.0 * vehicle.sensors.pressure_noise_Pa)
     idle = np.abs(expected) > 0.2 * np.abs(expected).max()
-    for (line, topic), gain, pressure in zip(
-        _topics(vehicle, Kind.PRESSURE).items(), run.torque_per_line, run.pressure, strict=True
-    ):
-        at = np.flatnonzero(idle & run.valid & (gain * expected < 0.0))
-        duration = float(run.time[-1] - run.time[0])
-        if at.size < 100 or run.time[at[-1]] - run.time[at[0]] < 0.5 * duration:
+    duration = float(time[-1] - time[0])
+    for (line, topic), gain, pressure in zip(_topics(vehicle, Kind.PRESSURE).items(), gains, pressures, strict=True):
+        at = np.flatnonzero(idle & valid & (gain * expected < 0.0))
+        if at.size < 100 or time[at[-1]] - time[at[0]] < 0.5 * duration:
             continue
-        pieces = np.array_split(at, 20)
-        level = np.array([np.median(pressure[piece]) for piece in pieces])
-        slope, _, low, high = theilslopes(level, [run.time[piece].mean() for piece in pieces])
+        parts = np.array_split(at, 20)
+        level = np.array([np.median(pressure[part]) for part in parts])
+        slope, _, low, high = theilslopes(level, [time[part].mean() for part in parts])
         if abs(slope) * duration > limit and low * high > 0.0 and high - low < abs(slope):
             yield Finding(
                 "zero_drift", topic,

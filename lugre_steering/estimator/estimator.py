@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
-from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle import Vehicle, vehicle_of
 from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
 from lugre_steering.vehicle.model import Model, build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
@@ -100,9 +101,10 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
 class Estimator:
     """Steering-torque estimator of one vehicle; a thin owner of the compiled core."""
 
-    def __init__(self, vehicle: Vehicle, options: Options | None = None, *, lean: bool = False) -> None:
-        """``lean``: compiled for the effects of this file alone, which is faster in each step and takes seconds once per set of them."""
-        self.vehicle, self.lean = vehicle, lean
+    def __init__(self, vehicle: Vehicle | str | Path, options: Options | None = None, *, lean: bool = False) -> None:
+        """``vehicle``: one, or the path of its file; ``lean``: compiled for the effects of this file alone, which is faster in each
+        step and takes seconds once per set of them."""
+        self.vehicle, self.lean = (vehicle := vehicle_of(vehicle)), lean
         self.options = options or Options()
         self.channels = vehicle.channels
         self._first_line = len(vehicle.sides)
@@ -112,19 +114,32 @@ class Estimator:
         self._residuals = np.zeros(PENDING_RING, RESIDUAL)
 
     def push(self, channel: int, stamp_ns: int, value: float, rate: float = math.nan) -> tuple[Records, Records]:
-        """One message -> new estimates (0 or 1) and residuals (0 or more), as views that the next push overwrites."""
+        """One message -> new estimates (0 or 1) and residuals (0 or more), as views that the next push overwrites.
+
+        ``DataError`` for a channel that ``channels`` does not have: the compiled loop would write beside its memory.
+        """
+        if not 0 <= channel < len(self.channels):
+            raise self._no_channel(channel)
         single = self._single
         single[0][0], single[1][0], single[2][0], single[3][0] = channel, stamp_ns, value, rate
         e, r = _process(self._core, self._first_line, *single, self._estimates, self._residuals)
         return self._estimates[:e], self._residuals[:r]
 
     def push_block(self, channel: IntArray, stamp_ns: IntArray, value: Array, rate: Array) -> tuple[Records, Records]:
-        """Many messages in recorded order -> all their estimates and residuals."""
+        """Many messages in recorded order, (n,) each -> all their estimates and residuals. ``DataError`` as in ``push``."""
+        if not channel.shape == stamp_ns.shape == value.shape == rate.shape == (channel.size,):
+            sizes = ", ".join(str(column.shape) for column in (channel, stamp_ns, value, rate))
+            raise DataError(f"channel, stamp_ns, value, rate: got arrays of shapes {sizes}, expected (n,) of all")
+        if channel.size and not 0 <= channel.min() <= channel.max() < len(self.channels):
+            raise self._no_channel(channel[(channel < 0) | (channel >= len(self.channels))][0])
         estimates, residuals = np.zeros(channel.size, ESTIMATE), np.zeros(channel.size + PENDING_RING, RESIDUAL)
         e, r = _process(
             self._core, self._first_line, channel.astype(np.int64), stamp_ns, value, rate, estimates, residuals
         )
         return estimates[:e], residuals[:r]
+
+    def _no_channel(self, channel: int) -> DataError:
+        return DataError(f"channel: got {channel}, expected 0 to {len(self.channels) - 1}, the place in channels")
 
     def begin_at(self, rubber_degC: float) -> None:
         """Rubber temperature [degC] from which every start is made, in place of the vehicle file's; to be given before the first sample.
@@ -141,18 +156,25 @@ class Estimator:
     def set_plan(self, stamp_ns: IntArray, theta: Array) -> None:
         """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan.
 
-        ``DataError`` if it is faster than an angle may be, or begins too far from the present one; the former plan stays.
+        ``DataError`` if it is none, is faster than an angle may be, or begins too far from the present one; the former plan stays.
         Without points there is no plan any more.
         """
+        if theta.shape != (len(self.vehicle.sides), stamp_ns.size):
+            raise DataError(f"{stamp_ns.size} times and angles of shape {theta.shape}; expected an angle of each side at each time")
+        if stamp_ns.size > PLAN_POINTS:
+            raise DataError(f"more than {PLAN_POINTS} points")
+        if not (np.abs(theta) <= math.pi).all():  # nan is refused too
+            raise DataError("an angle that is not a number from -pi to pi")
+        if (np.diff(stamp_ns) <= 0).any():
+            raise DataError("points that are not in order of time")
         faster = np.abs(np.diff(theta)) > self.options.max_rate_rad_s * np.diff(stamp_ns) * 1e-9
         if faster.any():
             raise DataError(f"faster than {self.options.max_rate_rad_s:g} rad/s")
         if stamp_ns.size and self._away(stamp_ns, theta):
             raise DataError(f"more than {self.options.plan_tolerance_rad:g} rad from the present angle")
-        n = min(stamp_ns.size, self._core.plan_ns.size)
-        self._core.plan_ns[:n] = stamp_ns[:n]
-        self._core.plan_theta[:, :n] = theta[:, :n]
-        self._core.config[0]["plan_size"] = n
+        self._core.plan_ns[: stamp_ns.size] = stamp_ns
+        self._core.plan_theta[:, : stamp_ns.size] = theta
+        self._core.config[0]["plan_size"] = stamp_ns.size
 
     def _away(self, stamp_ns: IntArray, theta: Array) -> bool:
         """Whether a plan, at the newest angle's stamp or where it begins later, cannot be gone to from there."""
@@ -240,7 +262,9 @@ class Estimator:
         return [array.copy() for array in self._core]
 
     def restore(self, snapshot: list[np.ndarray[Any, Any]]) -> None:
-        """Go back to a snapshot of an estimator of the same vehicle."""
+        """Go back to a snapshot of an estimator of the same vehicle; ``DataError``, and nothing changed, if it is of another."""
+        if [(a.dtype, a.shape) for a in self._core] != [(a.dtype, a.shape) for a in snapshot]:
+            raise DataError("it is not the snapshot of this model")
         for array, saved in zip(self._core, snapshot, strict=True):
             array[...] = saved
 

@@ -18,7 +18,7 @@ from lugre_steering.data.dataset import prepare
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Calibration, Candidate, Problem, Values, is_rig
+from lugre_steering.fitting.problem import Candidate, Problem, SheetValue, Values, is_rig
 from lugre_steering.fitting.split import CLUSTER_S
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -60,7 +60,7 @@ class Synchronised:
 def synchronised(
     recordings: Sequence[Recording],
     vehicle: Vehicle,
-    calibrations: Sequence[Calibration] | None = None,
+    calibrations: Sequence[SheetValue] | None = None,
     effects: Effects = (),
 ) -> Synchronised:
     """Recordings prepared with one clock; ``effects``: what is known to act beside, as physics left out can pass for an offset."""

@@ -52,7 +52,7 @@ def is_rig(vehicle: Vehicle) -> bool:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class SheetValue:
     """One baseline value that a vehicle sheet may have wrong.
 
     ``apply`` turns a change x into new parameter-record values; x = 0 is the sheet, ``prior`` its standard deviation.
@@ -67,14 +67,14 @@ class Calibration:
     additive: bool = False
 
 
-FRICTION = Calibration("friction_level", ("static_torque", "coulomb_torque"), 0.15, -0.6, 0.6)
-STATIC = Calibration("static_ratio", ("static_torque",), 0.12, -0.3, 0.5, additive=True)
-STIFFNESS = Calibration("stiffness", ("sigma_0",), 0.15, -0.6, 0.6)
-STRIBECK = Calibration("stribeck_speed", ("stribeck_speed",), 0.15, -0.7, 0.7)
-CAPACITY = Calibration("heat_capacity", ("heat_capacity",), 0.15, -0.6, 0.6)
-COOLING = Calibration("cooling", ("cooling",), 0.15, -0.6, 0.6)
-KINGPIN = Calibration("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
-GAIN = Calibration("pressure_gain", (), 0.03, -0.3, 0.3)
+FRICTION = SheetValue("friction_level", ("static_torque", "coulomb_torque"), 0.15, -0.6, 0.6)
+STATIC = SheetValue("static_ratio", ("static_torque",), 0.12, -0.3, 0.5, additive=True)
+STIFFNESS = SheetValue("stiffness", ("sigma_0",), 0.15, -0.6, 0.6)
+STRIBECK = SheetValue("stribeck_speed", ("stribeck_speed",), 0.15, -0.7, 0.7)
+CAPACITY = SheetValue("heat_capacity", ("heat_capacity",), 0.15, -0.6, 0.6)
+COOLING = SheetValue("cooling", ("cooling",), 0.15, -0.6, 0.6)
+KINGPIN = SheetValue("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
+GAIN = SheetValue("pressure_gain", (), 0.03, -0.3, 0.3)
 """Scales the torque that the pressures show, no field of the chain."""
 EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 50.0
 """Rubber over air at the start of a bag beyond that of the vehicle file: standard deviation and range; 30 K after a drive."""
@@ -92,7 +92,7 @@ RIG = (
 """Of a single joint or axis, whose sheet holds rough numbers."""
 
 
-def calibrations_for(vehicle: Vehicle) -> tuple[Calibration, ...]:
+def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:
     """The standard set; without rubber there is nothing thermal to calibrate."""
     if vehicle.rubber is not None:
         return STANDARD
@@ -177,7 +177,7 @@ class Problem:
     """
 
     def __init__(
-        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[Calibration] | None = None, *, more_laws: int = 0,
+        self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[SheetValue] | None = None, *, more_laws: int = 0,
         bends: Array | None = None,
     ) -> None:
         """``more_laws``: so many laws are tried in place of effects of the catalogue, of which only the vehicle's are there.

@@ -17,7 +17,7 @@ import numpy as np
 
 from lugre_steering.data.dataset import Run, motion, with_hydraulics
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Calibration, Candidate, Problem, Values
+from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Candidate, Problem, SheetValue, Values
 from lugre_steering.recording import Array, BagFinding, IntArray
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.vehicle import Vehicle
@@ -46,7 +46,7 @@ OFF, SEVERAL = 0.03, 1.1
 TIED = 1.1
 """Cost over the lowest up to which a hypothesis is as good."""
 SHOWN = 5
-LOAD = Calibration("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
+LOAD = SheetValue("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
 LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 LEVELS = ("friction_level", "stiffness")
@@ -213,7 +213,7 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
     others = [c for c in known if c.name != LEVEL.name]
     level = "friction.coulomb" if vehicle.friction is not None else "contact.coulomb_torque_Nm"
     stiff = level.split(".")[0] + ".stiffness_Nm_per_deg"
-    trials: list[tuple[str, list[Calibration], str]] = [(level, [LEVEL, *others], LEVEL.name)]
+    trials: list[tuple[str, list[SheetValue], str]] = [(level, [LEVEL, *others], LEVEL.name)]
     trials.append((stiff, [STIFF, *(c for c in known if c.name != STIFF.name)], STIFF.name))
     if vehicle.axle is not None:
         trials.append(("axle.load_N", [LOAD, *known], LOAD.name))

@@ -372,7 +372,7 @@ def test_one_angle_in_degrees_that_reading_refused(prefix: str, sound: Recording
     """Reading leaves out angles beyond half a turn; what is left looks small, the count does not."""
     degrees = scaled(180.0 / math.pi)(sound.angle["left"])
     keep = np.abs(degrees.value) <= math.pi
-    rejected = {prefix + LEFT: {"absurd_value": int((~keep).sum())}}
+    rejected = {prefix + LEFT: {"absurd": int((~keep).sum())}}
     bad = replace(angle("left", lambda s: Signal(s.time_s[keep], degrees.value[keep]))(sound), rejected=rejected)
     quality = inspect(bad, VEHICLE)
     assert ("unit_suspect", LEFT) in names(quality.blocking)
@@ -380,7 +380,7 @@ def test_one_angle_in_degrees_that_reading_refused(prefix: str, sound: Recording
 
 
 def test_air_in_kelvin_that_reading_refused(sound: Recording) -> None:
-    (found,) = inspect(replace(sound, rejected={"/" + AIR: {"absurd_value": 54}}), VEHICLE).findings
+    (found,) = inspect(replace(sound, rejected={"/" + AIR: {"absurd": 54}}), VEHICLE).findings
     assert (found.finding, found.topic) == ("rejected_samples", AIR)
     assert "kelvin" in found.statement
 
