@@ -402,6 +402,7 @@ def calibrate(
     from lugre_steering.calibration import calibrate as run
     from lugre_steering.calibration.result import facts, gate
     from lugre_steering.calibration.table import parse_priors, show_calibration
+    from lugre_steering.vehicle import load
 
     if no_prior and prior:
         raise DataError("--no-prior: leaves no use for --prior; expected one of them")
@@ -422,7 +423,7 @@ def calibrate(
     if as_json:
         print_json(result)
     else:
-        show_calibration(output(), result)
+        show_calibration(output(), result, load(vehicle).coordinate.force_unit)
         print(f"results in {out}")
     leave_if(wanted.failures(facts(result)))
 
