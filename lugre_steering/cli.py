@@ -320,7 +320,7 @@ def simulate(
         print_json(result) if as_json else simulation.show_outcomes(output(), outcomes, out)
         raise typer.Exit(0 if result["passed"] else 1)
     result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap")
-    print_json(result) if as_json else simulation.show_run(output(), result)
+    print_json(result) if as_json else simulation.show_run(output(), result, chosen)
 
 
 @command("vehicle")
