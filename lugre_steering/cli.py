@@ -320,7 +320,7 @@ def simulate(
         print_json(result) if as_json else simulation.show_outcomes(output(), outcomes, out)
         raise typer.Exit(0 if result["passed"] else 1)
     result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap")
-    print_json(result) if as_json else simulation.show_run(output(), result)
+    print_json(result) if as_json else simulation.show_run(output(), result, chosen)
 
 
 @command("vehicle")
@@ -402,6 +402,7 @@ def calibrate(
     from lugre_steering.calibration import calibrate as run
     from lugre_steering.calibration.result import facts, gate
     from lugre_steering.calibration.table import parse_priors, show_calibration
+    from lugre_steering.vehicle import load
 
     if no_prior and prior:
         raise DataError("--no-prior: leaves no use for --prior; expected one of them")
@@ -422,7 +423,7 @@ def calibrate(
     if as_json:
         print_json(result)
     else:
-        show_calibration(output(), result)
+        show_calibration(output(), result, load(vehicle).coordinate.force_unit)
         print(f"results in {out}")
     leave_if(wanted.failures(facts(result)))
 

@@ -8,6 +8,7 @@ import codecs
 import inspect
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -50,9 +51,11 @@ def test_replay_writes_what_the_contract_promises(bag: Path, tmp_path: Path) -> 
 
 
 def test_text_result_names_the_fit_and_the_folder(bag: Path, tmp_path: Path) -> None:
-    done = run("replay", bag, "--vehicle", VEHICLE, "--out", "out", cwd=tmp_path)
+    named = shutil.copytree(bag, tmp_path / "synthetic_hidden_stop_a")
+    done = run("replay", named, "--vehicle", VEHICLE, "--out", "out", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "RMSE" in done.stdout
+    assert f"\n{named.name} " in done.stdout  # whole, at 80 columns
     assert done.stdout.endswith("results in out\n")
 
 

@@ -24,8 +24,13 @@ from test_packaging import environment
 from typer.testing import CliRunner
 
 from lugre_steering import reference
+from lugre_steering.calibration import result as calibration
 from lugre_steering.cli import app
+from lugre_steering.diagnosis import result as diagnosis
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.errors import DataError
+from lugre_steering.fleet import result as fleet
+from lugre_steering.replay import result as replay
 from lugre_steering.vehicle import Vehicle
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -126,6 +131,15 @@ def test_commands_in_the_text_exist(page: Path) -> None:
             assert told in options(command), f"{named(page)}: {command} {told}"
     for module in re.findall(r"python -m (lugre_steering[.\w]*\w)", text):
         assert importlib.util.find_spec(module) is not None, f"{named(page)}: {module}"
+
+
+@pytest.mark.parametrize(("command", "gate"), [("replay", replay), ("calibrate", calibration), ("diagnose", diagnosis), ("fleet", fleet)])
+def test_what_can_be_failed_for_is_told(command: str, gate: Any) -> None:
+    page = (DOCS / "commands.md").read_text(encoding="utf-8")
+    (told,) = re.findall(rf"^\| `{command}` \| (.*) \|$", page, re.MULTILINE)
+    with pytest.raises(DataError) as refused:
+        gate.gate(["nothing of the kind"])
+    assert re.findall(r"`([^`]+)`", told) == str(refused.value).partition("expected one of ")[2].split(", ")
 
 
 QUICK = ("vehicle", "simulate", "effects", "replay", "import")

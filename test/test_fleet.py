@@ -256,12 +256,24 @@ def test_one_is_diagnosed_and_its_physics_stands(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="Dask is not installed")
-def test_a_dask_cluster_does_the_same(done: Path, runs: Path, tmp_path: Path) -> None:
+def test_a_dask_cluster_does_the_same_though_a_worker_is_killed(done: Path, runs: Path, tmp_path: Path) -> None:
     from distributed import LocalCluster
 
+    records, missing_then = tmp_path / "out" / "recordings", []
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+
+        def kill() -> None:
+            for _ in waiting(lambda: any(records.glob("*/*.json"))):
+                pass
+            os.kill(cluster.workers[0].pid, signal.SIGKILL)
+            missing_then.append(6 - len(list(records.glob("*/*.json"))))
+
+        killer = threading.Thread(target=kill)
+        killer.start()
         result = run(bags_of(runs), VEHICLE, tmp_path / "out", options=QUICK, scheduler=cluster.scheduler_address, version="1")
-        assert (result.examined, len(result.quarantine)) == (6, 2)
+        killer.join()
+        assert (result.examined + result.cached, len(result.quarantine)) == (6, 2)  # what a killed one had written is kept
+    assert missing_then[0] > 0  # in mid-run
     strip = {"seconds": None}
     assert [row | strip for row in table(tmp_path / "out", "scores")] == [row | strip for row in table(done, "scores")]
 

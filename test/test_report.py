@@ -411,6 +411,7 @@ def test_intervals_show_digits_that_differ() -> None:
     low, high = (float(end) for end in ends.split(" … "))
     assert high - low == pytest.approx(0.4200325 - 0.4199921, rel=0.05)
     assert low < float(value) < high
+    assert words.estimate(1.006e7, [6.48e6, 1.362e7]) == ("1.01e+07", "6.48e+06 … 1.36e+07")  # one notation
 
 
 # ----------------------------------------------------------------- missing libraries

@@ -28,8 +28,8 @@ def parse_priors(texts: Sequence[str]) -> dict[str, float]:
     return priors
 
 
-def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
-    """Parameters with intervals, what to make of them, and the paragraph."""
+def show_calibration(console: Console, result: Mapping[str, Any], unit: str) -> None:
+    """Parameters with intervals, what to make of them, and the paragraph; ``unit`` of torques: N m, or the force unit of a linear axis."""
     table = Table(title="calibration (units as in the key)", title_justify="left")
     for column in ("key", "sheet", "fitted", "95 % interval"):
         table.add_column(column, no_wrap=True)
@@ -37,7 +37,7 @@ def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
         interval = " … ".join(f"{end:.5g}" for end in row["ci95"])
         table.add_row(row["key"], f"{row['sheet']:.5g}", f"{row['value']:.5g}", interval)
     console.print(table)
-    console.print(_per_bag(result))
+    console.print(_per_bag(result, unit))
     for found in result["data_quality"]:
         if found["finding"] == SKIPPED:
             console.print(f"skipped: {found['bag']}: {found['statement']}", highlight=False, soft_wrap=True)
@@ -52,8 +52,8 @@ def show_calibration(console: Console, result: Mapping[str, Any]) -> None:
         console.print(result["picture_note"])
 
 
-def _per_bag(result: Mapping[str, Any]) -> Table:
-    table = Table(title="torque error (RMSE, N m or the unit of the axis)", title_justify="left")
+def _per_bag(result: Mapping[str, Any], unit: str) -> Table:
+    table = Table(title=f"torque error (RMSE, {unit})", title_justify="left")
     table.add_column("recording", overflow="fold")
     for column in ("seconds", "samples", "sheet", "calibrated"):
         table.add_column(column, justify="right", no_wrap=True)

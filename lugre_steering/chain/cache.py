@@ -4,13 +4,16 @@
 
 Numba believes whatever lies in its cache: an empty or cut file stops every later start, a flipped byte in the machine code may
 do anything. So each file ends with the hash of what stands before it, which Numba, a reader of pickles, does not see.
+Of processes that start together, one compiles and the others wait for what it keeps.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,6 +25,7 @@ from numba.core import caching, dispatcher
 _SEAL = hashlib.sha256
 _SEAL_BYTES = _SEAL().digest_size
 _told: set[str] = set()
+LONGEST_COMPILE_S = 180.0
 
 
 class _DamagedError(Exception):
@@ -54,16 +58,46 @@ class _SealedFile(caching.IndexDataCacheFile):
             os.unlink(self._index_path)
 
 
+class _Turn:
+    """One process at a time compiles one form of a function."""
+
+    def __init__(self, path: str) -> None:
+        self._file = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC)
+
+    def wait(self) -> bool:
+        """Until nobody else compiles it, or for so long that something is wrong there; whether that took any time."""
+        begin, waited = time.monotonic(), False
+        while not self._free() and time.monotonic() < begin + LONGEST_COMPILE_S:
+            waited = True
+            time.sleep(0.05)
+        return waited
+
+    def _free(self) -> bool:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True
+
+    def end(self) -> None:
+        os.close(self._file)
+
+
 class _KeptCode(caching.FunctionCache):
     """Numba's cache of one function; no trouble with its files ever reaches the caller, who then compiles."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         self._cache_file: _SealedFile = _SealedFile(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
+        self._turns: dict[str, _Turn] = {}
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             kept = super().load_overload(sig, target_context)
+            if kept is None and self._begin(sig):
+                kept = super().load_overload(sig, target_context)
+            if kept is not None:
+                self._end(sig)
             if kept is None and sys.stderr.isatty():  # somebody waits and wonders
                 _tell("compiling the model, once for this computer and these effects; this takes up to a minute")
             return kept
@@ -77,6 +111,21 @@ class _KeptCode(caching.FunctionCache):
             super().save_overload(sig, data)
         except (OSError, _DamagedError) as error:
             _tell(f"compiled code cannot be kept in {_folder()} ({getattr(error, 'strerror', error)}): every start compiles")
+        finally:
+            self._end(sig)
+
+    def _begin(self, sig: Any) -> bool:
+        """This process compiles now; True if another one has just done so."""
+        self._end(sig)  # an attempt that failed
+        name = hashlib.sha256(f"{self._impl.filename_base} {sig}".encode()).hexdigest()[:24]
+        with suppress(OSError):  # as save_overload will tell
+            self._turns[str(sig)] = _Turn(os.path.join(self._cache_path, f"{name}.turn"))
+            return self._turns[str(sig)].wait()
+        return False
+
+    def _end(self, sig: Any) -> None:
+        if turn := self._turns.pop(str(sig), None):
+            turn.end()
 
 
 def keep_safely() -> None:

@@ -74,9 +74,12 @@ def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (si
     return types.float64(types.float64), codegen
 
 
+_NO_DOORS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = njit(**_NO_DOORS)
+"""Decorator of what only compiled code calls: without the entrances for Python and C, a third of the time to compile the estimator."""
 law = njit(fastmath={"contract"}, error_model="numpy")
 """Decorator of every law of the chain: fused multiply-adds; divisions without the check that blocks vectorisation."""
-LAW_OPTIONS: Any = {"fastmath": {"contract"}, "error_model": "numpy"}
+LAW_OPTIONS: Any = {"fastmath": {"contract"}, "error_model": "numpy", **_NO_DOORS}
 """The same for what is compiled by way of ``overload``."""
 
 

@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from lugre_steering.chain.compiled import inner
 
 WIDTH_SIGMA = 5.0
 """Narrower, and chance alone moves a parked vehicle at 500 Hz: by 0.4 % of its torque a minute with 4."""
@@ -39,7 +40,7 @@ MOTION = np.dtype(
 )
 
 
-@njit
+@inner
 def running_maximum_excess(kappa):
     """Mean of (running maximum - true value) / sigma for white Gaussian noise on a ramp of ``kappa`` sigma per sample.
 
@@ -48,7 +49,7 @@ def running_maximum_excess(kappa):
     return 0.45 * math.log1p(1.0 / kappa)
 
 
-@njit
+@inner
 def follow(s, dt, measured, measured_rate, sigma):
     """Advance the motion state ``s`` by one sample: angle [rad] after ``dt`` [s], its noise ``sigma`` [rad] (0: none).
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lugre_steering.chain.compiled import inner
 from lugre_steering.estimator.doubt import reachable
 from lugre_steering.estimator.layout import (
     ABSURD,
@@ -37,7 +37,7 @@ _SOUND = -1
 """No reason to reject it."""
 
 
-@njit
+@inner
 def _clear(ch):
     """Forget the samples of one channel, not its counters."""
     ch.last_ns = 0
@@ -47,7 +47,7 @@ def _clear(ch):
     ch.cursor = 0
 
 
-@njit
+@inner
 def _begin_side(core, side):
     """Forget what one side has been through, but for the count of its steps outside the rubber table."""
     saturated = core.state[side].saturated
@@ -59,7 +59,7 @@ def _begin_side(core, side):
     _clear(core.channels[side])
 
 
-@njit
+@inner
 def restart(core, k):
     """Forget the past, except the counters; counted for channel ``k``, like the torques that still lack pressures."""
     for side in range(core.state.size):  # slice assignment would compile for ten seconds more
@@ -78,7 +78,7 @@ def restart(core, k):
 _DOUBTED, _SHARED, _THERE = range(3)
 
 
-@njit
+@inner
 def _other_side(core, k, stamp_ns):
     """What the other side says to a jump of angle channel ``k``: it is not there, it jumps as well, or it is there.
 
@@ -96,7 +96,7 @@ def _other_side(core, k, stamp_ns):
     return _SHARED
 
 
-@njit
+@inner
 def _absurd(c, kind, value):
     """Whether no such sensor can show this value."""
     if kind == Kind.ANGLE:
@@ -106,7 +106,7 @@ def _absurd(c, kind, value):
     return abs(value) > (HOTTEST_AIR_DEGC if kind == Kind.AIR_TEMPERATURE else 1e12)
 
 
-@njit
+@inner
 def _unusable(c, ch, stamp_ns, value):
     """Why the sample can be used under no circumstances, or ``_SOUND``."""
     if stamp_ns <= 0:
@@ -123,7 +123,7 @@ def _unusable(c, ch, stamp_ns, value):
     return BACKWARD if -c.backward_jump_ns < ahead < 0 else _SOUND
 
 
-@njit
+@inner
 def _suspect(ch, reason, stamp_ns, value):
     """Refuse the sample, until one soon after it agrees with it."""
     ch.reasons[reason] += 1
@@ -132,7 +132,7 @@ def _suspect(ch, reason, stamp_ns, value):
     return REJECTED
 
 
-@njit
+@inner
 def _jump_in_time(core, k, stamp_ns, value, follows_suspect):
     """What a stamp far from the last one means: refused, a new beginning, or ``_GOES_ON``."""
     ch = core.channels[k]
@@ -153,13 +153,13 @@ def _jump_in_time(core, k, stamp_ns, value, follows_suspect):
     return _GOES_ON
 
 
-@njit
+@inner
 def _reach(c, ch, stamp_ns):
     """How far [rad] the reading of a joint can change since the last one."""
     return c.max_rate * (stamp_ns - ch.last_ns) * 1e-9 + 10.0 * c.angle_noise
 
 
-@njit
+@inner
 def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
     """What an angle means that the joint cannot have reached: refused, a new beginning, a confirmed jump; else ``_GOES_ON``."""
     c = core.config[0]
@@ -179,7 +179,7 @@ def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
     return JUMPED
 
 
-@njit
+@inner
 def admit(core, k, stamp_ns, value):
     """Whether channel ``k`` accepts the sample, and whether its angle jumps; counts the reason if not."""
     c, ch = core.config[0], core.channels[k]

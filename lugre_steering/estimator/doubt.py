@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.step import step
 from lugre_steering.estimator.layout import ANGLE_JUMP
 from lugre_steering.estimator.preview import departs
@@ -72,7 +72,7 @@ GUARD = np.dtype(
 )
 
 
-@njit
+@inner
 def noise_of(core, side):
     """Noise [rad] of one angle sample of a side: the sheet's, or what it is where that is far more."""
     sigma = core.config[0].angle_noise
@@ -80,7 +80,7 @@ def noise_of(core, side):
     return math.sqrt(measured) if measured > (NOISY_SIGMA * sigma) ** 2 and sigma > 0.0 else sigma
 
 
-@njit
+@inner
 def watch(core, side, ch, dt, value):
     """Learn from the next reading [rad] of a side, ``dt`` [s] after the last: whether it stands still, and its noise.
 
@@ -102,14 +102,14 @@ def watch(core, side, ch, dt, value):
     g.before, g.bend = change, bend
 
 
-@njit
+@inner
 def still(core, side, stamp_ns):
     """Whether the reading of a side has not changed at all for so long that motion must have changed it."""
     g = core.guard[side]
     return g.still >= STILL_SAMPLES and stamp_ns - g.still_ns >= STILL_NS
 
 
-@njit
+@inner
 def angle_doubts(core, side, stamp_ns):
     """Doubts about the angle of a side at its newest sample."""
     g, c = core.guard[side], core.config[0]
@@ -130,7 +130,7 @@ def angle_doubts(core, side, stamp_ns):
     return found
 
 
-@njit
+@inner
 def weigh_pressures(core, stamp_ns, measured):
     """Angles that stand still while the measured torque [N m] swings by more than they can hold unseen are frozen."""
     c = core.config[0]
@@ -149,14 +149,14 @@ def weigh_pressures(core, stamp_ns, measured):
             core.guard[side].frozen = True
 
 
-@njit
+@inner
 def _supported(c):
     """Whether the measured torque has just spoken for the estimate."""
     smaller = math.sqrt(min(c.measured_now, c.estimate_now))
     return smaller > SUDDEN_SHARE * c.friction and math.sqrt(c.residual_now) < SUPPORT_SHARE * smaller
 
 
-@njit
+@inner
 def trust(core, side, dt):
     """Time passes without a jump: in the end the present state is the trusted one."""
     g = core.guard[side]
@@ -170,21 +170,21 @@ def trust(core, side, dt):
         g.fastest += max(0.0, abs(core.motion[side].omega) - g.fastest) * min(1.0, dt / FASTEST_MEMORY_S)
 
 
-@njit
+@inner
 def _stand_at(motion, value):
     """The motion estimate at a standstill there."""
     motion.center, motion.lead, motion.progress = value, 0.0, 0.0
     motion.theta, motion.omega, motion.alpha = value, 0.0, 0.0
 
 
-@njit
+@inner
 def reachable(core, side, since_ns, stamp_ns, change):
     """Whether a joint can have turned by ``change`` [rad] between two stamps, at the rates that it has shown."""
     g, sigma = core.guard[side], core.config[0].angle_noise
     return abs(change) <= FASTER * g.fastest * (stamp_ns - since_ns) * 1e-9 + UNSEEN_SIGMA * sigma
 
 
-@njit
+@inner
 def re_anchor(core, side, ch, stamp_ns, value):
     """The angle of a side jumps to ``value`` [rad], confirmed: no slip, no heat, unless the joint has really gone there.
 
@@ -221,7 +221,7 @@ def re_anchor(core, side, ch, stamp_ns, value):
     _stand_at(motion, value)
 
 
-@njit
+@inner
 def watch_line(ch, stamp_ns, value):
     """Learn from the next reading of a line how often its readings repeat, and whether it stands still now."""
     same = ch.last_ns != 0 and value == ch.last_value
@@ -234,20 +234,20 @@ def watch_line(ch, stamp_ns, value):
     ch.last_value = value
 
 
-@njit
+@inner
 def line_frozen(ch):
     """Whether a line whose readings hardly ever repeat has given the same one for a while."""
     return ch.repeats < REPEATING and ch.still >= STILL_SAMPLES and ch.last_ns - ch.still_ns >= STILL_NS
 
 
-@njit
+@inner
 def _sudden(c):
     """Whether residuals have just become as large as the torque, and that is large."""
     larger = math.sqrt(max(c.measured_now, c.estimate_now))
     return larger > SUDDEN_SHARE * c.friction and math.sqrt(c.residual_now) > LARGE_SHARE * larger
 
 
-@njit
+@inner
 def weigh_residual(c, stamp_ns, measured, residual):
     """Learn from the next residual [N m] how large residuals and torques have been of late."""
     dt = (stamp_ns - c.residual_ns) * 1e-9
@@ -268,7 +268,7 @@ def weigh_residual(c, stamp_ns, measured, residual):
     c.estimate_square += ((measured - residual) ** 2 - c.estimate_square) * weight
 
 
-@njit
+@inner
 def standing_doubts(core, stamp_ns):
     """Doubts about the whole vehicle: a residual beyond the bound of the calibration, or as large as the torque; the plan."""
     c, found = core.config[0], 0

@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.step import step
 
 PREVIEW_STEPS = 20
@@ -16,7 +16,7 @@ BEND_NS = 50_000_000
 """Accelerations of a plan are means over so long to either side: the corners between its points have none."""
 
 
-@njit
+@inner
 def _planned(core, side, stamp_ns):
     """Planned angle of a side at a time, linear between points, held at the last; NaN before or without a plan."""
     n = core.config[0].plan_size
@@ -31,7 +31,7 @@ def _planned(core, side, stamp_ns):
     return core.plan_theta[side, i - 1] + weight * (core.plan_theta[side, i] - core.plan_theta[side, i - 1])
 
 
-@njit
+@inner
 def departs(core, side, stamp_ns):
     """Whether the plan is farther from the present angle of a side than it may be, or than can be gone before it begins."""
     c = core.config[0]
@@ -41,7 +41,7 @@ def departs(core, side, stamp_ns):
     return abs(at - core.motion[side].theta) > reach
 
 
-@njit
+@inner
 def _planned_acceleration(core, side, stamp_ns):
     """Of a side at a time [rad/s2]; 0 before the plan and where it ends."""
     at = _planned(core, side, stamp_ns)
@@ -49,7 +49,7 @@ def _planned_acceleration(core, side, stamp_ns):
     return 0.0 if math.isnan(bend) else bend / (BEND_NS * 1e-9) ** 2
 
 
-@njit
+@inner
 def preview(core, side, stamp_ns):
     """Torque [N m] that this side will need one horizon ahead: along the plan, or at the present rate without one.
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lugre_steering.chain.compiled import inner
 from lugre_steering.estimator.layout import RATE
 
 MEMORY_S = 3.0
@@ -34,7 +34,7 @@ TRUST = np.dtype(
 )
 
 
-@njit
+@inner
 def believed(s, ch, c, dt, value, rate):
     """The ``rate`` [rad/s] of an accepted sample of channel ``ch``, ``dt`` [s] and ``value`` [rad] after the last; NaN: not used.
 
@@ -79,7 +79,7 @@ def believed(s, ch, c, dt, value, rate):
     return _counted(ch, rate, credible and not s.refuted)
 
 
-@njit
+@inner
 def _counted(ch, rate, used):
     if used:
         return rate

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from lugre_steering.chain.compiled import inner
 
 LONGEST_S = 0.05
 
 
-@njit
+@inner
 def release(core, e):
     """Replace the wanted feed-forward of an estimate by what may be acted upon.
 

@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.hydraulics import moment_arm
 from lugre_steering.chain.step import arm_factor, line_error
 from lugre_steering.estimator.doubt import weigh_pressures, weigh_residual
 
 
-@njit
+@inner
 def measured_torque(core, e, value):
     """Torque [N m] on the steering axis from the interpolated line values (or the torque sensor as it is)."""
     c = core.config[0]
@@ -31,7 +30,7 @@ def measured_torque(core, e, value):
     return torque * c.pressure_gain
 
 
-@njit
+@inner
 def form_residuals(core, first_line, residuals, count):
     """Form every residual whose pressures have all come, in stamp order."""
     c = core.config[0]

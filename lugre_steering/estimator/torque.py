@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.lag import lag_weights
 from lugre_steering.chain.rates import follow
 from lugre_steering.chain.step import step
@@ -30,7 +29,7 @@ from lugre_steering.estimator.release import release
 LONGEST_PERIOD_NS = 50_000_000  # of a sensor whose stamps may pair by half their period
 
 
-@njit
+@inner
 def _pair(core):
     """Drop waiting samples that can get no partner; stamp of the pair now at the head of the sides' queues, or 0."""
     sides, ring = core.waiting.shape
@@ -57,7 +56,7 @@ def _pair(core):
             return latest
 
 
-@njit
+@inner
 def _complete(core, k, stamp_ns, e):
     """Write the estimate of the pair at the head of the sides' queues, and keep it until its pressures come."""
     c, ring = core.config[0], core.waiting.shape[1]
@@ -96,7 +95,7 @@ def _complete(core, k, stamp_ns, e):
     c.pending_count += 1
 
 
-@njit
+@inner
 def _elapsed(c, ch, state, stamp_ns):
     """Time [s] since the last sample of the side; the clock of a side without any begins with the first side's."""
     if c.start_ns == 0 or stamp_ns < c.start_ns:
@@ -108,7 +107,7 @@ def _elapsed(c, ch, state, stamp_ns):
     return ch.period_ns * 1e-9
 
 
-@njit
+@inner
 def _seat(ch, ring):
     """Place among the waiting samples of the side for one more; the oldest makes room."""
     if ch.head - ch.cursor == ring:
@@ -118,7 +117,7 @@ def _seat(ch, ring):
     return (ch.head - 1) % ring
 
 
-@njit
+@inner
 def _wait(waiting, stamp_ns, state, motion, output):
     """Keep what the side has come to until the other side has too."""
     waiting.stamp_ns = stamp_ns
@@ -128,7 +127,7 @@ def _wait(waiting, stamp_ns, state, motion, output):
     waiting.temperature = output.temperature
 
 
-@njit
+@inner
 def _outside(c, state, motion, saturated):
     """Doubts about a side outside its rubber table (``saturated``: steps so far), or what its calibration has seen."""
     doubts = TABLE if state.saturated > saturated else 0
@@ -137,7 +136,7 @@ def _outside(c, state, motion, saturated):
     return doubts
 
 
-@njit
+@inner
 def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp.
 

@@ -32,7 +32,7 @@ def show_fleet(console: Console, result: Mapping[str, Any], out: Path) -> None:
         console.print(f"quarantine: {len(result['quarantine']) - MOST_LINES} more in {out / 'scores.parquet'}")
     if result["other_version"] is not None:
         console.print(f"{len(result['changes'])} differences to {result['other_version']}", highlight=False)
-    how = f"in {result['seconds']:.1f} s with {result['workers']} workers"
+    how = f"in {result['seconds']:.1f} s with {result['workers']} worker{'s' * (result['workers'] != 1)}"
     console.print(f"{result['examined']} recordings examined, {result['cached']} known, {how}", highlight=False, soft_wrap=True)
 
 

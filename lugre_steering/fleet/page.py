@@ -167,7 +167,7 @@ def _trends(fleet: Fleet, records: Sequence[Record], charts: Charts) -> str:
     begun = datetime.fromtimestamp(start * DAY_S).date()
     over_dates = _chart(scored, lambda record: _days(record) - start, f"days since {begun}")
     warm = {vehicle: [record for record in own if record["air_degC"] is not None] for vehicle, own in scored.items()}
-    over_air = _chart(warm, lambda record: float(record["air_degC"]), "air temperature [degC]")
+    over_air = _chart(warm, lambda record: float(record["air_degC"]), "air temperature (degC)")
     left = f'<p class="note">The first {MOST_VEHICLES} vehicles.</p>' if len(fleet.vehicles) > MOST_VEHICLES else ""
     said = "Root mean square of measured minus estimated torque of every recording"
     return found + charts.place(over_dates, f"{said} over its date") + charts.place(over_air, f"{said} over the air temperature") + left

@@ -14,7 +14,8 @@ from rich.table import Table
 def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     """The summary as a table, and remarks below it."""
     unit = summary["torque_unit"]
-    table = Table(title="replay: estimate against measured torque", title_justify="left")
+    look: Any = {"box": None, "padding": (0, 2, 0, 0), "header_style": "bold"}  # names whole at 80 columns
+    table = Table(title="replay: estimate against measured torque", title_justify="left", **look)
     table.add_column("recording", overflow="fold")
     for column in ("seconds", "torques", f"RMSE [{unit}]", "R2", f"bias [{unit}]"):
         table.add_column(column, justify="right", no_wrap=True)
@@ -22,7 +23,6 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
         table.add_row(bag["name"], f"{bag['duration_s']:.1f}", str(bag["estimates"]), *_fit(bag["fit"]))
     if len(summary["bags"]) > 1:
         seconds, torques = (sum(bag[key] for bag in summary["bags"]) for key in ("duration_s", "estimates"))
-        table.add_section()
         table.add_row("all", f"{seconds:.1f}", str(torques), *_fit(summary["overall"]))
     console.print(table)
     for line in _remarks(summary):

@@ -94,12 +94,15 @@ def torque(vehicle: Vehicle, value: float) -> str:
 
 
 def estimate(value: float | None, ends: Sequence[float | None] | None) -> tuple[str, str]:
-    """Value and interval, both with as many digits as tell the ends of the interval apart."""
+    """Value and interval, with as many digits as tell the ends of the interval apart, all with a power of ten where one needs it."""
     if value is None or ends is None or None in ends or not ends[0] < ends[1]:  # type: ignore[operator]
         return number(value), "-" if ends is None else " … ".join(number(end) for end in ends)
     largest = max(abs(value), *(abs(end) for end in ends if end is not None))
     digits = min(max(math.floor(math.log10(largest / (ends[1] - ends[0]))) + 3, 3), 9)  # type: ignore[operator]
-    return number(value, digits), " … ".join(number(end, digits) for end in ends)
+    texts = [number(each, digits) for each in (value, *ends)]
+    if any("e" in text for text in texts):
+        texts = [f"{each:.{digits - 1}e}" if each else text for each, text in zip((value, *ends), texts, strict=True)]
+    return texts[0], " … ".join(texts[1:])
 
 
 def percent(share: float | None) -> str:

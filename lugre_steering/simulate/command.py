@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from lugre_steering import units
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.bag.reader import bag_name
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.files import output_folder, refuse_foreign, write_record
 from lugre_steering.recording import Kind
+from lugre_steering.report import words
 from lugre_steering.report.available import no_pictures
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import manoeuvres, plant
@@ -137,14 +141,24 @@ def show_catalogue(console: Console) -> None:
     console.print(table)
 
 
-def show_run(console: Console, result: Mapping[str, Any]) -> None:
+def show_run(console: Console, result: Mapping[str, Any], vehicle: Vehicle) -> None:
     """What was simulated, in a few lines."""
-    table = Table(title="synthetic recording", show_header=False, title_justify="left")
-    for key, value in result.items():
-        if value not in (None, {}):
-            numbers = value if isinstance(value, list) else [value]
-            table.add_row(key, ", ".join(f"{n:.6g}" if isinstance(n, float) else str(n) for n in numbers))
+    table = Table(title="synthetic recording", show_header=False, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    angle = words.coordinate_axis(vehicle, "steering angle")
+    table.add_row("duration", words.quantity(result["duration_s"], "s"))
+    table.add_row(f"largest {units.words(vehicle, 'torque')}", words.torque(vehicle, result["largest_torque_Nm"]))
+    table.add_row(f"largest {angle.name}", words.quantity(math.radians(result["largest_angle_deg"]) * angle.scale, angle.unit))
+    if result["largest_pressure_Pa"] is not None:
+        table.add_row("largest pressure", words.quantity(1e-5 * result["largest_pressure_Pa"], "bar"))
+    if vehicle.rubber is not None:
+        ends = " and ".join(words.number(value, 3) for value in result["rubber_at_end_degC"])
+        table.add_row("rubber at the end", f"{ends} degC")
+    for id_, parameters in result["effects"].items():
+        table.add_row(CATALOGUE[id_].title, ", ".join(f"{name} = {words.number(value)}" for name, value in parameters.items()))
     console.print(table)
+    if result["picture_note"]:
+        console.print(result["picture_note"])
+    console.print(f"bag in {result['bag']}", highlight=False, soft_wrap=True)
 
 
 def show_outcomes(console: Console, outcomes: Sequence[Outcome], out: Path) -> None:

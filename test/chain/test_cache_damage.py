@@ -75,6 +75,35 @@ def test_a_lost_file_is_made_anew_without_a_word(folder: Path, capsys: pytest.Ca
     assert capsys.readouterr().err == ""
 
 
+START = """
+import sys, time
+from pathlib import Path
+import numba
+from lugre_steering.chain import compiled
+from lugre_steering.chain.lag import lag_weights as law
+
+started = numba.njit(cache=True)(law.py_func)
+print("here", flush=True)
+sys.stdin.readline()
+started(0.01, 0.1)
+print(sum(started.stats.cache_hits.values()))
+"""
+
+
+def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", START]
+    started = [subprocess.Popen(command, env=env, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) for _ in range(3)]
+    for process in started:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "here\n"
+    for process in started:
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+    assert sorted(process.communicate(timeout=60.0)[0] for process in started) == ["0\n", "1\n", "1\n"]
+
+
 def test_a_disk_that_is_full_costs_the_cache_only(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

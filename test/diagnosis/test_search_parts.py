@@ -26,6 +26,12 @@ def problem() -> Problem:
     return small_problem()
 
 
+@pytest.fixture(scope="module")
+def slower() -> Problem:
+    """The same drive at 40 Hz, for whole searches."""
+    return small_problem(40.0)
+
+
 @pytest.mark.parametrize("correlation", [[1.0], [1.0, 0.6, 0.3, 0.1], [1.0, 0.99, -0.99, 0.9]])
 def test_drawn_noise_has_the_level_and_stays_finite_for_any_estimate(correlation: list[float]) -> None:
     drawn = noise.QuietNoise(2.0, np.array(correlation)).draw(200_000, np.random.default_rng(1))
@@ -146,11 +152,11 @@ def test_a_pattern_is_sought_even_where_noise_seems_to_explain_all(problem: Prob
 
 
 def test_a_build_up_that_leads_nowhere_begins_again_from_the_best_fingerprint(
-    problem: Problem, monkeypatch: pytest.MonkeyPatch
+    slower: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wrong effect that happens to fit best alone, and beside which nothing stands, does not hide the two right ones."""
     truth = [effect("line_loss_quadratic", c=3e4), effect("slope_bias", torque=200.0)]
-    hidden = with_torque(problem, problem.predict_all(problem.start(), truth))
+    hidden = with_torque(slower, slower.predict_all(slower.start(), truth))
     roles = split.split(hidden)
     fitted = np.where(roles.fit, weight(hidden), 0.0)
     draws = SIGMA * np.random.default_rng(4).standard_normal((16, hidden.measured.size))
@@ -223,16 +229,16 @@ def test_no_length_of_recording_makes_a_law_exact(problem: Problem) -> None:
     assert verify.form_spread(problem, quieter, 10.0 * weight(problem))[-1] == pytest.approx(small, rel=1e-6)
 
 
-def test_what_stands_is_named_though_as_much_again_is_unlisted(problem: Problem) -> None:
+def test_what_stands_is_named_though_as_much_again_is_unlisted(slower: Problem) -> None:
     """A loss of the lines stays beside a torque that no entry makes and that is nearly half of it; alone, that torque is no name."""
-    theta, omega = (np.concatenate([getattr(run, key).mean(axis=0) for run in problem.runs]) for key in ("theta", "omega"))
+    theta, omega = (np.concatenate([getattr(run, key).mean(axis=0) for run in slower.runs]) for key in ("theta", "omega"))
     ripple = 350.0 * np.sin(2.0 * np.pi * theta / np.radians(3.7)) * np.sign(omega)
-    listed = problem.predict_all(problem.start(), [effect("line_loss_quadratic", c=3e4)])
-    roles, draws = split.split(problem), SIGMA * np.random.default_rng(4).standard_normal((16, problem.measured.size))
-    seen = noise.Noise(np.full(problem.measured.size, SIGMA), draws, 0.0)
-    fitted = np.where(roles.fit, weight(problem), 0.0)
-    for torque, names in ((listed + ripple, {"line_loss_quadratic"}), (problem.predict_all(problem.start()) + ripple, set())):
-        hidden = with_torque(problem, torque)
+    listed = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=3e4)])
+    roles, draws = split.split(slower), SIGMA * np.random.default_rng(4).standard_normal((16, slower.measured.size))
+    seen = noise.Noise(np.full(slower.measured.size, SIGMA), draws, 0.0)
+    fitted = np.where(roles.fit, weight(slower), 0.0)
+    for torque, names in ((listed + ripple, {"line_loss_quadratic"}), (slower.predict_all(slower.start()) + ripple, set())):
+        hidden = with_torque(slower, torque)
         found = build_up.search(hidden, seen, roles, fit(hidden, fitted))
         assert {item.score.candidate.effect.id for item in found.found} == names
 

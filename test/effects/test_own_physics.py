@@ -36,7 +36,8 @@ def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[s
 
 
 def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path) -> None:
-    made = run("simulate", "double-cycle", "--effect", "chain_ripple:torque=1500,pitch=0.11", "--effects", RIPPLE, "--out", tmp_path)
+    ripple = ("--effect", "chain_ripple:torque=1500,pitch=0.11", "--effects", RIPPLE)
+    made = run("simulate", "double-cycle", *ripple, "--rate", "50", "--out", tmp_path)
     assert made.returncode == 0, made.stderr
     bag = tmp_path / "synthetic_double_cycle"
     done = run("diagnose", bag, "--vehicle", SHEET, "--effects", RIPPLE, "--out", tmp_path / "d", "--no-report", "--json")

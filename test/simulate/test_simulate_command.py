@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,6 +58,28 @@ def test_a_manoeuvre_and_the_angles_of_its_own_bag(tmp_path: Path) -> None:
 
 
 SHORT = "segments: [{sweep: {to_deg: 10, rate_deg_s: 8, hold_s: 1}}]"
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "effect", "told"),
+    [
+        (
+            "test_vehicle.yaml", ("--effect", "slope_bias:torque=1000"),
+            (r"largest torque +[\d.]+ kN m", r"steering angle +1[01][.\d]* deg", "torque = 1000"),  # the inner track turns further
+        ),
+        ("linear_axis_example.yaml", (), (r"largest force +[\d.]+ N\b", r"largest position +17\d mm")),  # 10 deg are 0.1745 rad
+    ],
+)
+def test_what_was_simulated_is_told_in_words_and_the_units_of_the_machine(
+    tmp_path: Path, vehicle: str, effect: tuple[str, ...], told: tuple[str, ...]
+) -> None:
+    own = tmp_path / "mine.yaml"
+    own.write_text(SHORT, encoding="utf-8")
+    code, out, err = invoke(str(own), "--vehicle", str(config_folder() / vehicle), "--out", str(tmp_path / "a"), *effect)
+    assert code == 0, err
+    for pattern in told:
+        assert re.search(pattern, out), out
+    assert "_" not in out.partition("bag in")[0]
 
 
 def test_names_with_dots_do_not_meet(tmp_path: Path) -> None:
