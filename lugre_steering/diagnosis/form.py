@@ -33,13 +33,15 @@ WARMTH, WARMTH_K = 0.05, 20.0
 """Level per so many kelvin, in which batches of one rubber differ."""
 RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
 """Share of the torque that follows so many seconds late: the loss factor of treads."""
+RELAXATION = "its relaxation"
 SMALL = 0.2
 """Share of a freedom by which its effect on the torque is found: small enough to be linear."""
 
 
 class Freedom(NamedTuple):
-    """Shapes f (k, KNOTS) that a channel may have along a coordinate, at their largest."""
+    """Shapes f (k, KNOTS) that a channel may have along a coordinate, at their largest; ``words``: what that is of the friction."""
 
+    words: str
     channel: str
     coordinate: str
     low: float
@@ -47,8 +49,8 @@ class Freedom(NamedTuple):
     shapes: Array
 
 
-def bent(problem: Problem, fitted: Fit) -> Problem:
-    """The problem with these freedoms, as the chain shows them at a fit."""
+def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
+    """The problem with these freedoms, as the chain shows them at a fit; and what each is, in words."""
     lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=1)
     place, x = len(problem.vehicle.laws), fitted.x[: problem.nuisances]
     bags = range(len(problem.runs))
@@ -63,7 +65,8 @@ def bent(problem: Problem, fitted: Fit) -> Problem:
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
-    return Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
+    words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S))
+    return Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns)), words
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
@@ -76,16 +79,19 @@ def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
     # Places that crowd around the reversal, where the presliding bends most.
     near = np.array([np.interp(np.sqrt(way), np.linspace(0.0, np.sqrt(REACH), 7), hat) for hat in np.eye(7)])
     found = [
-        Freedom("friction_level", "abs_rate", 0.0, fast, np.array([STRENGTHENING * np.log1p(rate), STRIBECK * np.exp(-rate)])),
-        Freedom("friction_level", "angle", low, high, GROUND * _places(low, high, presliding)),
-        Freedom("presliding_stiffness", "since_reversal", 0.0, far, SHARPER * near[:4]),
-        Freedom("friction_level", "since_reversal", 0.0, far, ROUNDER * near[:5]),
+        Freedom(
+            "how it follows the rate", "friction_level", "abs_rate", 0.0, fast,
+            np.array([STRENGTHENING * np.log1p(rate), STRIBECK * np.exp(-rate)]),
+        ),
+        Freedom("its level along the ground", "friction_level", "angle", low, high, GROUND * _places(low, high, presliding)),
+        Freedom("its presliding", "presliding_stiffness", "since_reversal", 0.0, far, SHARPER * near[:4]),
+        Freedom("its presliding", "friction_level", "since_reversal", 0.0, far, ROUNDER * near[:5]),
     ]
     if problem.vehicle.rubber is not None:
         cold, hot = -60.0, 140.0
         warmer = (np.linspace(cold, hot, laws.KNOTS) - problem.temperatures(0, fitted.x)[0]) / WARMTH_K
         shapes = WARMTH * np.array([warmer, 0.5 * warmer * np.abs(warmer)])
-        found.append(Freedom("friction_level", "rubber_temperature", cold, hot, shapes))
+        found.append(Freedom("how it follows the temperature", "friction_level", "rubber_temperature", cold, hot, shapes))
     return found
 
 

@@ -52,17 +52,19 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
         return done
     progress("beside the friction law's own form")
     form = _Form.of(problem, noise, roles, found.baseline)
-    beside = Finished(form.problem, form.noise, form.roles, search(form.problem, form.noise, form.roles, form.baseline, progress))
+    there = search(form.problem, form.noise, form.roles, form.baseline, progress)
+    beside = Finished(form.problem, form.noise, form.roles, there, form=form.words)
     # A vehicle file can hold names, not the freedoms.
-    final = fit(problem, done.fitted, beside.found.final.effects, beside.found.final.x[: problem.nuisances])
-    return replace(done, found=replace(beside.found, baseline=found.baseline, final=final), beside_form=beside)
+    final = fit(problem, done.fitted, there.final.effects, there.final.x[: problem.nuisances])
+    return replace(done, found=replace(there, baseline=found.baseline, final=final), beside_form=beside)
 
 
 @dataclass(frozen=True)
 class _Form:
-    """A problem with the freedoms of the friction law, of few samples, and its recalibrated baseline."""
+    """A problem with the freedoms of the friction law (``words`` for each), of few samples, and its recalibrated baseline."""
 
     problem: Problem
+    words: tuple[str, ...]
     noise: Noise
     roles: Split
     baseline: Fit
@@ -70,11 +72,11 @@ class _Form:
     @staticmethod
     def of(problem: Problem, noise: Noise, roles: Split, baseline: Fit) -> _Form:
         thin, kept = thinned(problem, FORM_SAMPLES)
-        freer = bent(thin, baseline)
+        freer, words = bent(thin, baseline)
         noise = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
         roles = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
         start = np.concatenate([baseline.x, np.zeros(freer.bends.shape[1])])
-        return _Form(freer, noise, roles, fit(freer, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=start))
+        return _Form(freer, words, noise, roles, fit(freer, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=start))
 
     @property
     def explains_most(self) -> bool:

@@ -75,7 +75,7 @@ def conclude(
     causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
     advice = next_experiment(done, verdict, whole)
-    headline, statistics = statement(done, verdict, effects, judged, causal, left.text, ended, law, advice)
+    headline, statistics = statement(done, verdict, effects, judged, causal, left, ended, law, advice)
     return Diagnosis(
         schema=SCHEMA,
         bags=tuple(run.name for run in problem.runs),

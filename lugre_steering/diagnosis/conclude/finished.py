@@ -28,7 +28,9 @@ class Finished:
     roles: Split
     found: Search
     beside_form: Finished | None = None
-    """The same beside the freedoms of the friction law (``form``), where names alone did not explain all to the noise."""
+    """The same beside the freedoms of the friction law, where names alone did not explain all to the noise."""
+    form: tuple[str, ...] = ()
+    """What each of these freedoms is, in words; of a problem that has them."""
 
     @property
     def compared(self) -> Finished:

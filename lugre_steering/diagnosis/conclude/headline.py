@@ -30,7 +30,7 @@ def missing(done: Finished, effects: Sequence[NamedEffect], advice: Experiment |
     acts += dict.fromkeys(CHECKS[effect.stage] for effect in effects if effect.stage in CHECKS)
     if advice is not None:
         acts.append(f"drive {advice.manoeuvre.split(':')[0]} next, which tells apart what may be confused")
-    return f"Missing from the model: {found}. {_sentence(acts)}"
+    return f"Missing from the model: {found}. {sentence(", and ".join(acts))}"
 
 
 def lawful(said: str) -> str:
@@ -46,16 +46,16 @@ def unlisted(done: Finished, error: float, said: str) -> str:
     )
 
 
-def consistent(done: Finished, error: float) -> str:
-    """For a model that leaves nothing but noise: ``error`` [N m] on held-out data."""
+def consistent(done: Finished, error: float, left: str) -> str:
+    """For a model that leaves no physics: ``error`` [N m] on held-out data, and what is ``left``."""
+    more = f" {sentence(left)}" if done.beside_form else ""
     return (
         f"No missing physics is seen: recalibrated, the model explains the torque to {done.torque(error)} "
-        f"({_share(error / done.amplitude)}). Use augmented.yaml, the recalibrated vehicle file."
+        f"({_share(error / done.amplitude)}).{more} Use augmented.yaml, the recalibrated vehicle file."
     )
 
 
-def _sentence(acts: Sequence[str]) -> str:
-    text = ", and ".join(acts)
+def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 

@@ -18,7 +18,7 @@ from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
-from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.fit import Fit, fit, normalised
 from lugre_steering.recording import Array
 
 FORETELLS = 0.1
@@ -27,6 +27,8 @@ TELLING = 0.5
 """Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
 FORMULA = 0.02
 """Share of the held-out energy that a formula must explain to be proposed."""
+MOSTLY = 0.3
+"""Share of the largest from which a freedom of the friction law is told."""
 LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
 """Unlisted structure is located where its level over so many seconds exceeds both: noise levels, and a share of its peak."""
 
@@ -51,6 +53,11 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     pattern, gain = _pattern(done, final)
     if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
+        if done.form:
+            description = (
+                "what is left beyond noise is within what friction of another form than the model's does, "
+                f"mostly {_form(done, final)}"
+            )
         return LeftOver(Unexplained(False, description), "", False)
     if not final.effects:
         # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
@@ -82,6 +89,23 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
     )
     where = _where(done, axes, axis, residual, shape)
     return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
+
+
+def _form(done: Finished, final: Fit) -> str:
+    """Which freedoms of the friction law do most of what they do, in words."""
+    first, used = done.problem.first_bend, done.weight > 0.0
+    columns = done.problem.bends * final.x[first : done.problem.nuisances] * done.weight[:, None]
+    basis = np.linalg.qr(normalised(final.jacobian[used, :first]))[0]
+    energy = {
+        words: _beyond(columns[used][:, [word == words for word in done.form]].sum(axis=1), basis) for words in dict.fromkeys(done.form)
+    }
+    most = max(energy.values())
+    return " and ".join(words for words in sorted(energy, key=lambda words: -energy[words]) if energy[words] > MOSTLY * most)
+
+
+def _beyond(values: Array, basis: Array) -> float:
+    """Energy of values (n,) beyond an orthonormal basis (n, k)."""
+    return float(np.sum((values - basis @ (basis.T @ values)) ** 2))
 
 
 def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> LeftOver:

@@ -11,6 +11,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.conclude import headline
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.left_over import LeftOver
 from lugre_steering.diagnosis.conclude.verify import Judged
 from lugre_steering.diagnosis.result import Experiment, NamedEffect, Verdict
 from lugre_steering.effects.registry import CATALOGUE
@@ -45,7 +46,7 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
 
 
 def statement(
-    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str,
+    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver,
     ended: Sequence[str], law: str, advice: Experiment | None,
 ) -> tuple[str, str]:
     """Headline and statistics, for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
@@ -54,12 +55,12 @@ def statement(
     floor = f"Noise alone makes {done.torque(done.noise.floor)}."
     if verdict == "consistent":
         unseen = "From what size on an effect would have shown: detection_limits of diagnosis.json."
-        return headline.consistent(done, judged.before), f"{floor} {unseen}"
+        return headline.consistent(done, judged.before, left.entry.description), f"{floor} {unseen}"
     if verdict == "unlisted_physics":
         if law:
-            rest = f"{left[:1].upper()}{left[1:]}."
+            rest = f"{left.text[:1].upper()}{left.text[1:]}."
             return headline.lawful(law), f"{_gain(done, judged, 'the law')} {floor} {rest}"
-        return headline.unlisted(done, judged.before, left), f"{floor} Where it lives: unexplained in diagnosis.json."
+        return headline.unlisted(done, judged.before, left.text), f"{floor} Where it lives: unexplained in diagnosis.json."
     told = headline.missing(done, effects, advice, not ended)
     them = "it" if len(effects) == 1 else "them"
     return told, " ".join([_gain(done, judged, them), floor, *_remarks(done, effects, judged, causal, left, ended)])
@@ -74,7 +75,7 @@ def _gain(done: Finished, judged: Judged, with_: str) -> str:
 
 
 def _remarks(
-    done: Finished, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: str, ended: Sequence[str]
+    done: Finished, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver, ended: Sequence[str]
 ) -> list[str]:
     """What limits named effects, one sentence each."""
     remarks = [f"Without looking ahead, as the live node must, the error on all samples is {done.torque(causal)}."]
@@ -97,6 +98,8 @@ def _remarks(
         verb = "does" if len(ended) == 1 else "do"
         last = done.problem.runs[-1].name
         remarks.append(f"{' and '.join(ended)} {verb} not act in {last}, the last recording: augmented.yaml is without.")
-    if left:
-        remarks.append(f"Structure is left: {left}.")
+    if left.structured:
+        remarks.append(f"Structure is left: {left.text}.")
+    elif done.beside_form:
+        remarks.append(headline.sentence(left.entry.description))
     return remarks
