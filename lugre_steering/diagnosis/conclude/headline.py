@@ -30,7 +30,7 @@ def missing(done: Finished, effects: Sequence[NamedEffect], advice: Experiment |
     acts += dict.fromkeys(CHECKS[effect.stage] for effect in effects if effect.stage in CHECKS)
     if advice is not None:
         acts.append(f"drive {advice.manoeuvre.split(':')[0]} next, which tells apart what may be confused")
-    return f"Missing from the model: {found}. {sentence(", and ".join(acts))}"
+    return f"Missing from the model: {found}. {sentence(', and '.join(acts))}"
 
 
 def lawful(said: str) -> str:
