@@ -75,8 +75,11 @@ class _Form:
         freer, words = bent(thin, baseline)
         noise = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
         roles = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
-        start = np.concatenate([baseline.x, np.zeros(freer.bends.shape[1])])
-        return _Form(freer, words, noise, roles, fit(freer, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=start))
+        weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
+        # Recalibration was bent to imitate what is missing; from there the way back may be closed.
+        starts = [np.concatenate([baseline.x, np.zeros(freer.bends.shape[1])]), freer.start()]
+        fits = [fit(freer, weight, start=start, linearisations=20) for start in starts]
+        return _Form(freer, words, noise, roles, min(fits, key=lambda each: each.cost))
 
     @property
     def explains_most(self) -> bool:

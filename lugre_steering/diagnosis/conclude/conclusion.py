@@ -42,7 +42,7 @@ def conclude(
     # and an improvement that may be none is none.
     clock = _clocks_alone(found.final, len(problem.runs))
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
-    stuck = not is_rig(problem.vehicle) and bool(at_bounds(problem, found.final.x, LEVELS))
+    stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
     final = found.final if named or clock else found.baseline
     whole = _whole(done, final)
