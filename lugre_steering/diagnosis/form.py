@@ -84,9 +84,10 @@ def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
             np.array([STRENGTHENING * np.log1p(rate), STRIBECK * np.exp(-rate)]),
         ),
         Freedom("its level along the ground", "friction_level", "angle", low, high, GROUND * _places(low, high, presliding)),
-        Freedom("its presliding", "presliding_stiffness", "since_reversal", 0.0, far, SHARPER * near[:4]),
-        Freedom("its presliding", "friction_level", "since_reversal", 0.0, far, ROUNDER * near[:5]),
     ]
+    for way_of in ("since_reversal", "slip"):  # and on the first sweep, which no reversal has prepared
+        found.append(Freedom("its presliding", "presliding_stiffness", way_of, 0.0, far, SHARPER * near[:4]))
+        found.append(Freedom("its presliding", "friction_level", way_of, 0.0, far, ROUNDER * near[:5]))
     if problem.vehicle.rubber is not None:
         cold, hot = -60.0, 140.0
         warmer = (np.linspace(cold, hot, laws.KNOTS) - problem.temperatures(0, fitted.x)[0]) / WARMTH_K

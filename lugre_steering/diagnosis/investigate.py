@@ -38,15 +38,15 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
     repeated = repeated_motion(problem, NULL_DRAWS, seed)
     noise, roles, baseline = recalibrate(problem, repeated, seed)
     form = _Form.of(problem, noise, roles, baseline) if loudness(problem, noise, baseline).loud else None
-    again = form is None or not form.explains_most
-    found = search(problem, noise, roles, baseline, progress, again=again)
+    alone = form is not None and form.explains_most
+    found = search(problem, noise, roles, baseline, progress, alone=alone)
     for _ in range(NOISE_ROUNDS if found.found else 0):
         quieter = noise_model(problem, found.final.x, found.final.effects, repeated, seed=seed)
         if quieter.floor > QUIETER * noise.floor:
             break
         noise = quieter
         baseline = fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=found.baseline.x)
-        found = search(problem, noise, roles, baseline, progress, again=again)
+        found = search(problem, noise, roles, baseline, progress, alone=alone)
     done = Finished(problem, noise, roles, found)
     if not structured(done, found.final):
         return done

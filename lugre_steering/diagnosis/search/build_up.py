@@ -84,27 +84,32 @@ class Search:
 
 def search(
     problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None,
-    *, again: bool = True,
+    *, alone: bool = False,
 ) -> Search:
-    """Build up from the best first effect, and (``again``) where that does not stand from those with the best fingerprints."""
+    """Build up from the best first effect, and where that does not stand from those with the best fingerprints.
+
+    ``alone``: only one that explains all but noise by itself is of interest.
+    """
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
     samples, doubt = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt
 
     def standing(built: _Built) -> int:
+        if alone and built.steps and cost(problem, built.steps[-1][0], weight) > (2.0 + doubt) * samples:
+            return len(given)
         return max(len(given), _keep(built.steps, problem, weight, cost(problem, built.baseline, weight), samples, doubt))
 
     given = _rig_steps(problem, noise, weight, baseline, samples, progress) if is_rig(problem.vehicle) else []
-    built = _build_up(problem, noise, split, baseline, None, progress, given)
+    built = _build_up(problem, noise, split, baseline, None, progress, given, most=1 if alone else MAX_EFFECTS)
     first, tried, needed, kept = built.first, built.trials, bool(built.steps), standing(built)
     builds = [built]
-    for opening in _others(problem, weight, built) if again and needed and not kept else ():
+    for opening in _others(problem, weight, built) if needed and not kept and not alone else ():
         progress(f"building up again from {opening.trials[0].candidate.label}")
         built = _build_up(problem, noise, split, built.baseline, opening, progress)
         tried, kept = tried + built.trials, standing(built)
         builds.append(built)
         if kept:
             break
-    if needed and not kept:
+    if needed and not kept and not alone:
         kept, built = max(((_most(problem, noise, split, each), each) for each in builds), key=lambda found: found[0])
     baseline, start_cost = built.baseline, cost(problem, built.baseline, weight)
     excess = start_cost - samples
@@ -176,9 +181,9 @@ def _others(problem: Problem, weight: Array, built: _Built) -> list[_First]:
 
 def _build_up(
     problem: Problem, noise: Noise, split: Split, baseline: Fit, opening: _First | None, progress: Callable[[str], None],
-    given: Sequence[_Step] = (),
+    given: Sequence[_Step] = (), most: int = MAX_EFFECTS,
 ) -> _Built:
-    """Add effects while they are significant, larger than our own error, and explain what is left.
+    """Add effects (``most`` of them) while they are significant, larger than our own error, and explain what is left.
 
     ``opening``: a first round to go on from; without it the shortlist of the screen is fitted. ``given``: steps that stand already.
     """
@@ -190,7 +195,7 @@ def _build_up(
     first, first_choice = opening or _First(), opening is None
     all_trials: list[Trial] = []
     for _ in range(MAX_ROUNDS):
-        if len(steps) >= len(given) + (MAX_EFFECTS if first_choice else AGAIN_EFFECTS):
+        if len(steps) >= len(given) + (most if first_choice else AGAIN_EFFECTS):
             break
         if opening is not None and not steps:
             scores, trials = list(opening.scores), list(opening.trials)

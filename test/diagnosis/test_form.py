@@ -1,0 +1,76 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Friction of another form than the model's is no missing physics, and what hides beside it is named. All data are synthetic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_problem import SIGMA, small_problem, weight, with_torque
+
+from lugre_steering.data.dataset import Run
+from lugre_steering.diagnosis.conclude.left_over import left_over, structured
+from lugre_steering.diagnosis.form import bent
+from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.loudness import FORM_LEFT
+from lugre_steering.diagnosis.search.trial import cost
+from lugre_steering.fitting.fit import fit
+from lugre_steering.recording import Array
+
+NOTHING = small_problem(33.0)
+RECORD = NOTHING.model.parameters[0][0]
+
+
+def friction(run: Run, sharpness: float, strengthening: float, uneven: float) -> Array:
+    """Torque (n,) of tracks whose bristles yield by a power law, on ground that is not even, and stronger when faster."""
+    level, stiffness, total = float(RECORD["coulomb_torque"]), float(RECORD["sigma_0"]), np.zeros(run.time.size)
+    for theta in run.theta:
+        bristle, torque = 0.0, np.zeros(theta.size)
+        for i in range(1, theta.size):
+            rate = abs(theta[i] - theta[i - 1]) / (run.time[i] - run.time[i - 1])
+            strength = level * (1.0 + uneven * np.sin(14.0 * theta[i]) + strengthening * np.log1p(rate / 0.005))
+            for step in np.full(4, (theta[i] - theta[i - 1]) / 4.0):
+                share = stiffness * bristle / strength
+                bristle += step - abs(step) * np.sign(share) * abs(share) ** sharpness
+            torque[i] = stiffness * bristle
+        total += torque
+    return total
+
+
+KNOWN = NOTHING.predict_all(NOTHING.start())
+RUBBED = KNOWN + np.concatenate([friction(run, 1.4, 0.02, 0.02) - friction(run, 1.0, 0.0, 0.0) for run in NOTHING.runs])
+"""The model's torque with friction of another form."""
+STOP = np.concatenate([
+    np.sum(2e5 * np.sign(run.theta) * np.maximum(np.abs(run.theta) - 0.22, 0.0), axis=0) for run in NOTHING.runs
+])  # fmt: skip
+
+
+def test_friction_of_another_form_is_explained_by_the_freedoms_and_a_stop_is_not() -> None:
+    shares = []
+    for torque in (RUBBED, KNOWN + STOP):
+        problem = with_torque(NOTHING, torque)
+        plain = fit(problem, weight(problem))
+        freer, words = bent(problem, plain)
+        assert len(words) == freer.bends.shape[1]
+        beside = fit(freer, weight(problem), start=np.concatenate([plain.x, np.zeros(len(words))]))
+        shares.append(cost(freer, beside, weight(problem)) / cost(problem, plain, weight(problem)))
+    assert shares[0] < FORM_LEFT < shares[1]
+
+
+def test_no_name_is_given_to_friction_of_another_form() -> None:
+    done = investigate(with_torque(NOTHING, RUBBED), 1)
+    assert structured(done, done.found.final)  # it is seen
+    assert not done.found.found
+    assert done.beside_form is not None
+    left = left_over(done.beside_form, done.beside_form.found.baseline)
+    assert not left.structured
+    assert "form" in left.entry.description
+
+
+def test_a_stop_beside_it_is_named_alone_and_fitted_as_a_vehicle_file_can_hold_it() -> None:
+    done = investigate(with_torque(NOTHING, RUBBED + STOP), 1)
+    assert done.beside_form is not None
+    (found,) = done.found.final.effects
+    assert found[0].effect.id == "end_stop"
+    assert found[1]["engage_angle"] == pytest.approx(0.22, abs=0.02)
+    assert done.found.final.x.size == NOTHING.nuisances
