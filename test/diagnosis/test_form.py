@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_problem import SIGMA, small_problem, weight, with_torque
+from small_problem import small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.left_over import left_over, structured
