@@ -53,8 +53,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
 
 def diagnosed(runs: Sequence[Run]) -> tuple[Problem, Split, Search]:
     problem = Problem(vehicle_file.load(VEHICLE), runs)
-    _, roles, found = investigate(problem, seed=1)
-    return problem, roles, found
+    done = investigate(problem, seed=1)
+    return problem, done.roles, done.found
 
 
 def residual(problem: Problem, found: Search) -> np.ndarray:

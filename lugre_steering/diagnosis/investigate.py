@@ -13,9 +13,8 @@ from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import structured
 from lugre_steering.diagnosis.form import bent
-from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy, loudness
+from lugre_steering.diagnosis.loudness import FORM_LEFT, excess, form_energy, loudness
 from lugre_steering.diagnosis.search.build_up import search
-from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem
@@ -23,6 +22,8 @@ from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
 
 NULL_DRAWS = 16
+BETTER = 0.5
+"""Share of the excess left by all freedoms of the friction law together that names alone may leave to be believed without them."""
 FORM_SAMPLES = 8000
 """Samples on which names compete beside the form of the friction law, which is slow."""
 NOISE_ROUNDS, QUIETER = 2, 0.8
@@ -38,21 +39,23 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
     repeated = repeated_motion(problem, NULL_DRAWS, seed)
     noise, roles, baseline = recalibrate(problem, repeated, seed)
     form = _Form.of(problem, noise, roles, baseline) if loudness(problem, noise, baseline).loud else None
-    alone = form is not None and form.explains_most
-    found = search(problem, noise, roles, baseline, progress, alone=alone)
+    enough = form.left if form is not None and form.explains_most else None
+    found = search(problem, noise, roles, baseline, progress, enough=enough)
     for _ in range(NOISE_ROUNDS if found.found else 0):
         quieter = noise_model(problem, found.final.x, found.final.effects, repeated, seed=seed)
         if quieter.floor > QUIETER * noise.floor:
             break
         noise = quieter
         baseline = fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=found.baseline.x)
-        found = search(problem, noise, roles, baseline, progress, alone=alone)
+        found = search(problem, noise, roles, baseline, progress, enough=enough)
     done = Finished(problem, noise, roles, found)
     if not structured(done, found.final):
         return done
     progress("beside the friction law's own form")
     form = _Form.of(problem, noise, roles, found.baseline)
     there = search(form.problem, form.noise, form.roles, form.baseline, progress)
+    if found.found and not there.found and excess(problem, found.final, done.fitted) < BETTER * form.left:
+        return done  # all freedoms together do not what these names do
     beside = Finished(form.problem, form.noise, form.roles, there, form=form.words)
     # A vehicle file can hold names, not the freedoms.
     final = fit(problem, done.fitted, there.final.effects, there.final.x[: problem.nuisances])
@@ -75,18 +78,24 @@ class _Form:
         freer, words = bent(thin, baseline)
         noise = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
         roles = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
-        weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
+        weight, every = (np.where(used, 1.0 / noise.sigma, 0.0) for used in (roles.fit, freer.valid))
+        plain = fit(thin, weight, start=baseline.x)
         # Recalibration was bent to imitate what is missing; from there the way back may be closed.
-        starts = [np.concatenate([baseline.x, np.zeros(freer.bends.shape[1])]), freer.start()]
-        fits = [fit(freer, weight, start=start, linearisations=20) for start in starts]
-        return _Form(freer, words, noise, roles, min(fits, key=lambda each: each.cost))
+        starts = [np.concatenate([plain.x, np.zeros(freer.bends.shape[1])]), freer.start()]
+        free = min((fit(freer, weight, start=start, linearisations=20) for start in starts), key=lambda each: each.cost)
+        freer.bends_explain = max(excess(thin, plain, every) - excess(freer, free, every), 0.0)
+        return _Form(freer, words, noise, roles, free)
+
+    @property
+    def left(self) -> float:
+        """Excess beside these freedoms."""
+        return excess(self.problem, self.baseline, np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0))
 
     @property
     def explains_most(self) -> bool:
         """Whether there is hardly more than these freedoms."""
         weight = np.where(self.roles.fit, 1.0 / self.noise.sigma, 0.0)
-        left = cost(self.problem, self.baseline, weight) - float(self.roles.fit.sum())
-        return left < FORM_LEFT * form_energy(self.problem, self.baseline, weight)
+        return self.left * float(self.roles.fit.sum()) < FORM_LEFT * form_energy(self.problem, self.baseline, weight)
 
 
 def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:

@@ -42,14 +42,21 @@ def loudness(problem: Problem, noise: Noise, result: Fit) -> Loudness:
     return Loudness(excess, slow, slow > max(SLOW_EXCESS, noise.slow_doubt, doubt) or excess > FAST_EXCESS + doubt)
 
 
+def excess(problem: Problem, result: Fit, weight: Array) -> float:
+    """Energy per sample with weight that a fit leaves beyond noise, in noise variances."""
+    return float(np.sum(((problem.measured - result.prediction) * weight) ** 2) / max(int(np.count_nonzero(weight)), 1)) - 1.0
+
+
 def form_energy(problem: Problem, result: Fit, weight: Array) -> float:
-    """Energy, in noise variances, that the freedoms of the friction law explain of what recalibration cannot."""
+    """Energy, in noise variances, that the freedoms of the friction law explain of what recalibration cannot: what they do in a fit,
+    or what holds of it on data that it has not seen."""
     if not problem.bends.shape[1]:
         return 0.0
     used, first = weight > 0.0, problem.first_bend
     bent = (problem.bends @ result.x[first : problem.nuisances] * weight)[used]
     columns = normalised(result.jacobian[used, :first])
-    return float(np.sum((bent - columns @ np.linalg.lstsq(columns, bent, rcond=1e-8)[0]) ** 2))
+    done = float(np.sum((bent - columns @ np.linalg.lstsq(columns, bent, rcond=1e-8)[0]) ** 2))
+    return min(done, problem.bends_explain * float(np.count_nonzero(used)))
 
 
 def _slow_energy(problem: Problem, standardised: Array) -> float:

@@ -193,6 +193,8 @@ class Problem:
         self.bag = np.concatenate([np.full(run.time.size, i) for i, run in enumerate(runs)])
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
         self.bends = np.zeros((self.measured.size, 0)) if bends is None else bends
+        self.bends_explain = np.inf
+        """Energy per sample, in noise variances, that the bends explain of all samples, those that do not fit them too; once known."""
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
         self.size = size_of(vehicle, self.runs)

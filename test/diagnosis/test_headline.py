@@ -75,7 +75,7 @@ def test_places_are_told_where_they_are_some(coordinate: str, ends: tuple[float,
 
 
 def test_other_verdicts_say_the_error_and_what_to_do() -> None:
-    assert headline.consistent(finished(), 100.0) == (
+    assert headline.consistent(finished(), 100.0, "what is left is noise") == (
         "No missing physics is seen: recalibrated, the model explains the torque to 100 N m (0.2 % of the torque). "
         "Use augmented.yaml, the recalibrated vehicle file."
     )

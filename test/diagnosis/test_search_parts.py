@@ -163,12 +163,12 @@ def test_a_build_up_that_leads_nowhere_begins_again_from_the_best_fingerprint(
     seen = noise.Noise(np.full(hidden.measured.size, SIGMA), draws, 0.0)
     real, openings = build_up._build_up, []
 
-    def misled(*given: Any) -> build_up._Built:
+    def misled(*given: Any, **more: Any) -> build_up._Built:
         opening = given[4]
         if opening is not None:
             openings.append(opening.trials[0])
-            return real(*given)
-        built = real(*given)
+            return real(*given, **more)
+        built = real(*given, **more)
         *others, wrong = built.first.trials
         item = build_up.Found(wrong.score, (), built.first.trials, 1.0)
         first = replace(built.first, trials=(wrong, *others))

@@ -84,17 +84,18 @@ class Search:
 
 def search(
     problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None,
-    *, alone: bool = False,
+    *, enough: float | None = None,
 ) -> Search:
     """Build up from the best first effect, and where that does not stand from those with the best fingerprints.
 
-    ``alone``: only one that explains all but noise by itself is of interest.
+    ``enough``: only one name is of interest, which by itself leaves no more than a share of this excess, or nothing but noise.
     """
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
-    samples, doubt = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt
+    samples, doubt, alone = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt, enough is not None
+    least = 1.0 + max(1.0 + doubt, enough or 0.0)
 
     def standing(built: _Built) -> int:
-        if alone and built.steps and cost(problem, built.steps[-1][0], weight) > (2.0 + doubt) * samples:
+        if alone and built.steps and cost(problem, built.steps[-1][0], weight) > least * samples:
             return len(given)
         return max(len(given), _keep(built.steps, problem, weight, cost(problem, built.baseline, weight), samples, doubt))
 
