@@ -251,7 +251,7 @@ class Campaign:
 
     def _recovered_s(self, end_ns: int) -> float:
         """When after the fault's end the torque is, and stays, that of a vehicle without the fault."""
-        clean = torques(self.vehicle, self.neighbour.clean)
+        clean = torques(self.vehicle, list(self.neighbour.clean))
         after = [(ns, value) for ns, value in self.neighbour.torque if ns > end_ns and ns in clean]
         off = [ns for ns, value in after if abs(value - clean[ns]) > NEAR * self.friction]
         if not after or (off and off[-1] == after[-1][0]):
@@ -260,7 +260,7 @@ class Campaign:
 
     def _off_replay(self, end_ns: int) -> float:
         """Largest difference [N m] between what the node said after the fault and a replay of what it was sent."""
-        replayed = torques(self.vehicle, self.neighbour.sent)
+        replayed = torques(self.vehicle, list(self.neighbour.sent))  # more is being sent
         off = [abs(value - replayed[ns]) for ns, value in self.neighbour.torque if ns > end_ns and ns in replayed]
         return max(off, default=math.nan)
 
