@@ -15,7 +15,9 @@ from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
+from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
@@ -96,11 +98,21 @@ def diagnose_recordings(
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
         findings += _by_bag(disturbed)
         done = investigate(Problem(vehicle, runs), seed, progress)
-    if done.found.excess > WORTH_A_SHEET and (wrong := wrong_entry(done.problem, done.found.final.effects)) is not None:
+    if (wrong := _wrong_entry(done)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
     findings += _by_bag(weather_findings(done.problem, done.found.final))
     progress("verifying on held-out data")
     return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
+
+
+def _wrong_entry(done: Finished) -> WrongSheet | None:
+    """An entry of the sheet that explains what recalibration leaves, better than names and the form of the friction law."""
+    left = excess(done.problem, done.found.baseline, done.fitted)
+    if not left > WORTH_A_SHEET:
+        return None
+    form = done.beside_form
+    rival = 1.0 if form is None else max(excess(form.problem, form.found.baseline, form.fitted), 0.0) / left
+    return wrong_entry(done.problem, done.found.final.effects, rival)
 
 
 def _other_clocks(pieces: Sequence[Recording], clocks: Synchronised, final: Fit) -> Synchronised | None:

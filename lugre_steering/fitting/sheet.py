@@ -118,8 +118,11 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]))
 
 
-def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = ()) -> WrongSheet | None:
-    """Whether one wrong bore, arm or pair of lines, or another vehicle, explains what the baseline leaves, and better than ``effects``."""
+def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = (), rival: float = 1.0) -> WrongSheet | None:
+    """Whether one wrong bore, arm or pair of lines, or another vehicle, explains what the baseline leaves, and better than ``effects``.
+
+    ``rival``: share of it that another explanation leaves, which it must do better than.
+    """
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
@@ -128,7 +131,7 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
         return None
     floor = float(np.count_nonzero(thin.valid))
     left, excess, beside_names = found[0].cost - floor, baseline.cost - floor, named.cost - floor
-    if excess <= 0.0 or left > (1.0 - EXPLAINED) * excess or left > BETTER * beside_names:
+    if excess <= 0.0 or left > min((1.0 - EXPLAINED), BETTER * rival) * excess or left > BETTER * beside_names:
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 
