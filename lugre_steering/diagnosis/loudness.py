@@ -52,11 +52,15 @@ def form_energy(problem: Problem, result: Fit, weight: Array) -> float:
     or what holds of it on data that it has not seen."""
     if not problem.bends.shape[1]:
         return 0.0
-    used, first = weight > 0.0, problem.first_bend
-    bent = (problem.bends @ result.x[first : problem.nuisances] * weight)[used]
-    columns = normalised(result.jacobian[used, :first])
-    done = float(np.sum((bent - columns @ np.linalg.lstsq(columns, bent, rcond=1e-8)[0]) ** 2))
-    return min(done, problem.bends_explain * float(np.count_nonzero(used)))
+    done = beyond_calibration(problem, result, weight, problem.bends @ result.x[problem.first_bend : problem.nuisances])
+    return min(done, problem.bends_explain * float(np.count_nonzero(weight)))
+
+
+def beyond_calibration(problem: Problem, result: Fit, weight: Array, torque: Array) -> float:
+    """Energy of a torque (n,), in noise variances, beyond what a recalibration does as well."""
+    used = weight > 0.0
+    columns, values = normalised(result.jacobian[used, : problem.first_bend]), (torque * weight)[used]
+    return float(np.sum((values - columns @ np.linalg.lstsq(columns, values, rcond=1e-8)[0]) ** 2))
 
 
 def _slow_energy(problem: Problem, standardised: Array) -> float:

@@ -56,6 +56,7 @@ def consistent(done: Finished, error: float, left: str) -> str:
 
 
 def sentence(text: str) -> str:
+    """With a capital letter and a full stop; nothing stays nothing."""
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 

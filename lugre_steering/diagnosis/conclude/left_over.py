@@ -13,12 +13,12 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import unlisted
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy, loudness
+from lugre_steering.diagnosis.loudness import FORM_LEFT, beyond_calibration, form_energy, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.diagnosis.search.trial import cost
-from lugre_steering.fitting.fit import Fit, fit, normalised
+from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import Array
 
 FORETELLS = 0.1
@@ -93,19 +93,14 @@ def left_over(done: Finished, final: Fit) -> LeftOver:
 
 def _form(done: Finished, final: Fit) -> str:
     """Which freedoms of the friction law do most of what they do, in words."""
-    first, used = done.problem.first_bend, done.weight > 0.0
-    columns = done.problem.bends * final.x[first : done.problem.nuisances] * done.weight[:, None]
-    basis = np.linalg.qr(normalised(final.jacobian[used, :first]))[0]
+    problem = done.problem
+    parts = problem.bends * final.x[problem.first_bend : problem.nuisances]
     energy = {
-        words: _beyond(columns[used][:, [word == words for word in done.form]].sum(axis=1), basis) for words in dict.fromkeys(done.form)
+        words: beyond_calibration(problem, final, done.weight, parts[:, [own == words for own in done.form]].sum(axis=1))
+        for words in dict.fromkeys(done.form)
     }
     most = max(energy.values())
     return " and ".join(words for words in sorted(energy, key=lambda words: -energy[words]) if energy[words] > MOSTLY * most)
-
-
-def _beyond(values: Array, basis: Array) -> float:
-    """Energy of values (n,) beyond an orthonormal basis (n, k)."""
-    return float(np.sum((values - basis @ (basis.T @ values)) ** 2))
 
 
 def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> LeftOver:

@@ -88,7 +88,7 @@ def search(
 ) -> Search:
     """Build up from the best first effect, and where that does not stand from those with the best fingerprints.
 
-    ``enough``: only one name is of interest, which by itself leaves no more than a share of this excess, or nothing but noise.
+    ``enough``: only one name is of interest, which by itself leaves no more than this excess per sample, or hardly more than noise.
     """
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
     samples, doubt, alone = float(split.fit.sum()), OWN_ERROR + noise.slow_doubt, enough is not None
