@@ -20,7 +20,7 @@ import numpy as np
 
 from lugre_steering.bag import read_recording
 from lugre_steering.data.dataset import Run, motion, prepare
-from lugre_steering.diagnosis.search.build_up import OWN_ERROR
+from lugre_steering.diagnosis.loudness import OWN_ERROR
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.proof.blind import noise_of

@@ -34,6 +34,8 @@ WARMTH, WARMTH_K = 0.05, 20.0
 RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
 """Share of the torque that follows so many seconds late: the loss factor of treads."""
 RELAXATION = "its relaxation"
+LATE_S, LATE = 0.015, "the clocks of its sensors"
+"""How far pressures and angles may still be apart once their clocks are set, which is done beside a law of another form."""
 SMALL = 0.2
 """Share of a freedom by which its effect on the torque is found: small enough to be linear."""
 
@@ -65,7 +67,10 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
-    words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S))
+    parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
+    changes = np.concatenate([np.gradient(torque, run.time) for run, torque in parts])
+    columns += [LATE_S * changes * (problem.bag == bag) for bag in bags]
+    words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
     return Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns)), words
 
 

@@ -14,9 +14,11 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sensors import beside_sensors
 from lugre_steering.recording import Array
 
+OWN_ERROR = 0.05
+"""Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
 SLOW_EXCESS, FAST_EXCESS = 0.25, 1.0
 """Energy left over, in noise variances, that is structure: slow and above the doubt about slow noise, or of any kind."""
-FORM_LEFT, FORM_TAKEN = 0.15, 0.05
+FORM_LEFT, FORM_TAKEN = 0.15, 0.02
 """Shares of the energy that the freedoms of the friction law explain: what may be left beside them without being structure, since
 they too are of another form than nature, and what one name must take of that to be more than such a form."""
 
@@ -48,12 +50,13 @@ def excess(problem: Problem, result: Fit, weight: Array) -> float:
 
 
 def form_energy(problem: Problem, result: Fit, weight: Array) -> float:
-    """Energy, in noise variances, that the freedoms of the friction law explain of what recalibration cannot: what they do in a fit,
-    or what holds of it on data that it has not seen."""
+    """Energy, in noise variances, of what the freedoms of the friction law do beyond what a recalibration does as well."""
     if not problem.bends.shape[1]:
         return 0.0
-    done = beyond_calibration(problem, result, weight, problem.bends @ result.x[problem.first_bend : problem.nuisances])
-    return min(done, problem.bends_explain * float(np.count_nonzero(weight)))
+    fitted = np.any(result.jacobian != 0.0, axis=1)  # samples held out have no slopes
+    torque = problem.bends @ result.x[problem.first_bend : problem.nuisances]
+    done = beyond_calibration(problem, result, weight * fitted, torque)
+    return done * float(np.count_nonzero(weight)) / max(int(np.count_nonzero(weight * fitted)), 1)
 
 
 def beyond_calibration(problem: Problem, result: Fit, weight: Array, torque: Array) -> float:

@@ -31,7 +31,8 @@ cost per linearisation from which the next one is of effects alone."""
 class Fit:
     """Result of a joint fit: nuisance x, effects with their values, prediction (n,) [N m], weighted cost, covariance (q, q).
 
-    ``jacobian`` (n, q): change of the prediction per unit of each fitted value, times the weight of each sample.
+    ``jacobian`` (n, q): change of the prediction per unit of each fitted value, times the weight of each sample. ``pull`` (q,): the same
+    of its prior's error; ``pulled`` (q,): that error at the fit.
     """
 
     x: Array
@@ -40,11 +41,18 @@ class Fit:
     cost: float
     jacobian: Array
     covariance: Array
+    pull: Array
+    pulled: Array
 
     def basis(self, without: slice | None = None) -> Array:
         """Orthonormal columns (n, k) that span what the fitted values can change, but for those ``without``; weighted too."""
         columns = self.jacobian if without is None else np.delete(self.jacobian, without, axis=1)
         return np.asarray(np.linalg.qr(normalised(columns))[0])
+
+
+    def tangent(self) -> Array:
+        """Orthonormal columns (n + q, k): what the fitted values can change, and below it what that costs by their priors."""
+        return np.asarray(np.linalg.qr(normalised(np.vstack([self.jacobian, np.diag(self.pull)])))[0])
 
 
 def normalised(columns: Array) -> Array:
@@ -85,7 +93,8 @@ def fit(
     spread = np.linalg.pinv(slope.T @ slope + np.diag(vector.prior**2), rcond=1e-12)
     covariance = np.asarray(spread * np.outer(natural, natural), float)
     error = (descent.base - problem.measured) * weight
-    return Fit(x, tuple(fitted), descent.base, _cost(error, p * vector.prior, False), slope / natural, covariance)
+    return Fit(x, tuple(fitted), descent.base, _cost(error, p * vector.prior, False), slope / natural, covariance,
+               vector.prior / natural, p * vector.prior)
 
 
 @dataclass(frozen=True)
@@ -112,7 +121,7 @@ class _Vector:
             problem, effects, free, scale,
             np.concatenate([low / scale, [parameter.scaled(parameter.low) for _, parameter in free]]),
             np.concatenate([high / scale, [parameter.scaled(parameter.high) for _, parameter in free]]),
-            np.concatenate([problem.prior_weights(priors), [parameter.pull for _, parameter in free]]),
+            np.concatenate([problem.prior_weights(priors), [parameter.pull * problem.doubt**0.5 for _, parameter in free]]),
         )  # fmt: skip
 
     @property
@@ -242,6 +251,9 @@ def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, hi
     # A column that does nothing has no scale of its own.
     damped = normal + np.diag(damping * diagonal + 1e-9 * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1e-30)))
     factor = np.linalg.cholesky(damped)
-    span = np.maximum(high - low, 1e-12)
     target = solve_triangular(factor, -gradient, lower=True)
+    step = solve_triangular(factor, target, lower=True, trans="T")
+    if np.all((low <= step) & (step <= high)):
+        return np.asarray(step)
+    span = np.maximum(high - low, 1e-12)
     return np.asarray(lsq_linear(factor.T, target, (low, low + span), method="bvls").x)

@@ -80,6 +80,8 @@ EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 50.0
 """Rubber over air at the start of a bag beyond that of the vehicle file: standard deviation and range; 30 K after a drive."""
 AIR_K, AIR_FAR_K, AIR_KNOWN_K = 15.0, 50.0, 1.0
 """Air against the vehicle file where none was recorded: standard deviation and range; standard deviation where it was."""
+TYPICAL = 1.0 / 3.0
+"""Standard deviation of the size of a bend, in what it is at most, of real rubber."""
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
 
 
@@ -193,8 +195,10 @@ class Problem:
         self.bag = np.concatenate([np.full(run.time.size, i) for i, run in enumerate(runs)])
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
         self.bends = np.zeros((self.measured.size, 0)) if bends is None else bends
-        self.bends_explain = np.inf
-        """Energy per sample, in noise variances, that the bends explain of all samples, those that do not fit them too; once known."""
+        self.doubt = 1.0
+        """Energy of the errors, in noise variances, that counts as one independent error; priors weigh as much against it."""
+        self.typical = TYPICAL
+        """Standard deviation of the size of a bend, in what it is at most."""
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
         self.size = size_of(vehicle, self.runs)
@@ -223,7 +227,8 @@ class Problem:
     def prior_weights(self, priors: bool) -> Array:
         """Weight of the prior on each scaled nuisance; the sheet's off without ``priors``, but weather has no other source."""
         own = [float(priors)] * len(self.calibrations) + [0.3] * len(self.runs)
-        return np.array(own + [1.0] * (self.nuisances - len(own)))
+        weather, bends = [1.0] * int(self._weather[0].size), [1.0 / self.typical] * int(self.bends.shape[1])
+        return np.asarray(np.array(own + weather + bends) * self.doubt**0.5)
 
     def bounds(self) -> tuple[Array, Array]:
         _, coldest, warmest = self._weather
@@ -242,6 +247,18 @@ class Problem:
         air = [unknown if run.first_air is None else known for run in self.runs]
         deviation, low, high = np.array(excess + air).T
         return deviation, low, high
+
+    def bent(self, columns: Sequence[Array]) -> Problem:
+        """The same with more bends, each of ``columns`` (n, k)."""
+        bent = copy(self)
+        bent.bends = np.hstack([self.bends, *columns])
+        return bent
+
+    def doubted(self, doubt: float, typical: float) -> Problem:
+        """The same with another doubt, and another typical size of bends."""
+        doubted = copy(self)
+        doubted.doubt, doubted.typical = doubt, typical
+        return doubted
 
     def with_known_weather(self) -> Problem:
         """The same where every bag is known to have begun as warm as the vehicle file says, to a hundredth of a degree."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lugre_steering.diagnosis.search.build_up import Search
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
@@ -16,7 +17,6 @@ from lugre_steering.diagnosis.conclude.statement import at_end
 from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect
 from lugre_steering.diagnosis.search import fingerprint, locate
-from lugre_steering.diagnosis.search.build_up import Search
 from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import split

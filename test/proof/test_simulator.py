@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from lugre_steering.bench import own_error
-from lugre_steering.diagnosis.search.build_up import OWN_ERROR
+from lugre_steering.diagnosis.loudness import OWN_ERROR
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.proof import hydraulics, manoeuvres, simulator
 from lugre_steering.proof.conceal import ZONED

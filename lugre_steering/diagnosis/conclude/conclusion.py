@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.laws.find import find
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
+from lugre_steering.diagnosis.search.search import as_held
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
@@ -45,10 +46,10 @@ def conclude(
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
     final = found.final if named or clock else found.baseline
-    whole = _whole(done, final)
+    whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
-    left = _left(done, final, named or clock)
+    left = _left(done, named or clock)
     verdict: Verdict
     lawful, beside, laws, law = None, done, [], ""
     if left.structured and not named:
@@ -64,7 +65,7 @@ def conclude(
         verdict = "unlisted_physics"
     else:
         verdict = "consistent"
-    effects = named_effects(done, whole, material) if named else []
+    effects = named_effects(done, whole, bent, material) if named else []
     better = named or lawful is not None
     after = judged.after if better else judged.before
     vehicle = augmented_vehicle(beside, whole, effects, after)
@@ -105,12 +106,10 @@ def conclude(
     ).in_words()
 
 
-def _left(done: Finished, final: Fit, named: bool) -> LeftOver:
-    """What is left by the final fit, or beside the freedoms of the friction law where these had to be given."""
-    if done.beside_form is None:
-        return left_over(done, final)
-    there = done.beside_form.found
-    return left_over(done.beside_form, there.final if named else there.baseline)
+def _left(done: Finished, named: bool) -> LeftOver:
+    """What is left beside the freedoms of the friction law and of the names."""
+    there = done.compared.found
+    return left_over(done.compared, there.final if named else there.baseline, done.needs_form)
 
 
 def _clocks_alone(final: Fit, bags: int) -> bool:
@@ -123,17 +122,19 @@ def _clocks_alone(final: Fit, bags: int) -> bool:
     )
 
 
-def _whole(done: Finished, final: Fit) -> Fit:
-    """All valid data fitted, for the values that are reported; what began late is timed anew."""
-    problem, weight = done.problem, done.weight
-    whole = fit(problem, weight, final.effects, final.x)
-    for index, (candidate, values) in enumerate(whole.effects):
+def _whole(done: Finished, final: Fit) -> tuple[Fit, Fit]:
+    """All valid data fitted, for the values that are reported, and the same beside all freedoms; what began late is timed anew."""
+    there = done.compared
+    if not final.effects:
+        return fit(done.problem, done.weight, (), final.x), there.found.baseline
+    bent = fit(there.problem, there.weight, there.found.final.effects, there.found.final.x)
+    for index, (candidate, values) in enumerate(bent.effects):
         if candidate.since:
-            effects = [*whole.effects]
-            effects[index] = (replace(candidate, since=onset.timed(problem, weight, whole, index)), values)
-            again = fit(problem, weight, effects, whole.x)
-            whole = again if again.cost < whole.cost else whole
-    return whole
+            effects = [*bent.effects]
+            effects[index] = (replace(candidate, since=onset.timed(there.problem, there.weight, bent, index)), values)
+            again = fit(there.problem, there.weight, effects, bent.x)
+            bent = again if again.cost < bent.cost else bent
+    return as_held(done.problem, done.weight, bent, [item.given for item in done.found.found]), bent
 
 
 def _limits(done: Finished, named: Sequence[str]) -> dict[str, Limit]:

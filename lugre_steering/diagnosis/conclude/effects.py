@@ -14,8 +14,8 @@ from lugre_steering.diagnosis.conclude import verify
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.build_up import Found
-from lugre_steering.diagnosis.search.ties import tied
+from lugre_steering.diagnosis.search.compare import tied
+from lugre_steering.diagnosis.search.search import Found
 from lugre_steering.diagnosis.search.trial import Trial, cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate
@@ -26,10 +26,11 @@ BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
 
 
-def named_effects(done: Finished, whole: Fit, material: float) -> list[NamedEffect]:
-    """Entries of the effects in ``whole`` (fitted to all data), largest share first; ``material``: see ``_statement``."""
+def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> list[NamedEffect]:
+    """Entries of the effects in ``whole`` (fitted to all data), largest share first; ``bent``: the same beside all freedoms, which says
+    how sure their values are; ``material``: see ``_statement``."""
     problem, found = done.problem, done.found
-    intervals = _intervals(done, whole)
+    intervals = _intervals(done, whole, bent)
     start = cost(problem, found.baseline, done.fitted)
     removed = start - cost(problem, found.final, done.fitted)
     total = sum(item.gain for item in found.found)
@@ -40,7 +41,7 @@ def named_effects(done: Finished, whole: Fit, material: float) -> list[NamedEffe
         rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
         entries.append(NamedEffect(
             id=candidate.effect.id, stage=cast(Stage, candidate.effect.stage),
-            statement=_statement(done, whole, index, item, size, rivals, material),
+            statement=_statement(done, whole, bent, index, item, size, rivals, material),
             p_value=item.score.p_value, parameters=intervals[index], where=tuple(_where(done, candidate, part)),
             energy_share=float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0)),
             masked_share=float(np.clip(item.score.masked_share, 0.0, 1.0)), indistinguishable_from=tuple(rivals),
@@ -49,19 +50,15 @@ def named_effects(done: Finished, whole: Fit, material: float) -> list[NamedEffe
     return sorted(entries, key=lambda entry: -entry.energy_share)
 
 
-def _intervals(done: Finished, whole: Fit) -> list[dict[str, FittedValue]]:
-    """Value, 95 % interval and unit of each free parameter, effect by effect."""
-    covariance = verify.robust_covariance(done.problem, whole, done.weight, done.roles.cluster)
-    spread = verify.jackknife(done.problem, whole, done.weight)
-    form = verify.form_spread(done.problem, whole, done.weight)
+def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedValue]]:
+    """Value, 95 % interval and unit of each free parameter, effect by effect: beside all freedoms, and by the doubt about its errors."""
+    deviation = np.sqrt(np.maximum(np.diag(bent.covariance), 0.0) * done.compared.problem.doubt)[done.compared.problem.nuisances :]
     position = 0
     found: list[dict[str, FittedValue]] = []
     for candidate, values in whole.effects:
         parameters: dict[str, FittedValue] = {}
         for key in candidate.free:
-            place = done.problem.nuisances + position
-            drawn = max(float(np.sqrt(max(covariance[place, place], 0.0))), float(spread[position]))
-            half = float(np.hypot(verify.WIDTH * drawn, verify.NORMAL * form[place]))
+            half = verify.NORMAL * float(deviation[position])
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
             )
@@ -71,7 +68,7 @@ def _intervals(done: Finished, whole: Fit) -> list[dict[str, FittedValue]]:
 
 
 def _statement(
-    done: Finished, whole: Fit, index: int, item: Found, size: float, rivals: list[str], material: float
+    done: Finished, whole: Fit, bent: Fit, index: int, item: Found, size: float, rivals: list[str], material: float
 ) -> str:
     """One sentence; an effect of ``size`` [N m] is material above the share ``material`` of the torque amplitude."""
     candidate, _ = whole.effects[index]
@@ -80,27 +77,27 @@ def _statement(
     return (
         f"{done.title(candidate.effect.id)}: {law}. Up to {done.torque(size)} "
         f"({words.percent(size / done.amplitude)} of the torque amplitude, {label}){_since(done, candidate)}"
-        + _lines(done, whole, index, item)
+        + _lines(done, bent, index, item)
         + (f"; the data cannot tell it from {', '.join(rivals)}." if rivals else ".")
     )
 
 
-def _lines(done: Finished, whole: Fit, index: int, item: Found) -> str:
+def _lines(done: Finished, bent: Fit, index: int, item: Found) -> str:
     """Other pressure lines on which the same error would fit as well, with its size there."""
-    problem, hydraulics = done.problem, done.problem.vehicle.hydraulics
-    candidate, values = whole.effects[index]
+    problem, hydraulics, weight = done.compared.problem, done.problem.vehicle.hydraulics, done.compared.weight
+    candidate, values = bent.effects[index]
     if not candidate.effect.per_line or hydraulics is None:
         return ""
-    rest = [effect for i, effect in enumerate(whole.effects) if i != index]
+    rest = [effect for i, effect in enumerate(bent.effects) if i != index]
 
     def with_line(line: str) -> Trial:
-        fitted = fit(problem, done.weight, [*rest, (replace(candidate, line=line), values)], whole.x, linearisations=6)
-        return Trial(item.score, fitted, cost(problem, fitted, done.weight))
+        fitted = fit(problem, weight, [*rest, (replace(candidate, line=line), values)], bent.x, linearisations=6)
+        return Trial(item.score, fitted, fitted.cost)
 
     own = with_line(candidate.line)
     others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
-    before = cost(problem, fit(problem, done.weight, rest, whole.x, linearisations=6), done.weight)
-    equal = tied(problem, done.weight, done.roles, own, others, before, float(problem.valid.sum()), law=0.0)
+    before = fit(problem, weight, rest, bent.x, linearisations=6).cost
+    equal = tied(problem, weight, done.compared.roles, own, others, before, law=0.0)
     key = candidate.free[0]
     unit = done.unit(candidate.parameter(key).unit)
     named = [f"{trial.candidate.line} ({words.quantity(trial.fit.effects[-1][1][key], unit)})" for trial in equal]

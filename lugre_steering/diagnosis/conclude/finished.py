@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.search.build_up import Search
+from lugre_steering.diagnosis.loudness import loudness
+from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
@@ -28,14 +29,19 @@ class Finished:
     roles: Split
     found: Search
     beside_form: Finished | None = None
-    """The same beside the freedoms of the friction law, where names alone did not explain all to the noise."""
+    """The same beside the freedoms of the friction law and of what is named."""
     form: tuple[str, ...] = ()
-    """What each of these freedoms is, in words; of a problem that has them."""
+    """What each of these freedoms is, in words, empty for those of a name; of a problem that has them."""
 
     @property
     def compared(self) -> Finished:
         """Where the names were compared."""
         return self.beside_form or self
+
+    @cached_property
+    def needs_form(self) -> bool:
+        """Whether names alone leave more than noise."""
+        return loudness(self.problem, self.noise, self.found.final).loud
 
     @cached_property
     def weight(self) -> Array:

@@ -41,19 +41,14 @@ class LeftOver(NamedTuple):
     structured: bool
 
 
-def structured(done: Finished, final: Fit) -> bool:
-    """Whether ``final`` leaves more than noise, or a pattern that foretells it."""
-    return loudness(done.problem, done.noise, final).loud or _pattern(done, final)[1] > FORETELLS
-
-
-def left_over(done: Finished, final: Fit) -> LeftOver:
-    """Judge what ``final`` leaves of the measured torque."""
+def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
+    """Judge what ``final`` leaves of the measured torque; ``needs_form``: there is more than noise without the freedoms beside it."""
     residual = done.problem.measured - final.prediction
     excess, slow, loud = loudness(done.problem, done.noise, final)
     pattern, gain = _pattern(done, final)
     if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
-        if done.form:
+        if needs_form:
             description = (
                 "what is left beyond noise is within what friction of another form than the model's does, "
                 f"mostly {_form(done, final)}"
@@ -97,7 +92,7 @@ def _form(done: Finished, final: Fit) -> str:
     parts = problem.bends * final.x[problem.first_bend : problem.nuisances]
     energy = {
         words: beyond_calibration(problem, final, done.weight, parts[:, [own == words for own in done.form]].sum(axis=1))
-        for words in dict.fromkeys(done.form)
+        for words in dict.fromkeys(done.form) if words
     }
     most = max(energy.values())
     return " and ".join(words for words in sorted(energy, key=lambda words: -energy[words]) if energy[words] > MOSTLY * most)

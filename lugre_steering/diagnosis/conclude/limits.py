@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from lugre_steering.diagnosis.loudness import FORM_TAKEN, form_energy
+from lugre_steering.diagnosis.search.compare import needed as least_needed
 from lugre_steering.diagnosis.search.fingerprint import Score, candidates, signature
 from lugre_steering.effects.entry import Parameter
 from lugre_steering.fitting.fit import Fit
@@ -32,16 +32,16 @@ def smallest(
     Beside freedoms of the friction law it must show more than their own form may. The size is found on the effect itself: few grow
     in proportion to their parameter. None: no size that the parameter may have would do.
     """
-    form = FORM_TAKEN * form_energy(problem, baseline, weight)
+    least_energy = least_needed(problem, baseline, weight)
     variants: dict[str, list[tuple[float, float, Score]]] = {}
     for score in scores:
         candidate = score.candidate
         if candidate.effect.id in without or not candidate.free or candidate.since or candidate.bags is not None:
             continue
-        needed = max(REVEALED * float(np.count_nonzero(weight)), 2.0 * float(np.max(score.null_explained)), form)
+        needed = max(REVEALED * float(np.count_nonzero(weight)), 2.0 * float(np.max(score.null_explained)), least_energy)
         if score.visible > 0.0:
             variants.setdefault(candidate.effect.id, []).append((float(np.sqrt(needed / score.visible)), needed, score))
-    basis = baseline.basis()
+    basis = baseline.tangent()[: weight.size]
     base = [problem.predict(bag, baseline.x, baseline.effects) for bag in range(len(problem.runs))]
 
     def shown(score: Score, needed: float, sign: float, size: float) -> float:

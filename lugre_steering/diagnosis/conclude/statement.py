@@ -100,6 +100,6 @@ def _remarks(
         remarks.append(f"{' and '.join(ended)} {verb} not act in {last}, the last recording: augmented.yaml is without.")
     if left.structured:
         remarks.append(f"Structure is left: {left.text}.")
-    elif done.beside_form:
+    elif done.needs_form:
         remarks.append(headline.sentence(left.entry.description))
     return remarks

@@ -13,7 +13,7 @@ from lugre_steering.diagnosis.conclude import verify
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
-from lugre_steering.diagnosis.search.build_up import OWN_ERROR
+from lugre_steering.diagnosis.loudness import OWN_ERROR
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem

@@ -149,13 +149,14 @@ def screen(
 
     ``weight`` (n,) is 1 / sigma, zero where samples are withheld.
     """
-    basis = fit.basis()
-    residuals = np.vstack([problem.measured - fit.prediction, draws]) * weight
+    basis = fit.tangent()
+    below = np.vstack([-fit.pulled, np.zeros((len(draws), fit.pulled.size))])
+    residuals = np.hstack([np.vstack([problem.measured - fit.prediction, draws]) * weight, below])
     residuals = residuals - (residuals @ basis) @ basis.T
     base = [problem.predict(bag, fit.x, fit.effects) for bag in range(len(problem.runs))]
     energy = float(residuals[0] @ residuals[0])
     longest = max(float(run.time[-1]) for run in problem.runs)
-    starts = [*((share * longest,) * len(problem.runs) for share in LATE), onset.suggested(problem, residuals[0])]
+    starts = [*((share * longest,) * len(problem.runs) for share in LATE), onset.suggested(problem, residuals[0, : weight.size])]
     begun = [np.concatenate([run.time >= s for run, s in zip(problem.runs, start, strict=True)]) for start in starts]
 
     def score(candidate: Candidate) -> list[Score]:
@@ -189,11 +190,14 @@ def screen(
 def score_columns(candidate: Candidate, columns: Array, basis: Array, residuals: Array, energy: float) -> Score | None:
     """Projection of the residual (first row) and the null draws (other rows) on what of a signature is not masked.
 
+    ``basis`` (n + q, k) and ``residuals`` (m, n + q) have the errors of q priors below those of n samples.
+
     Columns whose parameter would leave its allowed sign explain nothing, since no such physics exists.
     """
     total = float(np.sum(columns**2))
     if total < 1e-12:
         return None
+    columns = np.vstack([columns, np.zeros((basis.shape[0] - columns.shape[0], columns.shape[1]))])
     visible = columns - basis @ (basis.T @ columns)
     seen = float(np.sum(visible**2))
     nothing = None

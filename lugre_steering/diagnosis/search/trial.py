@@ -21,8 +21,6 @@ PARTIAL = 0.1
 """Share by which an effect in one bag only, or from a time on, must explain more than the same everywhere."""
 VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
-MEMORY = 4.0
-"""Samples that count as one, roughly: errors have a memory."""
 TRIAL_TOLERANCE = 1e-4
 START, GO_ON, NEAR = 3, 5, 0.3
 """Linearisations of a trial from each start and beyond, and the share of the best trial's gain within which it must be able to come:
@@ -56,7 +54,7 @@ class Round:
 
     def __init__(self, problem: Problem, weight: Array, current: Fit, scores: Sequence[Score]) -> None:
         self.problem, self.weight, self.current, self.scores = problem, weight, current, scores
-        self.before = self.best = cost(problem, current, weight)
+        self.before = self.best = current.cost
         self._tried: dict[Candidate, Trial] = {}
 
     def try_effect(self, score: Score) -> Trial:
@@ -82,7 +80,7 @@ class Round:
             self.problem, self.weight, ahead.fit.effects, ahead.fit.x, linearisations=GO_ON, tolerance=TRIAL_TOLERANCE,
             worth=self.worth,
         )
-        return Trial(score, gone_on, cost(self.problem, gone_on, self.weight))
+        return Trial(score, gone_on, gone_on.cost)
 
     def _fitted(self, score: Score, start: Array, *, linearisations: int = START + GO_ON, worth: float = np.inf) -> Trial:
         """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
@@ -95,7 +93,7 @@ class Round:
         result = fit(
             self.problem, self.weight, effects, start, linearisations=linearisations, tolerance=TRIAL_TOLERANCE, worth=worth
         )
-        return Trial(score, result, cost(self.problem, result, self.weight))
+        return Trial(score, result, result.cost)
 
     def everywhere(self, trial: Trial) -> Trial:
         """A trial of an effect in one bag only, or from a time on, against the same everywhere, which is the simpler claim."""
@@ -158,8 +156,7 @@ def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
     since = onset.timed(problem, weight, trial.fit, len(earlier))
     effects = [*earlier, (replace(candidate, since=since), values)]
     result = fit(problem, weight, effects, trial.fit.x, linearisations=8, tolerance=TRIAL_TOLERANCE)
-    better = cost(problem, result, weight)
-    return Trial(trial.score, result, better) if better < trial.cost else trial
+    return Trial(trial.score, result, result.cost) if result.cost < trial.cost else trial
 
 
 def rank(trial: Trial, before: float) -> float:
@@ -184,15 +181,13 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
     richer = replace(candidate, free=(*candidate.free, *kept))
     result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=20, tolerance=1e-5)
-    left = cost(problem, result, weight)
-    # What the model leaves over makes its numbers less sure than noise alone would.
-    misfit = max(left / max(float(np.count_nonzero(weight)), 1.0), 1.0)
-    while weak := _weak(result, values, kept, misfit):
+    left = result.cost
+    while weak := _weak(result, values, kept, problem.doubt):
         # Two that do the same work are both weak, yet not both superfluous.
         for dropped in (weak, weak[:1]) if len(weak) > 1 else (weak,):
             leaner = _without(problem, weight, result, values, dropped)
-            after = cost(problem, leaner, weight)
-            if after < left + SURE_SIGMA**2 * MEMORY * misfit * len(dropped):
+            after = leaner.cost
+            if after < left + SURE_SIGMA**2 * problem.doubt * len(dropped):
                 break
         else:
             break
@@ -200,11 +195,11 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     return Trial(trial.score, result, left) if left < trial.cost else trial
 
 
-def _weak(result: Fit, values: Values, optional: Sequence[str], misfit: float) -> list[str]:
+def _weak(result: Fit, values: Values, optional: Sequence[str], doubt: float) -> list[str]:
     """Parameters of the last effect that left their value in ``values`` by less than some standard deviations, weakest first."""
     if not optional:
         return []
-    deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * misfit * MEMORY)[-len(optional) :]
+    deviation = np.sqrt(np.maximum(np.diag(result.covariance), 0.0) * doubt)[-len(optional) :]
     fitted = result.effects[-1][1]
     moved = {n: abs(fitted[n] - values.get(n, 0.0)) / max(float(sd), 1e-300) for n, sd in zip(optional, deviation, strict=True)}
     return sorted((name for name in optional if moved[name] < SURE_SIGMA), key=moved.__getitem__)

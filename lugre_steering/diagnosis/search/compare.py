@@ -1,0 +1,163 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Compare models by one number: the energy that one takes more than the other, against two doubts.
+
+What a fit leaves is no white noise: errors are larger than those of the sensors and last, so that many samples count as one. And no
+law is true to a percent: what the friction law and the effects already named may do by bending (their freedoms, with priors
+of the size that real ones show) is given to every model that is compared, and of what these freedoms do some part is
+always beyond them. A name must take more than both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, form_energy
+from lugre_steering.diagnosis.search.foreign import Pattern, strongest
+from lugre_steering.diagnosis.search.propose import Proposal
+from lugre_steering.diagnosis.search.trial import Trial, cost, rank
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import TYPICAL, Problem
+from lugre_steering.fitting.split import Split
+from lugre_steering.recording import Array
+
+SURE = 25.0
+"""Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
+OWN_SHARE = 0.2
+"""Share of the simulation's own error that may look like one name."""
+MEMORY_S, FORGOTTEN = 3.0, 0.05
+"""Longest memory of errors looked for, and the correlation at which it has ended."""
+ROUNDS = 3
+SIZES, SLIGHT = (0.01, 0.03, 0.1, 0.3, 1.0), 0.1
+"""Sizes of bends that are tried, in what is typical of real rubber; up to which they hardly stand for anything."""
+TIE_T, TIE = 2.5, 10.0
+"""Models are tied within so many standard errors block by block unless they are SURE apart, or within so many doubts."""
+PER_VALUE = 4.0
+"""Doubts that a free value costs where models are tied."""
+LAW = 0.01
+"""Share of what a law takes that another must leave more: none is truer than that."""
+HALF = 0.5
+"""Share of the best one's energy that a rival must take; and of their own that names must still take beside a pattern to stand."""
+MARGIN = 0.1
+"""Share of what names take that a pattern must take more: a name wins a draw."""
+
+
+def doubt(problem: Problem, result: Fit, weight: Array) -> float:
+    """Energy, in noise variances, that counts as one independent error: their mean square times the samples that they last."""
+    error = (problem.measured - result.prediction) * weight
+    used = (weight > 0.0).astype(float)
+    longest = 1 + round(MEMORY_S / float(problem.runs[0].time[1] - problem.runs[0].time[0]))
+    together, pairs = np.zeros(longest), np.zeros(longest)
+    for a, b in zip(problem.edges[:-1], problem.edges[1:], strict=True):
+        for lag in range(min(longest, b - a)):
+            together[lag] += float(error[a : b - lag] @ error[a + lag : b])
+            pairs[lag] += float(used[a : b - lag] @ used[a + lag : b])
+    covariance = together / np.maximum(pairs, 1.0)
+    correlation = covariance / max(covariance[0], 1e-300)
+    ended = np.flatnonzero(correlation < FORGOTTEN)
+    return float(max(covariance[0], 1.0) * (1.0 + 2.0 * correlation[1 : ended[0] if ended.size else longest].sum()))
+
+
+def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | None = None) -> tuple[Problem, Fit]:
+    """The problem with the doubt that its own fit leaves (or a given one) and bends as large as the data ask for, and its fit.
+
+    Both decide how much priors weigh. Where the law is that of the recording, bends are worth nothing and are none.
+    """
+    for _ in range(ROUNDS):
+        now = doubt(problem, result, weight) if own_doubt is None else own_doubt
+        sizes = [problem.doubted(now, TYPICAL * share) for share in SIZES]
+        problem = min(sizes, key=lambda each: _expected(each, weight, result))
+        result = fit(problem, weight, result.effects, result.x)
+    return problem, result
+
+
+def worlds(problem: Problem) -> list[Problem]:
+    """The problem, and the same with hardly any bends: where much is missing they stand for it, and would make small what it is."""
+    exact = problem.doubted(problem.doubt, TYPICAL * SIZES[0])
+    return [problem, exact] if problem.typical > TYPICAL * SLIGHT else [problem]
+
+
+def clearest(weight: Array, proposals: Sequence[Proposal]) -> tuple[Problem, Fit, Proposal]:
+    """Of the best models of several worlds the one with most evidence, settled, by the doubt of the one that leaves least."""
+    models = [settled(own.problem, weight, own.best) for own in proposals]
+    least = min(there.doubt for there, _ in models)
+    common = [settled(there, weight, best, least) for there, best in models]
+    index = min(range(len(models)), key=lambda i: left(*common[i]))
+    return *models[index], proposals[index]
+
+
+def left(problem: Problem, result: Fit) -> float:
+    """Energy, in noise variances, by which models are compared: what a fit leaves, and what its freedoms are worth.
+
+    Minus twice the logarithm of the evidence (MacKay, Neural Computation 4 (1992) 415), times the doubt.
+    """
+    return result.cost + problem.doubt * _volume(problem, _gram(problem, result))
+
+
+def _expected(problem: Problem, weight: Array, result: Fit) -> float:
+    """What ``left`` would be of a model that is linear about a fit, for the doubt and the sizes of bends that the problem has."""
+    slope, error, x = result.jacobian[:, : problem.nuisances], (problem.measured - result.prediction) * weight, result.x
+    gram = _gram(problem, result)
+    target = error + slope @ x
+    along = slope.T @ target
+    prior = (problem.prior_weights(True) / problem.scales()) ** 2
+    cost = float(target @ target - along @ np.linalg.solve(gram + np.diag(prior), along))
+    return cost + problem.doubt * _volume(problem, gram)
+
+
+def _gram(problem: Problem, result: Fit) -> Array:
+    slope = result.jacobian[:, : problem.nuisances]
+    return np.asarray(slope.T @ slope)
+
+
+def _volume(problem: Problem, gram: Array) -> float:
+    """Logarithm of the squared ratio of the volumes of all freedoms before and after the data."""
+    prior = problem.prior_weights(True) / problem.scales()  # in doubts
+    return float(np.linalg.slogdet(np.eye(prior.size) + gram / np.outer(prior, prior))[1])
+
+
+def needed(problem: Problem, result: Fit, weight: Array) -> float:
+    """Energy that a name must take to be believed, where ``result`` has it."""
+    samples = float(np.count_nonzero(weight))
+    return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + OWN_SHARE * OWN_ERROR * samples
+
+
+def tied(
+    problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float,
+    law: float = LAW,
+) -> list[Trial]:
+    """Rivals that this data cannot tell from the best.
+
+    Either no clear difference block by block (Vuong 1989), or one smaller than the doubts and the share ``law`` of what the best takes.
+    """
+    found = []
+    error = ((problem.measured - best.fit.prediction) * weight) ** 2
+    for other in others:
+        if other.candidate.label == best.candidate.label or before - other.cost < HALF * (before - best.cost):
+            continue
+        difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
+        t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
+        apart = other.cost - best.cost
+        if (apart < SURE * problem.doubt and t < TIE_T) or apart < TIE * problem.doubt + law * (before - best.cost):
+            found.append(other)
+    return found
+
+
+def simplest(best: Trial, rivals: list[Trial], before: float, own_doubt: float) -> tuple[Trial, list[Trial]]:
+    """Of effects that fit equally well the one with the fewest free parameters stands for the group."""
+    group = [best, *rivals]
+    chosen = min(group, key=lambda trial: rank(trial, before) + PER_VALUE * own_doubt * len(trial.candidate.free))
+    return chosen, [trial for trial in group if trial is not chosen]
+
+
+def foreign(problem: Problem, weight: Array, pattern: Pattern, baseline: Fit, named: Fit) -> bool:
+    """Whether one pattern outside the catalogue takes clearly more than all names, which take little beside it.
+
+    ``problem``: that of the ``named``; ``pattern`` was sought beside the ``baseline``.
+    """
+    start, with_names, alone = cost(problem, baseline, weight), cost(problem, named, weight), pattern.cost(problem, weight)
+    if not alone < with_names - MARGIN * (start - with_names):
+        return False
+    return alone - strongest(problem, named, weight).cost(problem, weight) < HALF * (start - with_names)

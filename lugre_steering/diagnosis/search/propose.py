@@ -1,0 +1,90 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Propose: the candidates whose fingerprints a residual shows, each fitted in the chain beside all that stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.diagnosis.search.trial import Round, Trial, ranked, refine, timed
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.recording import Array
+
+SHORTLIST, SHORT = 7, 0.08
+"""Effects fitted at most, and the share of the best one's screened energy that each must have."""
+PROMISING, CLOSE = (3, 5), 0.1
+"""Of these how many are fitted with care at least and at most, and the share of the gain within which they deserve it."""
+FALSE_DISCOVERY_RATE = 0.01
+LEADING = 0.5
+"""Share of the best one's energy from which a trial is looked at more closely."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """One round: the fit without a further name, what the screen says beside it, and the trials, best first."""
+
+    problem: Problem
+    current: Fit
+    scores: tuple[Score, ...]
+    trials: list[Trial]
+
+    @property
+    def before(self) -> float:
+        """Energy that is left without a further name."""
+        return self.current.cost
+
+    @property
+    def best(self) -> Fit:
+        return self.trials[0].fit if self.trials else self.current
+
+
+def proposed(
+    problem: Problem, weight: Array, current: Fit, scores: Sequence[Score], progress: Callable[[str], None]
+) -> list[Trial]:
+    """The shortlist fitted, what leads it also from an instant on and then with care; best first."""
+    before = current.cost
+    trials, tried = [], Round(problem, weight, current, scores)
+    for score in choose(scores):
+        progress(f"fitting {score.candidate.label}")
+        trials.append(tried.everywhere(tried.try_effect(score)))
+    trials = ranked(trials, before)
+    trials[: PROMISING[0]] = [tried.begun_late(trial) for trial in trials[: PROMISING[0]]]
+    trials = ranked(trials, before)
+    if trials and timed(trials[0]):
+        trials = ranked([tried.begun_late(trial) for trial in trials], before)
+    close = sum(trial.cost < trials[0].cost + CLOSE * (before - trials[0].cost) for trial in trials)
+    promising = int(np.clip(close, *PROMISING))
+    trials[:promising] = [tried.deepen(trial) for trial in trials[:promising]]
+    return ranked(trials, before)
+
+
+def closer(problem: Problem, weight: Array, seen: Proposal) -> Proposal:
+    """What leads of an earlier round once more, with all parts of its laws, where less is in doubt."""
+    current = fit(problem, weight, seen.current.effects, seen.current.x)
+    leading = [trial for trial in seen.trials if seen.before - trial.cost > LEADING * (seen.before - seen.trials[0].cost)]
+    trials = []
+    for trial in leading:
+        again = fit(problem, weight, trial.fit.effects, trial.fit.x)
+        trials.append(refine(problem, weight, replace(trial, fit=again, cost=again.cost)))
+    return Proposal(problem, current, seen.scores, ranked(trials, current.cost))
+
+
+def choose(scores: Sequence[Score]) -> list[Score]:
+    """Shortlist: the best variant of each effect that is significant across the catalogue."""
+    best: dict[str, Score] = {}
+    for score in sorted(scores, key=lambda score: -score.explained):
+        best.setdefault(score.candidate.effect.id, score)
+    if not best:
+        return []
+    adjusted = stats.false_discovery_control([score.p_value for score in best.values()], method="by")
+    significant = [
+        score for score, p in zip(best.values(), adjusted, strict=True)
+        if p < FALSE_DISCOVERY_RATE and score.explained > SHORT * next(iter(best.values())).explained
+    ]  # fmt: skip
+    return significant[:SHORTLIST]

@@ -1,0 +1,150 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Naming: propose candidates, compare the best one with the model without it, and stop where it takes too little.
+
+Everything is compared beside the freedoms of the friction law and of the names that stand (``compare``), so that a name
+neither makes up for their form nor is made up for by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lugre_steering.diagnosis.search import flexible, rig
+from lugre_steering.diagnosis.search.compare import clearest, foreign, left, needed, settled, simplest, tied, worlds
+from lugre_steering.diagnosis.search.fingerprint import Score, screen
+from lugre_steering.diagnosis.search.foreign import Pattern, strongest
+from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Problem, is_rig
+from lugre_steering.fitting.split import Split
+from lugre_steering.recording import Array
+
+MAX_EFFECTS, MOST_RIVALS = 3, 6
+CLEARER = 0.5
+"""Fall of the doubt, once physics is found, that asks for a closer look at it and its rivals."""
+BENT = 0.3
+"""By how much of its own torque the law of a name may bend at any place, at most."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """An accepted effect: its screen score, its rivals that fit as well, the trials of its round and the energy [noise variances] it took.
+
+    ``given``: it is what every joint may have, and was not looked for.
+    """
+
+    score: Score
+    rivals: tuple[str, ...]
+    trials: tuple[Trial, ...]
+    gain: float
+    given: bool = False
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the search came to: fits without and with what was found; scores of the first round and every trial, for the report."""
+
+    baseline: Fit
+    final: Fit
+    found: tuple[Found, ...]
+    first_scores: tuple[Score, ...]
+    trials: tuple[Trial, ...]
+    pattern: Pattern
+    """The strongest pattern that no entry makes."""
+
+
+def search(
+    problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None
+) -> tuple[Problem, Search]:
+    """Add names one at a time while the best of those proposed takes more than the doubts; with the problem that this led to."""
+    weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
+    problem, baseline = settled(problem, weight, baseline)
+    now, current, found = problem, baseline, list[Found]()
+    if is_rig(problem.vehicle):
+        progress("inertia, viscous friction, offset and gravity")
+        for result, score in rig.carried(problem, noise, weight, baseline, needed(problem, baseline, weight)):
+            found.append(Found(score, (), (), current.cost - result.cost, given=True))
+            current = result
+        now, current = settled(problem, weight, current)
+    given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
+    while len(found) < given + MAX_EFFECTS:
+        progress("fingerprints")
+        further = len(found) > given
+        rounds = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
+        there, best, own = clearest(weight, rounds)
+        while own.trials and there.doubt < CLEARER * own.problem.doubt:
+            there, best, own = clearest(weight, [closer(world, weight, own) for world in ([there] if further else worlds(there))])
+        first, tried = first or own.scores, tried + own.trials
+        if not own.trials:
+            break
+        without = settled(there, weight, fit(there, weight, current.effects, current.x), there.doubt)
+        taken = left(*without) - left(there, best)
+        if taken < needed(there, best, weight):
+            break
+        rivals = tied(there, weight, split, own.trials[0], own.trials[1:], own.before)
+        chosen, rivals = simplest(own.trials[0], rivals, own.before, there.doubt)
+        names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
+        found.append(Found(chosen.score, names, tuple(own.trials), taken))
+        found, current = _pruned(there, weight, found, best if chosen is own.trials[0] else chosen.fit)
+        now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
+    problem, baseline = settled(problem, weight, baseline, now.doubt)
+    pattern = strongest(problem, baseline, weight)
+    if len(found) > given and foreign(now, weight, pattern, baseline, current):
+        rest = current.effects[:given]
+        now, current = settled(problem, weight, fit(problem, weight, rest, current.x[: problem.nuisances]))
+        found = found[:given]
+    more = np.zeros(now.nuisances - baseline.x.size)
+    return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), pattern)
+
+
+def _round(
+    problem: Problem, noise: Noise, weight: Array, current: Fit, further: bool, progress: Callable[[str], None]
+) -> Proposal:
+    """What is proposed beside a fit."""
+    current = fit(problem, weight, current.effects, current.x)
+    scores = screen(problem, current, weight, noise.draws, [candidate.effect.id for candidate, _ in current.effects])
+    if further:  # a wrong shape of the first shows at some events, which late variants fit like a glove
+        scores = [score for score in scores if not score.candidate.since]
+    return Proposal(problem, current, tuple(scores), proposed(problem, weight, current, scores, progress))
+
+
+def as_held(problem: Problem, weight: Array, bent_: Fit, free: Sequence[bool]) -> Fit:
+    """Effects of a fit beside the freedoms as a vehicle file holds them: without these, their values kept but where ``free``."""
+    effects = [
+        (candidate if every else replace(candidate, free=()), values)
+        for (candidate, values), every in zip(bent_.effects, free, strict=True)
+    ]
+    held = fit(problem, weight, effects, bent_.x[: problem.nuisances], linearisations=20)
+    values = [values for _, values in held.effects]
+    return replace(held, effects=tuple(zip((candidate for candidate, _ in bent_.effects), values, strict=True)))
+
+
+def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:
+    """Without earlier names that the latest one has made superfluous: they had only filled in for its shape."""
+    kept = list(found)
+    for index in range(len(kept) - 2, -1, -1):
+        if kept[index].given:
+            continue
+        rest = [effect for i, effect in enumerate(current.effects) if i != index]
+        without = fit(problem, weight, rest, current.x, linearisations=20, tolerance=TRIAL_TOLERANCE)
+        if without.cost - current.cost < needed(problem, current, weight):
+            dropped = kept.pop(index)
+            # Together they explained what the latest now explains alone.
+            kept[-1] = replace(kept[-1], gain=kept[-1].gain + dropped.gain)
+            current = without
+    return kept, current
+
+
+def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given: int) -> tuple[Problem, Fit]:
+    """The problem where the law of each name may bend too, and the fit there; ``plain``: without any bends of names."""
+    shapes = [flexible.bends(problem, current, problem.valid.astype(float), i) for i in range(given, len(current.effects))]
+    columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
+    freed = plain.bent(columns)
+    x = np.append(current.x[: plain.nuisances], np.zeros(freed.nuisances - plain.nuisances))
+    return settled(freed, weight, fit(freed, weight, current.effects, x))
