@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.form import bent
-from lugre_steering.diagnosis.search.search import as_held, search
+from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem
@@ -43,14 +43,14 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
 
 
 def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progress: Callable[[str], None]) -> Finished:
-    """What the search comes to, with names fitted as a vehicle file holds them: recalibrated beside their values."""
+    """What the search comes to, with names fitted as a vehicle file holds them: without the freedoms."""
     thin, kept = thinned(problem, SAMPLES)
     freer, words = bent(thin, baseline)
     few = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt), Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
     there, found = search(freer, *few, _unbent(freer, few[1], few[0], baseline), progress)
     beside = Finished(there, *few, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))
     weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
-    final = as_held(problem, weight, found.final, [item.given for item in found.found])
+    final = fit(problem, weight, found.final.effects, found.final.x[: problem.nuisances], linearisations=20)
     return Finished(problem, noise, roles, replace(found, baseline=baseline, final=final), beside_form=beside)
 
 

@@ -20,7 +20,6 @@ from lugre_steering.diagnosis.laws.find import find
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
-from lugre_steering.diagnosis.search.search import as_held
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
@@ -134,7 +133,7 @@ def _whole(done: Finished, final: Fit) -> tuple[Fit, Fit]:
             effects[index] = (replace(candidate, since=onset.timed(there.problem, there.weight, bent, index)), values)
             again = fit(there.problem, there.weight, effects, bent.x)
             bent = again if again.cost < bent.cost else bent
-    return as_held(done.problem, done.weight, bent, [item.given for item in done.found.found]), bent
+    return fit(done.problem, done.weight, bent.effects, bent.x[: done.problem.nuisances], linearisations=20), bent
 
 
 def _limits(done: Finished, named: Sequence[str]) -> dict[str, Limit]:

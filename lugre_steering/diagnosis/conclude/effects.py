@@ -51,14 +51,17 @@ def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> lis
 
 
 def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedValue]]:
-    """Value, 95 % interval and unit of each free parameter, effect by effect: beside all freedoms, and by the doubt about its errors."""
+    """Value, 95 % interval and unit of each free parameter, effect by effect.
+
+    As sure as beside all freedoms, by the doubt about the errors there; and a value that these shift is as unsure as that.
+    """
     deviation = np.sqrt(np.maximum(np.diag(bent.covariance), 0.0) * done.compared.problem.doubt)[done.compared.problem.nuisances :]
     position = 0
     found: list[dict[str, FittedValue]] = []
-    for candidate, values in whole.effects:
+    for (candidate, values), (_, shifted) in zip(whole.effects, bent.effects, strict=True):
         parameters: dict[str, FittedValue] = {}
         for key in candidate.free:
-            half = verify.NORMAL * float(deviation[position])
+            half = verify.NORMAL * float(np.hypot(deviation[position], values[key] - shifted[key]))
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
             )

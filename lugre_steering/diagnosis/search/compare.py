@@ -25,13 +25,13 @@ from lugre_steering.recording import Array
 
 SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
-OWN_SHARE = 0.2
+OWN_SHARE = 0.05
 """Share of the simulation's own error that may look like one name."""
 MEMORY_S, FORGOTTEN = 3.0, 0.05
 """Longest memory of errors looked for, and the correlation at which it has ended."""
 ROUNDS = 3
-SIZES, SLIGHT = (0.01, 0.03, 0.1, 0.3, 1.0), 0.1
-"""Sizes of bends that are tried, in what is typical of real rubber; up to which they hardly stand for anything."""
+SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
+"""Sizes of bends that are tried, in what is typical of real rubber."""
 TIE_T, TIE = 2.5, 10.0
 """Models are tied within so many standard errors block by block unless they are SURE apart, or within so many doubts."""
 PER_VALUE = 4.0
@@ -76,16 +76,14 @@ def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | Non
 def worlds(problem: Problem) -> list[Problem]:
     """The problem, and the same with hardly any bends: where much is missing they stand for it, and would make small what it is."""
     exact = problem.doubted(problem.doubt, TYPICAL * SIZES[0])
-    return [problem, exact] if problem.typical > TYPICAL * SLIGHT else [problem]
+    return [problem, exact] if problem.typical > exact.typical else [problem]
 
 
-def clearest(weight: Array, proposals: Sequence[Proposal]) -> tuple[Problem, Fit, Proposal]:
-    """Of the best models of several worlds the one with most evidence, settled, by the doubt of the one that leaves least."""
+def clearest(weight: Array, proposals: Sequence[Proposal]) -> tuple[Problem, Fit]:
+    """Of the best models of several worlds the one with most evidence, settled by the doubt of the one that leaves least in doubt."""
     models = [settled(own.problem, weight, own.best) for own in proposals]
     least = min(there.doubt for there, _ in models)
-    common = [settled(there, weight, best, least) for there, best in models]
-    index = min(range(len(models)), key=lambda i: left(*common[i]))
-    return *models[index], proposals[index]
+    return min((settled(there, weight, best, least) for there, best in models), key=lambda model: left(*model))
 
 
 def left(problem: Problem, result: Fit) -> float:
@@ -152,12 +150,12 @@ def simplest(best: Trial, rivals: list[Trial], before: float, own_doubt: float) 
     return chosen, [trial for trial in group if trial is not chosen]
 
 
-def foreign(problem: Problem, weight: Array, pattern: Pattern, baseline: Fit, named: Fit) -> bool:
-    """Whether one pattern outside the catalogue takes clearly more than all names, which take little beside it.
-
-    ``problem``: that of the ``named``; ``pattern`` was sought beside the ``baseline``.
-    """
-    start, with_names, alone = cost(problem, baseline, weight), cost(problem, named, weight), pattern.cost(problem, weight)
-    if not alone < with_names - MARGIN * (start - with_names):
+def foreign(weight: Array, pattern: Pattern, baseline: tuple[Problem, Fit], named: tuple[Problem, Fit]) -> bool:
+    """Whether one pattern outside the catalogue, sought beside the ``baseline``, takes clearly more than all names, which take
+    little beside it."""
+    taken = left(*baseline) - left(*named)
+    alone = cost(*baseline, weight) - pattern.cost(baseline[0], weight)
+    if alone < (1.0 + MARGIN) * taken:
         return False
-    return alone - strongest(problem, named, weight).cost(problem, weight) < HALF * (start - with_names)
+    beside = cost(*named, weight) - strongest(*named, weight).cost(named[0], weight)
+    return alone - beside > HALF * taken

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.diagnosis.search.fingerprint import Score
-from lugre_steering.diagnosis.search.trial import Round, Trial, ranked, refine, timed
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial, ranked, refine, timed
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
@@ -64,15 +64,18 @@ def proposed(
     return ranked(trials, before)
 
 
-def closer(problem: Problem, weight: Array, seen: Proposal) -> Proposal:
-    """What leads of an earlier round once more, with all parts of its laws, where less is in doubt."""
-    current = fit(problem, weight, seen.current.effects, seen.current.x)
-    leading = [trial for trial in seen.trials if seen.before - trial.cost > LEADING * (seen.before - seen.trials[0].cost)]
+def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposal:
+    """What leads in some rounds once more, with all parts of its laws, in one world."""
+    current = fit(problem, weight, seen[0].current.effects, seen[0].current.x)
+    leading: dict[str, Trial] = {}
+    for own in seen:
+        best = own.before - own.trials[0].cost if own.trials else 0.0
+        leading |= {trial.candidate.label: trial for trial in own.trials if own.before - trial.cost > LEADING * best}
     trials = []
-    for trial in leading:
-        again = fit(problem, weight, trial.fit.effects, trial.fit.x)
+    for trial in leading.values():
+        again = fit(problem, weight, trial.fit.effects, trial.fit.x, tolerance=TRIAL_TOLERANCE)
         trials.append(refine(problem, weight, replace(trial, fit=again, cost=again.cost)))
-    return Proposal(problem, current, seen.scores, ranked(trials, current.cost))
+    return Proposal(problem, current, seen[0].scores, ranked(trials, current.cost))
 
 
 def choose(scores: Sequence[Score]) -> list[Score]:

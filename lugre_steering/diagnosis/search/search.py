@@ -26,8 +26,8 @@ from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS = 3, 6
-CLEARER = 0.5
-"""Fall of the doubt, once physics is found, that asks for a closer look at it and its rivals."""
+HOPELESS = 0.3
+"""Share of the energy needed below which no closer look is taken."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -76,31 +76,37 @@ def search(
     while len(found) < given + MAX_EFFECTS:
         progress("fingerprints")
         further = len(found) > given
-        rounds = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
-        there, best, own = clearest(weight, rounds)
-        while own.trials and there.doubt < CLEARER * own.problem.doubt:
-            there, best, own = clearest(weight, [closer(world, weight, own) for world in ([there] if further else worlds(there))])
-        first, tried = first or own.scores, tried + own.trials
-        if not own.trials:
+        seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
+        first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
+        there, best = clearest(weight, seen)
+        if not best.effects[len(current.effects) :] or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight):
             break
-        without = settled(there, weight, fit(there, weight, current.effects, current.x), there.doubt)
-        taken = left(*without) - left(there, best)
+        progress(f"a closer look at {best.effects[-1][0].label}")
+        seen = [closer(world, weight, seen) for world in ([there] if further else worlds(there))]
+        own = closer(clearest(weight, seen)[0], weight, seen)
+        rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
+        chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
+        there, best = settled(own.problem, weight, chosen.fit)
+        taken = _taken(there, weight, current, best)
         if taken < needed(there, best, weight):
             break
-        rivals = tied(there, weight, split, own.trials[0], own.trials[1:], own.before)
-        chosen, rivals = simplest(own.trials[0], rivals, own.before, there.doubt)
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
         found.append(Found(chosen.score, names, tuple(own.trials), taken))
-        found, current = _pruned(there, weight, found, best if chosen is own.trials[0] else chosen.fit)
+        found, current = _pruned(there, weight, found, best)
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
     problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
-    if len(found) > given and foreign(now, weight, pattern, baseline, current):
+    if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
         rest = current.effects[:given]
         now, current = settled(problem, weight, fit(problem, weight, rest, current.x[: problem.nuisances]))
         found = found[:given]
     more = np.zeros(now.nuisances - baseline.x.size)
     return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), pattern)
+
+
+def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
+    """Energy that the last name of ``best`` takes, the bends as large as the data ask for without it and with it."""
+    return left(*settled(there, weight, fit(there, weight, current.effects, current.x), there.doubt)) - left(there, best)
 
 
 def _round(
@@ -112,17 +118,6 @@ def _round(
     if further:  # a wrong shape of the first shows at some events, which late variants fit like a glove
         scores = [score for score in scores if not score.candidate.since]
     return Proposal(problem, current, tuple(scores), proposed(problem, weight, current, scores, progress))
-
-
-def as_held(problem: Problem, weight: Array, bent_: Fit, free: Sequence[bool]) -> Fit:
-    """Effects of a fit beside the freedoms as a vehicle file holds them: without these, their values kept but where ``free``."""
-    effects = [
-        (candidate if every else replace(candidate, free=()), values)
-        for (candidate, values), every in zip(bent_.effects, free, strict=True)
-    ]
-    held = fit(problem, weight, effects, bent_.x[: problem.nuisances], linearisations=20)
-    values = [values for _, values in held.effects]
-    return replace(held, effects=tuple(zip((candidate for candidate, _ in bent_.effects), values, strict=True)))
 
 
 def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:

@@ -180,7 +180,7 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     kept = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
     richer = replace(candidate, free=(*candidate.free, *kept))
-    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=20, tolerance=1e-5)
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
     left = result.cost
     while weak := _weak(result, values, kept, problem.doubt):
         # Two that do the same work are both weak, yet not both superfluous.
