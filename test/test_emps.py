@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lugre_steering.diagnosis.search.build_up import Search
 from scipy.io import loadmat
 
 from lugre_steering import vehicle as vehicle_file
@@ -21,6 +20,7 @@ from lugre_steering.bag import read_recording
 from lugre_steering.data.bursts import all_bursts, set_aside
 from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import Split
 from lugre_steering.importing import import_table

@@ -69,9 +69,10 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     changes = np.concatenate([np.gradient(torque, run.time) for run, torque in parts])
-    columns += [LATE_S * changes * (problem.bag == bag) for bag in bags]
+    clocks = np.column_stack([LATE_S * changes * (problem.bag == bag) for bag in bags])
     words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
-    return Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns)), words
+    freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
+    return freer.bent([clocks]), words  # clocks are apart whatever the friction is like
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:

@@ -15,13 +15,13 @@ from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
 
 NULL_DRAWS = 16
-SAMPLES = 8000
-"""Samples on which names are compared, unless the recording is slow."""
+SAMPLES, FASTEST_HZ = 6000, 200.0
+"""Samples on which names are compared, unless the recording is slow, and the rate beyond which there is nothing to be seen."""
 NOISE_ROUNDS, QUIETER = 2, 0.8
 """Searches repeated, and the fall of the noise floor, once physics is found, that asks for it."""
 
@@ -44,8 +44,9 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
 
 def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progress: Callable[[str], None]) -> Finished:
     """What the search comes to, with names fitted as a vehicle file holds them: without the freedoms."""
-    thin, kept = thinned(problem, SAMPLES)
-    freer, words = bent(thin, baseline)
+    thin, kept = thinned(problem, SAMPLES, FASTEST_HZ)
+    # What else joints and axes may do is found by name: their sheets know little of their friction anyhow.
+    freer, words = (thin, ()) if is_rig(problem.vehicle) else bent(thin, baseline)
     few = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt), Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
     there, found = search(freer, *few, _unbent(freer, few[1], few[0], baseline), progress)
     beside = Finished(there, *few, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))

@@ -198,7 +198,7 @@ class Problem:
         self.doubt = 1.0
         """Energy of the errors, in noise variances, that counts as one independent error; priors weigh as much against it."""
         self.typical = TYPICAL
-        """Standard deviation of the size of a bend of the friction law, in what it is at most; of names, the last ``shapes``, TYPICAL."""
+        """Standard deviation of the size of a bend of the friction law, in what it is at most; of the last ``shapes``, TYPICAL."""
         self.shapes = 0
         record = self.model.parameters[0][0]
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
@@ -229,7 +229,8 @@ class Problem:
         """Weight of the prior on each scaled nuisance; the sheet's off without ``priors``, but weather has no other source."""
         own = [float(priors)] * len(self.calibrations) + [0.3] * len(self.runs)
         bends = [1.0 / self.typical] * int(self.bends.shape[1] - self.shapes) + [1.0 / TYPICAL] * self.shapes
-        return np.asarray(np.array(own + [1.0] * int(self._weather[0].size) + bends) * self.doubt**0.5)
+        known = 1.0 if is_rig(self.vehicle) else self.doubt**0.5  # the sheet of a rig is a guess, and weighs nothing
+        return np.asarray(np.array(own + [1.0] * int(self._weather[0].size) + bends) * known)
 
     def bounds(self) -> tuple[Array, Array]:
         _, coldest, warmest = self._weather
@@ -250,7 +251,7 @@ class Problem:
         return deviation, low, high
 
     def bent(self, columns: Sequence[Array]) -> Problem:
-        """The same with bends of the laws of names, each of ``columns`` (n, k)."""
+        """The same with more bends, each of ``columns`` (n, k), whose size is known."""
         bent = copy(self)
         bent.bends = np.hstack([self.bends, *columns])
         bent.shapes = int(bent.bends.shape[1] - self.bends.shape[1] + self.shapes)

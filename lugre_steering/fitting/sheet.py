@@ -149,13 +149,13 @@ def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
     ]  # fmt: skip
 
 
-def thinned(problem: Problem, most: int = SAMPLES) -> tuple[Problem, IntArray]:
-    """The same with few samples, ``most`` unless they are slow, and which these are: hypotheses are far apart."""
+def thinned(problem: Problem, most: int = SAMPLES, rate_Hz: float = RATE_HZ) -> tuple[Problem, IntArray]:
+    """The same with few samples, ``most`` unless they are slow and not more often than at ``rate_Hz``, and which these are."""
     total = sum(run.time.size for run in problem.runs)
     runs, kept = [], []
     for run, first in zip(problem.runs, problem.edges, strict=False):
         step = float(run.time[1] - run.time[0])
-        stride = max(1, round(1.0 / RATE_HZ / step), -(-total // most) if step < 0.1 else 1)
+        stride = max(1, round(1.0 / rate_Hz / step), -(-total // most) if step < 0.1 else 1)
         runs.append(_every(run, stride))
         kept.append(first + np.arange(0, run.time.size, stride))
     return Problem(problem.vehicle, runs, problem.calibrations), np.concatenate(kept)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lugre_steering.diagnosis.search.build_up import Search
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
@@ -18,6 +17,7 @@ from lugre_steering.diagnosis.conclude.verify import rmse
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect
 from lugre_steering.diagnosis.search import fingerprint, locate
 from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import split
 from lugre_steering.fitting.fit import Fit, fit
@@ -34,7 +34,7 @@ def problem() -> Problem:
 
 def finished(problem: Problem, baseline: Fit, scores: tuple[Score, ...] = ()) -> Finished:
     noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(4).standard_normal((4, problem.valid.size)), 0.0)
-    found = Search(baseline, baseline, (), 0.0, 0.0, True, scores, (), None)
+    found = Search(baseline, baseline, (), scores, (), None)
     return Finished(problem, noise, split.split(problem), found)
 
 

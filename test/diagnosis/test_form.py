@@ -9,7 +9,7 @@ import pytest
 from small_problem import small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.conclude.left_over import left_over, structured
+from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT
@@ -59,10 +59,10 @@ def test_friction_of_another_form_is_explained_by_the_freedoms_and_a_stop_is_not
 
 def test_no_name_is_given_to_friction_of_another_form() -> None:
     done = investigate(with_torque(NOTHING, RUBBED), 1)
-    assert structured(done, done.found.final)  # it is seen
+    assert done.needs_form  # it is seen
     assert not done.found.found
     assert done.beside_form is not None
-    left = left_over(done.beside_form, done.beside_form.found.baseline)
+    left = left_over(done.beside_form, done.beside_form.found.baseline, done.needs_form)
     assert not left.structured
     assert "form" in left.entry.description
 

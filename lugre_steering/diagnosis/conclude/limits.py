@@ -41,12 +41,13 @@ def smallest(
         needed = max(REVEALED * float(np.count_nonzero(weight)), 2.0 * float(np.max(score.null_explained)), least_energy)
         if score.visible > 0.0:
             variants.setdefault(candidate.effect.id, []).append((float(np.sqrt(needed / score.visible)), needed, score))
-    basis = baseline.tangent()[: weight.size]
+    basis = baseline.tangent()
     base = [problem.predict(bag, baseline.x, baseline.effects) for bag in range(len(problem.runs))]
 
     def shown(score: Score, needed: float, sign: float, size: float) -> float:
         """Logarithm of what shows of an effect of this size over what must."""
         column = signature(problem, baseline, base, score.candidate, sign * size)[:, 0] * weight
+        column = np.append(column, np.zeros(basis.shape[0] - weight.size))
         seen = column - basis @ (basis.T @ column)
         return float(np.log(max(float(seen @ seen), 1e-12) / needed))
 

@@ -25,7 +25,7 @@ from lugre_steering.recording import Array
 
 SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
-OWN_SHARE = 0.05
+OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name."""
 MEMORY_S, FORGOTTEN = 3.0, 0.05
 """Longest memory of errors looked for, and the correlation at which it has ended."""

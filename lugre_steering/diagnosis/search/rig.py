@@ -10,6 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from lugre_steering.diagnosis.search.compare import doubt
 from lugre_steering.diagnosis.search.fingerprint import Score, candidates, screen
 from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial, cost, refine
 from lugre_steering.fitting.fit import Fit, fit
@@ -17,15 +20,22 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.recording import Array
 
+LEAST, SHARE, SURE = 0.05, 0.02, 0.3
+"""Energy by which what is left must rise without a term: in noise variances per sample, and a share of what all leave, unless it is
+so large against the noise."""
 
-def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit, least: float) -> list[tuple[Fit, Score]]:
-    """The terms without which the energy left over would rise by at least ``least``, what matters most first.
+
+def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> list[tuple[Fit, Score]]:
+    """The terms without which clearly more would be left over, what matters most first.
 
     Each with the fit that has it and those before it, and its score against what the others leave.
     """
+    samples = float(np.count_nonzero(weight))
+    least = max(LEAST * samples, min(SHARE * (cost(problem, baseline, weight) - samples), SURE * samples))
     known = {candidate.effect.id for candidate, _ in problem.standing}
     terms = [c for c in candidates(problem, sorted(known)) if c.effect.of_every_joint]
     full = _fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
+    problem = problem.doubted(doubt(problem, full, weight), problem.typical)
     order: list[Candidate] = []  # what can be spared first comes last
     while full.effects:
         rests = [[e for i, e in enumerate(full.effects) if i != index] for index in range(len(full.effects))]

@@ -18,7 +18,7 @@ from lugre_steering.diagnosis.search.compare import clearest, foreign, left, nee
 from lugre_steering.diagnosis.search.fingerprint import Score, screen
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem, is_rig
@@ -26,6 +26,7 @@ from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS = 3, 6
+LEADING = 3
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 BENT = 0.3
@@ -55,8 +56,8 @@ class Search:
     found: tuple[Found, ...]
     first_scores: tuple[Score, ...]
     trials: tuple[Trial, ...]
-    pattern: Pattern
-    """The strongest pattern that no entry makes."""
+    pattern: Pattern | None
+    """The strongest pattern that no entry makes, if it was sought."""
 
 
 def search(
@@ -64,14 +65,15 @@ def search(
 ) -> tuple[Problem, Search]:
     """Add names one at a time while the best of those proposed takes more than the doubts; with the problem that this led to."""
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
-    problem, baseline = settled(problem, weight, baseline)
-    now, current, found = problem, baseline, list[Found]()
+    current, found = baseline, list[Found]()
     if is_rig(problem.vehicle):
         progress("inertia, viscous friction, offset and gravity")
-        for result, score in rig.carried(problem, noise, weight, baseline, needed(problem, baseline, weight)):
+        for result, score in rig.carried(problem, noise, weight, baseline):
             found.append(Found(score, (), (), current.cost - result.cost, given=True))
             current = result
-        now, current = settled(problem, weight, current)
+    now, current = settled(problem, weight, current)
+    found = [replace(item, rivals=_rivals(now, noise, weight, split, current, i)) for i, item in enumerate(found)]
+    problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
     given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
     while len(found) < given + MAX_EFFECTS:
         progress("fingerprints")
@@ -118,6 +120,21 @@ def _round(
     if further:  # a wrong shape of the first shows at some events, which late variants fit like a glove
         scores = [score for score in scores if not score.candidate.since]
     return Proposal(problem, current, tuple(scores), proposed(problem, weight, current, scores, progress))
+
+
+def _rivals(problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, index: int) -> tuple[str, ...]:
+    """Known rivals of one effect of a fit, and those with the best fingerprints, that would do as well in its place."""
+    own = current.effects[index]
+    rest = [effect for i, effect in enumerate(current.effects) if i != index]
+    without = fit(problem, weight, rest, current.x, linearisations=6)
+    best: dict[str, Score] = {}
+    for score in screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest]):
+        best.setdefault(score.candidate.effect.id, score)
+    tried = Round(problem, weight, without, list(best.values()))
+    champion = Trial(best[own[0].effect.id], replace(current, effects=(*rest, own)), current.cost)
+    names = {*own[0].effect.rivals, *list(best)[:LEADING]} & {*best} - {own[0].effect.id}
+    trials = [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
+    return tuple(trial.candidate.effect.id for trial in tied(problem, weight, split, champion, trials, without.cost))
 
 
 def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:

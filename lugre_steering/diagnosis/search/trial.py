@@ -36,8 +36,6 @@ class Trial:
     score: Score
     fit: Fit
     cost: float
-    deep: bool = False
-    """Whether it was fitted from several starts and refined."""
 
     @property
     def candidate(self) -> Candidate:
@@ -115,12 +113,8 @@ class Round:
         begun = retime(self.problem, self.weight, self.try_effect(late))
         return begun if begun.cost < trial.cost - PARTIAL * (self.before - begun.cost) else trial
 
-    def deepen_near(self, trial: Trial) -> Trial:
-        """The same trial where it is too far from the best to matter, else ``deepen``."""
-        return trial if trial.cost > self.worth else self.deepen(trial)
-
     def deepen(self, trial: Trial) -> Trial:
-        """A promising trial also from its next best shapes, and at its typical size from the sheet; then refined.
+        """A promising trial also from its next best shapes, and at its typical size from the sheet.
 
         Valleys are narrow, and a linear guess far from the truth may lie beyond the next hill.
         """
@@ -137,7 +131,7 @@ class Round:
             best = min([best, self._fitted(score, x, worth=best.cost)], key=lambda each: each.cost)
         for _ in range(RETIMED if tried.since else 0):
             best = retime(self.problem, self.weight, best)
-        return replace(refine(self.problem, self.weight, best), deep=True)
+        return best
 
 
 def _partial(score: Score) -> bool:
