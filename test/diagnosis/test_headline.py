@@ -26,7 +26,7 @@ def finished(**more: Any) -> Any:
     """As much of a finished search of two recordings of 100 s as the sentence needs; a torque amplitude of 50 kN m."""
     runs = [SimpleNamespace(name=name, time=np.linspace(0.0, 100.0, 11)) for name in ("a", "b")]
     given = {
-        "problem": SimpleNamespace(runs=runs, vehicle=VEHICLE), "amplitude": 50e3, "beside_form": None,
+        "problem": SimpleNamespace(runs=runs, vehicle=VEHICLE), "amplitude": 50e3, "needs_form": False,
         "torque": lambda value: words.torque(VEHICLE, value), "title": lambda name: units.title(VEHICLE, CATALOGUE[name]),
     }  # fmt: skip
     return SimpleNamespace(**(given | more))

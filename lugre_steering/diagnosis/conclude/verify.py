@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Verification on samples that neither fitting nor selection saw, and intervals that respect coloured errors."""
+"""Verification on samples that neither fitting nor selection saw."""
 
 from __future__ import annotations
 
@@ -9,21 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search import flexible, onset
+from lugre_steering.diagnosis.search import onset
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import CYCLE, Mask, Split, split
 from lugre_steering.recording import Array, IntArray
 
 RESAMPLES = 2000
-STRETCHES = 6
 ENOUGH = 5
 """Stretches of CLUSTER_S that must be left to judge by."""
-BEND = 0.03
-"""Standard deviation of what a law is off its own torque at any place: a few per cent, by judgement; laws fit no better."""
 NORMAL = float(stats.norm.ppf(0.975))
-WIDTH = float(stats.t.ppf(0.975, STRETCHES - 1))
-"""Half width of a 95 % interval in standard deviations known from STRETCHES estimates."""
+"""Half width of a 95 % interval in standard deviations."""
 
 
 def rmse(problem: Problem, result: Fit, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
@@ -81,46 +77,3 @@ def _judge(before: Array, after: Array, held: Mask, clusters: IntArray, seed: in
     low, high = np.quantile(gains, [0.025, 0.975])
     rms = [float(np.sqrt(total.sum() / held.sum())) for total in (before_sum, after_sum)]
     return Judged(rms[0], rms[1], 1.0 - rms[1] / rms[0], (float(low), float(high)))
-
-
-def jackknife(problem: Problem, result: Fit, weight: Array) -> Array:
-    """Standard deviations (q,) of the free effect parameters: the fit repeated without each of some long stretches in turn.
-
-    Errors of the laws themselves differ from stretch to stretch, so they widen it as they should (Quenouille 1949).
-    """
-    parts = max(2, round(STRETCHES / len(problem.runs)))
-    stretch = np.concatenate([
-        bag * parts + np.arange(run.time.size) * parts // run.time.size for bag, run in enumerate(problem.runs)
-    ])  # fmt: skip
-    estimates = []
-    for left_out in range(int(stretch[-1]) + 1):
-        kept = np.where(stretch == left_out, 0.0, weight)
-        fitted = fit(problem, kept, result.effects, result.x, linearisations=4)
-        estimates.append([values[key] for candidate, values in fitted.effects for key in candidate.free])
-    spread = np.array(estimates)
-    return np.asarray(np.sqrt((len(spread) - 1.0) * np.var(spread, axis=0)))
-
-
-def robust_covariance(problem: Problem, result: Fit, weight: Array, cluster: IntArray) -> Array:
-    """Covariance of all fitted values (cluster-robust sandwich; Liang and Zeger 1986), at least the homoscedastic one."""
-    scores = result.jacobian * ((problem.measured - result.prediction) * weight)[:, None]
-    count = int(cluster.max()) + 1
-    summed = np.zeros((count, scores.shape[1]))
-    np.add.at(summed, cluster, scores)
-    bread = result.covariance
-    sandwich = bread @ (summed.T @ summed) @ bread
-    own = np.maximum(np.diag(sandwich), 1e-300)
-    scale = np.sqrt(np.maximum(np.diag(bread), own) / own)
-    return np.asarray(sandwich * np.outer(scale, scale))
-
-
-def form_spread(problem: Problem, result: Fit, weight: Array) -> Array:
-    """Standard deviations (q,) of all fitted values from the form of the laws: each bends by BEND of its torque, independently at
-    some places along its own coordinate.
-
-    Nature's law is not the one that is fitted, and no length of recording mends that (Kennedy and O'Hagan 2001).
-    """
-    shifts = np.hstack([
-        result.covariance @ (result.jacobian.T @ flexible.bends(problem, result, weight, index)) for index in range(len(result.effects))
-    ])  # fmt: skip
-    return np.asarray(BEND * np.sqrt(np.sum(shifts**2, axis=1)))

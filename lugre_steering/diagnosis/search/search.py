@@ -72,7 +72,7 @@ def search(
             found.append(Found(score, (), (), current.cost - result.cost, given=True))
             current = result
     now, current = settled(problem, weight, current)
-    found = [replace(item, rivals=_rivals(now, noise, weight, split, current, i)) for i, item in enumerate(found)]
+    found = [replace(item, rivals=_rivals(now, noise, weight, split, current, i, None)) for i, item in enumerate(found)]
     problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
     given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
     while len(found) < given + MAX_EFFECTS:
@@ -96,6 +96,9 @@ def search(
         found.append(Found(chosen.score, names, tuple(own.trials), taken))
         found, current = _pruned(there, weight, found, best)
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
+    for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
+        if item.rivals:
+            found[i] = replace(item, rivals=_rivals(now, noise, weight, split, current, i, item.rivals))
     problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
     if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
@@ -122,8 +125,10 @@ def _round(
     return Proposal(problem, current, tuple(scores), proposed(problem, weight, current, scores, progress))
 
 
-def _rivals(problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, index: int) -> tuple[str, ...]:
-    """Known rivals of one effect of a fit, and those with the best fingerprints, that would do as well in its place."""
+def _rivals(
+    problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, index: int, among: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Effects, ``among`` some or its known rivals and those with the best fingerprints, that would do as well as one of a fit."""
     own = current.effects[index]
     rest = [effect for i, effect in enumerate(current.effects) if i != index]
     without = fit(problem, weight, rest, current.x, linearisations=6)
@@ -132,7 +137,7 @@ def _rivals(problem: Problem, noise: Noise, weight: Array, split: Split, current
         best.setdefault(score.candidate.effect.id, score)
     tried = Round(problem, weight, without, list(best.values()))
     champion = Trial(best[own[0].effect.id], replace(current, effects=(*rest, own)), current.cost)
-    names = {*own[0].effect.rivals, *list(best)[:LEADING]} & {*best} - {own[0].effect.id}
+    names = {*((*own[0].effect.rivals, *list(best)[:LEADING]) if among is None else among)} & {*best} - {own[0].effect.id}
     trials = [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
     return tuple(trial.candidate.effect.id for trial in tied(problem, weight, split, champion, trials, without.cost))
 
