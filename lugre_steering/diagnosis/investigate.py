@@ -18,10 +18,12 @@ from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
+from lugre_steering.recording import IntArray
 
 NULL_DRAWS = 16
-SAMPLES, FASTEST_HZ = 6000, 200.0
-"""Samples on which names are compared, unless the recording is slow, and the rate beyond which there is nothing to be seen."""
+SAMPLES, FASTEST_HZ, ALONE = 6000, 200.0, 5
+"""Samples on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
+times as many are as quick without freedoms."""
 NOISE_ROUNDS, QUIETER = 2, 0.8
 """Searches repeated, and the fall of the noise floor, once physics is found, that asks for it."""
 
@@ -44,15 +46,24 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
 
 def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progress: Callable[[str], None]) -> Finished:
     """What the search comes to, with names fitted as a vehicle file holds them: without the freedoms."""
-    thin, kept = thinned(problem, SAMPLES, FASTEST_HZ)
     # What else joints and axes may do is found by name: their sheets know little of their friction anyhow.
-    freer, words = (thin, ()) if is_rig(problem.vehicle) else bent(thin, baseline)
+    alone = is_rig(problem.vehicle)
+    thin, kept = _coarser(problem, baseline, ALONE * SAMPLES if alone else SAMPLES)
+    freer, words = (thin, ()) if alone else bent(thin, baseline)
     few = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt), Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
     there, found = search(freer, *few, _unbent(freer, few[1], few[0], baseline), progress)
     beside = Finished(there, *few, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))
     weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
     final = fit(problem, weight, found.final.effects, found.final.x[: problem.nuisances], linearisations=20)
     return Finished(problem, noise, roles, replace(found, baseline=baseline, final=final), beside_form=beside)
+
+
+def _coarser(problem: Problem, baseline: Fit, most: int) -> tuple[Problem, IntArray]:
+    """The problem on fewer samples, and which; what longer steps change of the baseline's torque is no error of the model."""
+    thin, kept = thinned(problem, most, FASTEST_HZ)
+    change = np.split(thin.predict_all(baseline.x) - baseline.prediction[kept], thin.edges[1:-1])
+    runs = [replace(run, measured=run.measured + part) for run, part in zip(thin.runs, change, strict=True)]
+    return Problem(thin.vehicle, runs, thin.calibrations), kept
 
 
 def _unbent(problem: Problem, roles: Split, noise: Noise, baseline: Fit) -> Fit:

@@ -17,7 +17,7 @@ import numpy as np
 from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, form_energy
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal
-from lugre_steering.diagnosis.search.trial import Trial, cost, rank
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial, cost, rank
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import TYPICAL, Problem
 from lugre_steering.fitting.split import Split
@@ -26,10 +26,11 @@ from lugre_steering.recording import Array
 SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
 OWN_SHARE = 0.1
-"""Share of the simulation's own error that may look like one name."""
+"""Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
 MEMORY_S, FORGOTTEN = 3.0, 0.05
 """Longest memory of errors looked for, and the correlation at which it has ended."""
-ROUNDS = 3
+ROUNDS, ALIKE = 3, 0.1
+"""Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
 """Sizes of bends that are tried, in what is typical of real rubber."""
 TIE_T, TIE = 2.5, 10.0
@@ -67,9 +68,11 @@ def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | Non
     """
     for _ in range(ROUNDS):
         now = doubt(problem, result, weight) if own_doubt is None else own_doubt
-        sizes = [problem.doubted(now, TYPICAL * share) for share in SIZES]
+        before, sizes = problem, [problem.doubted(now, TYPICAL * share) for share in SIZES]
         problem = min(sizes, key=lambda each: _expected(each, weight, result))
-        result = fit(problem, weight, result.effects, result.x)
+        result = fit(problem, weight, result.effects, result.x, tolerance=TRIAL_TOLERANCE)
+        if problem.typical == before.typical and abs(problem.doubt - before.doubt) < ALIKE * before.doubt:
+            break
     return problem, result
 
 
@@ -118,8 +121,8 @@ def _volume(problem: Problem, gram: Array) -> float:
 
 def needed(problem: Problem, result: Fit, weight: Array) -> float:
     """Energy that a name must take to be believed, where ``result`` has it."""
-    samples = float(np.count_nonzero(weight))
-    return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + OWN_SHARE * OWN_ERROR * samples
+    own = OWN_ERROR * float(np.count_nonzero(weight)) * (OWN_SHARE if problem.bends.shape[1] else 1.0)
+    return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + own
 
 
 def tied(
