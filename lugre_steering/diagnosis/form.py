@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How else rubber may rub: small smooth freedoms of the friction law itself, each within what real rubber shows.
 
-No friction law is true to a percent. What such a freedom explains is no missing physics, so where names do not explain a
-recording to its noise they have to compete beside these. Each is a law in the chain, so that bristles and heat follow it.
+No friction law is true to a percent. What such a freedom explains is no missing physics, so names are compared beside these. Each is
+a law in the chain, so that bristles and heat follow it.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def search(
             found.append(Found(score, (), (), current.cost - result.cost, given=True))
             current = result
     now, current = settled(problem, weight, current)
-    found = [replace(item, rivals=_rivals(now, noise, weight, split, current, i, None)) for i, item in enumerate(found)]
+    found = [_told(item, _rivals(now, noise, weight, split, current, i, None)) for i, item in enumerate(found)]
     problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
     given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
     while len(found) < given + MAX_EFFECTS:
@@ -98,7 +98,7 @@ def search(
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
-            found[i] = replace(item, rivals=_rivals(now, noise, weight, split, current, i, item.rivals))
+            found[i] = _told(item, _rivals(now, noise, weight, split, current, i, item.rivals))
     problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
     if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
@@ -127,7 +127,7 @@ def _round(
 
 def _rivals(
     problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, index: int, among: Sequence[str] | None
-) -> tuple[str, ...]:
+) -> list[Trial]:
     """Effects, ``among`` some or its known rivals and those with the best fingerprints, that would do as well as one of a fit."""
     own = current.effects[index]
     rest = [effect for i, effect in enumerate(current.effects) if i != index]
@@ -139,7 +139,12 @@ def _rivals(
     champion = Trial(best[own[0].effect.id], replace(current, effects=(*rest, own)), current.cost)
     names = {*((*own[0].effect.rivals, *list(best)[:LEADING]) if among is None else among)} & {*best} - {own[0].effect.id}
     trials = [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
-    return tuple(trial.candidate.effect.id for trial in tied(problem, weight, split, champion, trials, without.cost))
+    return tied(problem, weight, split, champion, trials, without.cost)
+
+
+def _told(item: Found, rivals: Sequence[Trial]) -> Found:
+    """An effect with other rivals, and how these fit."""
+    return replace(item, rivals=tuple(trial.candidate.effect.id for trial in rivals), trials=(*rivals, *item.trials))
 
 
 def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:
