@@ -23,7 +23,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import WrongSheet, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import Suspect, WrongSheet, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import BagFinding, Finding, Recording
@@ -34,6 +34,8 @@ MIN_SLIDING, MIN_SAMPLES = 2.0, 500
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""
 
+MISPLACED_RAD = 0.05
+"""Error of an angle's zero (3 deg) that is no small misalignment."""
 WORTH_A_SHEET = 0.5
 """Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
@@ -98,11 +100,21 @@ def diagnose_recordings(
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
         findings += _by_bag(disturbed)
         done = investigate(Problem(vehicle, runs), seed, progress)
-    if (wrong := _wrong_entry(done)) is not None:
+    if (wrong := _misplaced(done) or _wrong_entry(done)) is not None:
         return _wrong_sheet(qualities, vehicle, findings, wrong)
     findings += _by_bag(weather_findings(done.problem, done.found.final))
     progress("verifying on held-out data")
     return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
+
+
+def _misplaced(done: Finished) -> WrongSheet | None:
+    """An angle sensor so far from its zero that it was put on, or written down, wrongly: no physics is to be read from its angles."""
+    for candidate, values in done.found.final.effects:
+        zero = values.get("offset", 0.0)
+        if "angle" in candidate.effect.hooks and done.problem.vehicle.coordinate.unit == "rad" and abs(zero) > MISPLACED_RAD:
+            said = f"both angles stand about {np.degrees(zero):.1f} deg from their zero"
+            return WrongSheet(1.0, (Suspect("zero of the angle sensors", None, 0.0, 0.0),), said)
+    return None
 
 
 def _wrong_entry(done: Finished) -> WrongSheet | None:

@@ -5,18 +5,25 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from hidden_cases import VEHICLE, cut, made, overlap, thinned
+from small_problem import effect, small_problem, weight
 
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration import coverage
+from lugre_steering.diagnosis import engine
+from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.search import fingerprint
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import BagError
+from lugre_steering.fitting.fit import fit
 from lugre_steering.proof.simulator import Concealed
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
 from lugre_steering.vehicle import load
@@ -83,3 +90,14 @@ def test_the_angle_between_the_tracks_is_no_motion() -> None:
     result = diagnose_recordings([cut(whole, np.inf, since_s=6.0)], vehicle)
     assert result.json["verdict"] == "insufficient_data"
     assert "presliding lengths" in result.json["statement"]
+
+
+@pytest.mark.parametrize(("zero", "told"), [(0.09, "5.2 deg"), (-0.09, "-5.2 deg"), (0.02, None)])
+def test_angles_far_from_their_zero_are_no_physics(zero: float, told: str | None) -> None:
+    """A hidden offset of a degree is named; five degrees are a sensor put on wrongly, and nothing is named before that is right."""
+    problem = small_problem(40.0)
+    final = fit(problem, weight(problem), [effect("angle_offset", offset=zero)], linearisations=1)
+    done = SimpleNamespace(problem=problem, found=SimpleNamespace(final=replace(final, effects=(effect("angle_offset", offset=zero),))))
+    wrong = engine._misplaced(cast(Finished, done))
+    assert (wrong is None) == (told is None)
+    assert wrong is None or (told in wrong.statement and "zero of the angle sensors" in wrong.statement)
