@@ -112,8 +112,11 @@ def _misplaced(done: Finished) -> WrongSheet | None:
     for candidate, values in done.found.final.effects:
         zero = values.get("offset", 0.0)
         if "angle" in candidate.effect.hooks and done.problem.vehicle.coordinate.unit == "rad" and abs(zero) > MISPLACED_RAD:
+            problem, final = done.problem, done.found.final
+            left = float(np.linalg.norm((problem.measured - final.prediction)[problem.valid]))
+            share = left / max(float(np.linalg.norm(problem.measured[problem.valid])), 1e-30)
             said = f"both angles stand about {np.degrees(zero):.1f} deg from their zero"
-            return WrongSheet(1.0, (Suspect("zero of the angle sensors", None, 0.0, 0.0),), said)
+            return WrongSheet(1.0, (Suspect("zero of the angle sensors", None, share, final.cost),), said)
     return None
 
 

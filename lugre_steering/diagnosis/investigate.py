@@ -18,7 +18,7 @@ from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
-from lugre_steering.recording import IntArray
+from lugre_steering.recording import Array, IntArray
 
 NULL_DRAWS = 16
 SAMPLES, FASTEST_HZ, ALONE = 6000, 200.0, 5
@@ -50,9 +50,10 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
     alone = is_rig(problem.vehicle)
     thin, kept = _coarser(problem, baseline, ALONE * SAMPLES if alone else SAMPLES)
     freer, words = (thin, ()) if alone else bent(thin, baseline)
-    few = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt), Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
-    there, found = search(freer, *few, _unbent(freer, few[1], few[0], baseline), progress)
-    beside = Finished(there, *few, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))
+    fewer = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
+    used = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
+    there, found = search(freer, fewer, used, _unbent(freer, np.where(used.fit, 1.0 / fewer.sigma, 0.0), baseline), progress)
+    beside = Finished(there, fewer, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))
     weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
     final = fit(problem, weight, found.final.effects, found.final.x[: problem.nuisances], linearisations=20)
     return Finished(problem, noise, roles, replace(found, baseline=baseline, final=final), beside_form=beside)
@@ -66,9 +67,8 @@ def _coarser(problem: Problem, baseline: Fit, most: int) -> tuple[Problem, IntAr
     return Problem(thin.vehicle, runs, thin.calibrations), kept
 
 
-def _unbent(problem: Problem, roles: Split, noise: Noise, baseline: Fit) -> Fit:
+def _unbent(problem: Problem, weight: Array, baseline: Fit) -> Fit:
     """The baseline with its freedoms; recalibration was bent to imitate what is missing, and from there the way back may be closed."""
-    weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
     starts = [np.append(baseline.x, np.zeros(problem.bends.shape[1])), problem.start()]
     return min((fit(problem, weight, start=start, linearisations=20) for start in starts), key=lambda each: each.cost)
 

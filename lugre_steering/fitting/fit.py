@@ -93,8 +93,8 @@ def fit(
     spread = np.linalg.pinv(slope.T @ slope + np.diag(vector.prior**2), rcond=1e-12)
     covariance = np.asarray(spread * np.outer(natural, natural), float)
     error = (descent.base - problem.measured) * weight
-    return Fit(x, tuple(fitted), descent.base, _cost(error, p * vector.prior, False), slope / natural, covariance,
-               vector.prior / natural, p * vector.prior)
+    pull, pulled = vector.prior / natural, p * vector.prior
+    return Fit(x, tuple(fitted), descent.base, _cost(error, pulled, False), slope / natural, covariance, pull, pulled)
 
 
 @dataclass(frozen=True)

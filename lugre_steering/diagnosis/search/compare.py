@@ -115,7 +115,7 @@ def _gram(problem: Problem, result: Fit) -> Array:
 
 def _volume(problem: Problem, gram: Array) -> float:
     """Logarithm of the squared ratio of the volumes of all freedoms before and after the data."""
-    prior = problem.prior_weights(True) / problem.scales()  # in doubts
+    prior = problem.prior_weights(True) / problem.scales()  # weighed against one doubt, as the data are
     return float(np.linalg.slogdet(np.eye(prior.size) + gram / np.outer(prior, prior))[1])
 
 

@@ -20,17 +20,18 @@ OTHER_AXIS = {"motion": "torque", "thermal": "accumulated slip", "parallel_torqu
 """Coordinate for effects whose own one is no signal, by stage; angle since reversal for the contact."""
 
 
-def bends(problem: Problem, current: Fit, weight: Array, index: int) -> Array:
-    """Weighted columns (n, k): the torque of one effect near each of some places along its own coordinate; they add up to it."""
+def bends(problem: Problem, current: Fit, index: int) -> Array:
+    """Columns (n, k): the torque of one effect near each of some places along its own coordinate; they add up to it where valid."""
     effect = current.effects[index][0].effect
     axes = [locate.coordinates(run, run.measured) for run in problem.runs]
     axis = effect.coordinate if effect.coordinate in axes[0] else OTHER_AXIS.get(effect.stage, "angle since reversal")
     # Laws are odd or even: a difference between the two directions is physics of its own.
     coordinate = np.abs(np.concatenate([bag[axis] for bag in axes]))
     part = locate.contribution(problem, current, index)
-    acting = np.abs(part) * weight > 1e-3 * np.max(np.abs(part) * weight)
+    part = np.where(problem.valid, part, 0.0)
+    acting = np.abs(part) > 1e-3 * np.max(np.abs(part))
     knots = np.unique(np.quantile(coordinate[acting], np.linspace(0.0, 1.0, KNOTS))) if acting.any() else np.zeros(0)
     if knots.size < FEWEST:  # a direction has no places
-        return np.asarray((part * weight)[:, None])
+        return np.asarray(part[:, None])
     columns = np.array([np.interp(coordinate, knots, row) for row in np.eye(knots.size)])
-    return np.asarray((columns * part).T * weight[:, None])
+    return np.asarray((columns * part).T)

@@ -25,8 +25,8 @@ from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
-MAX_EFFECTS, MOST_RIVALS = 3, 6
-LEADING = 3
+MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
+"""Most names, most rivals told of one, and how many of the best fingerprints are tried in place of what every joint has."""
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 BENT = 0.3
@@ -72,7 +72,7 @@ def search(
             found.append(Found(score, (), (), current.cost - result.cost, given=True))
             current = result
     now, current = settled(problem, weight, current)
-    found = [_told(item, _rivals(now, noise, weight, split, current, i, None)) for i, item in enumerate(found)]
+    found = [_told(item, _rivals(now, noise, weight, split, current, item, i)) for i, item in enumerate(found)]
     problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
     given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
     while len(found) < given + MAX_EFFECTS:
@@ -98,7 +98,7 @@ def search(
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
-            found[i] = _told(item, _rivals(now, noise, weight, split, current, i, item.rivals))
+            found[i] = _told(item, _rivals(now, noise, weight, split, current, item, i))
     problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
     if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
@@ -126,9 +126,9 @@ def _round(
 
 
 def _rivals(
-    problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, index: int, among: Sequence[str] | None
+    problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, item: Found, index: int
 ) -> list[Trial]:
-    """Effects, ``among`` some or its known rivals and those with the best fingerprints, that would do as well as one of a fit."""
+    """Rivals that would do as well as one effect of a fit: of those it has had, or of a given one the known ones and best fingerprints."""
     own = current.effects[index]
     rest = [effect for i, effect in enumerate(current.effects) if i != index]
     without = fit(problem, weight, rest, current.x, linearisations=6)
@@ -136,8 +136,9 @@ def _rivals(
     for score in screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest]):
         best.setdefault(score.candidate.effect.id, score)
     tried = Round(problem, weight, without, list(best.values()))
-    champion = Trial(best[own[0].effect.id], replace(current, effects=(*rest, own)), current.cost)
-    names = {*((*own[0].effect.rivals, *list(best)[:LEADING]) if among is None else among)} & {*best} - {own[0].effect.id}
+    champion = Trial(item.score, replace(current, effects=(*rest, own)), current.cost)
+    among = (*own[0].effect.rivals, *list(best)[:FINGERPRINTS]) if item.given else item.rivals
+    names = {*among} & {*best} - {own[0].effect.id}
     trials = [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
     return tied(problem, weight, split, champion, trials, without.cost)
 
@@ -165,7 +166,7 @@ def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fi
 
 def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given: int) -> tuple[Problem, Fit]:
     """The problem where the law of each name may bend too, and the fit there; ``plain``: without any bends of names."""
-    shapes = [flexible.bends(problem, current, problem.valid.astype(float), i) for i in range(given, len(current.effects))]
+    shapes = [flexible.bends(problem, current, i) for i in range(given, len(current.effects))]
     columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
     freed = plain.bent(columns)
     x = np.append(current.x[: plain.nuisances], np.zeros(freed.nuisances - plain.nuisances))
