@@ -78,7 +78,7 @@ def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) 
     sheet = np.concatenate([run.sigma for run in problem.runs])
     weight = np.where(split(problem).fit, 1.0 / sheet, 0.0)
     starts = [fit(problem, weight, linearisations=25), fit(problem, weight, robust=True, linearisations=25)]
-    first = min((fit(problem, weight, start=start.x, linearisations=10) for start in starts), key=lambda f: f.cost)
+    first = min((fit(problem, weight, start=start, linearisations=10) for start in starts), key=lambda f: f.cost)
     noise = noise_model(problem, first.x, (), repeated, seed=seed)
     roles = balanced(problem, ((problem.measured - first.prediction) / noise.sigma) ** 2 - 1.0)
     return noise, roles, fit(problem, np.where(roles.fit, 1.0 / noise.sigma, 0.0), start=first.x)

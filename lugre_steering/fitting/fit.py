@@ -13,8 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.optimize import lsq_linear
+from scipy.linalg import cho_factor, cho_solve
 
 from lugre_steering.effects.entry import Parameter
 from lugre_steering.fitting.problem import Candidate, Problem, in_threads
@@ -25,6 +24,8 @@ ROBUST = 3.0
 STEPS, FORETOLD, FAR = 6, 0.5, 0.03
 """Most steps per linearisation, the share of the foretold fall that a step must bring for another one, and the relative fall of the
 cost per linearisation from which the next one is of effects alone."""
+MOST_SETS = 5
+"""Sets of bounds tried per value."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Fit:
     """Result of a joint fit: nuisance x, effects with their values, prediction (n,) [N m], weighted cost, covariance (q, q).
 
     ``jacobian`` (n, q): change of the prediction per unit of each fitted value, times the weight of each sample. ``pull`` (q,): the same
-    of its prior's error; ``pulled`` (q,): that error at the fit.
+    of its prior's error; ``pulled`` (q,): that error at the fit. ``weight`` (n,) of the samples; ``settled``: no further
+    fall is to be had.
     """
 
     x: Array
@@ -43,12 +45,13 @@ class Fit:
     covariance: Array
     pull: Array
     pulled: Array
+    weight: Array
+    settled: bool
 
     def basis(self, without: slice | None = None) -> Array:
         """Orthonormal columns (n, k) that span what the fitted values can change, but for those ``without``; weighted too."""
         columns = self.jacobian if without is None else np.delete(self.jacobian, without, axis=1)
         return np.asarray(np.linalg.qr(normalised(columns))[0])
-
 
     def tangent(self) -> Array:
         """Orthonormal columns (n + q, k): what the fitted values can change, and below it what that costs by their priors."""
@@ -65,7 +68,7 @@ def fit(
     problem: Problem,
     weight: Array,
     effects: Sequence[tuple[Candidate, Mapping[str, float]]] = (),
-    start: Array | None = None,
+    start: Array | Fit | None = None,
     *,
     linearisations: int = 12,
     robust: bool = False,
@@ -76,12 +79,14 @@ def fit(
     """Joint bounded least squares of calibration, initial bristles and the free parameters of all effects.
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
+    ``start``: nuisances to begin at, or a fit whose nuisances and, as far as the same is fitted, linearisation are gone on with.
     ``tolerance``: relative fall of the cost per step below which the fit ends; ``linearisations``: how often it may linearise
     anew before it ends anyhow; ``worth``: cost that must still be in reach at the present pace. ``robust`` bounds the influence of
     samples beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
     vector = _Vector.of(problem, effects, priors)
-    descent = _Descent(vector, weight, robust, vector.begin(problem.start() if start is None else start))
+    x = problem.start() if start is None else start.x if isinstance(start, Fit) else start
+    descent = _Descent(vector, weight, robust, vector.begin(x), start if isinstance(start, Fit) else None)
     for done in range(linearisations):
         before = descent.left
         descent.advance(tolerance)
@@ -94,7 +99,9 @@ def fit(
     covariance = np.asarray(spread * np.outer(natural, natural), float)
     error = (descent.base - problem.measured) * weight
     pull, pulled = vector.prior / natural, p * vector.prior
-    return Fit(x, tuple(fitted), descent.base, _cost(error, pulled, False), slope / natural, covariance, pull, pulled)
+    return Fit(
+        x, tuple(fitted), descent.base, _cost(error, pulled, False), slope / natural, covariance, pull, pulled, weight, descent.settled,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -145,6 +152,17 @@ class _Vector:
         slopes = [parameter.slope(float(number)) for (_, parameter), number in zip(self.free, p[self.nuisances :], strict=True)]
         return np.concatenate([self.scale, slopes])
 
+    def known(self, earlier: Fit, weight: Array) -> int:
+        """How many of the values, from the first on, an earlier fit with the same weight has a linearisation of."""
+        if earlier.x.size != self.nuisances or not np.array_equal(earlier.weight, weight):
+            return 0
+        shared = self.nuisances
+        for (old, _), (new, _) in zip(earlier.effects, self.effects, strict=False):
+            if old != new:
+                break
+            shared += len(new.free)
+        return shared
+
     def predict(self, p: Array) -> Array:
         return self.problem.predict_all(*self.values(p))
 
@@ -176,11 +194,21 @@ class _Descent:
     ``settled``: no further fall is to be had, as a whole linearisation at this very place says.
     """
 
-    def __init__(self, vector: _Vector, weight: Array, robust: bool, p: Array) -> None:
+    def __init__(self, vector: _Vector, weight: Array, robust: bool, p: Array, earlier: Fit | None) -> None:
         self.vector, self.weight, self.robust, self.p = vector, weight, robust, p
         self.base, self.damping, self.settled = vector.predict(p), 1e-3, False
         self.left = self._cost(p, self.base)
-        self.linearise(whole=True)
+        known = 0 if earlier is None else vector.known(earlier, weight)
+        if earlier is None or not known:
+            self.linearise(whole=True)
+            return
+        self.slope = earlier.jacobian[:, :known] * vector.natural(p)[:known]
+        same = [dict(values) for _, values in vector.effects] == [values for _, values in earlier.effects]
+        self._whole = earlier.settled and known == p.size and same
+        if known < p.size:
+            further = vector.jacobian(p, self.base, known) * weight[:, None]
+            self.slope = np.hstack([self.slope, further])
+        self.gram = self.slope.T @ self.slope
 
     def _cost(self, p: Array, predicted: Array) -> float:
         return _cost((predicted - self.vector.problem.measured) * self.weight, p * self.vector.prior, self.robust)
@@ -243,17 +271,39 @@ def _cost(error: Array, prior_error: Array, robust: bool) -> float:
 
 
 def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
-    """Levenberg-Marquardt step that respects bounds: min 1/2 d'(A + damping diag A) d + g'd, low <= d <= high.
-
-    The small normal equations keep the cost of a step independent of the number of samples.
-    """
+    """Levenberg-Marquardt step that respects bounds."""
     diagonal = np.diag(normal)
     # A column that does nothing has no scale of its own.
-    damped = normal + np.diag(damping * diagonal + 1e-9 * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1e-30)))
-    factor = np.linalg.cholesky(damped)
-    target = solve_triangular(factor, -gradient, lower=True)
-    step = solve_triangular(factor, target, lower=True, trans="T")
-    if np.all((low <= step) & (step <= high)):
-        return np.asarray(step)
-    span = np.maximum(high - low, 1e-12)
-    return np.asarray(lsq_linear(factor.T, target, (low, low + span), method="bvls").x)
+    least = 1e-9 * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1e-30))
+    return bounded_minimum(normal + np.diag(damping * diagonal + least), gradient, low, high)
+
+
+def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> Array:
+    """Where 1/2 d'A d + g'd is least within low <= d <= high, for positive definite A (q, q), by active sets.
+
+    As bounded-variable least squares (Stark and Parker, Comput. Stat. 10 (1995) 129), but on normal equations, whose cost is independent
+    of the number of samples. After MOST_SETS sets of bounds the best one yet is returned.
+    """
+    step = cho_solve(cho_factor(normal), -gradient)
+    held = (step < low) | (step > high)
+    step = np.clip(step, low, high)
+    for _ in range(MOST_SETS * step.size if held.any() else 0):
+        free = ~held
+        wanted = step.copy()
+        if free.any():
+            wanted[free] = cho_solve(cho_factor(normal[np.ix_(free, free)]), -(gradient + normal[:, held] @ step[held])[free])
+        change = wanted - step
+        beyond = (wanted < low) | (wanted > high)
+        if beyond.any():  # as far as the first bound, which then holds
+            room = np.where(change > 0.0, high - step, low - step)[beyond] / change[beyond]
+            first = np.flatnonzero(beyond)[room == room.min()]
+            step += room.min() * change
+            step[first] = np.where(change > 0.0, high, low)[first]
+            held[first] = True
+            continue
+        step = wanted
+        inward = (normal @ step + gradient) * np.where(step <= low, -1.0, 1.0) * held / np.sqrt(np.diag(normal))
+        if not np.any(inward > 0.0):
+            break
+        held[np.argmax(inward)] = False
+    return np.asarray(np.clip(step, low, high))

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.diagnosis.search.fingerprint import score_columns, screen
-from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.fit import Fit, bounded_minimum, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import split
 
@@ -52,6 +52,31 @@ def test_reaches_the_minimum_that_scipy_reaches(problem: Problem, robust: bool) 
     deviations = np.sqrt(np.diag(found.covariance))[: len(TRUTH)]
     assert np.abs((found.x[: len(TRUTH)] - TRUTH) / deviations).max() < 4.0
     assert deviations[:3].max() < 0.02
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_bounded_steps_are_those_of_bounded_least_squares(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((60, 12)) @ (np.eye(12) + rng.standard_normal((12, 12)))
+    target = columns @ rng.uniform(-3.0, 3.0, 12)
+    low, high = -rng.uniform(0.0, 2.0, 12), rng.uniform(0.0, 2.0, 12)  # some on the point of leaving their range
+    found = bounded_minimum(columns.T @ columns, -columns.T @ target, low, high)
+    wanted = lsq_linear(columns, target, (low, high + 1e-12), method="bvls", tol=1e-14, max_iter=1000).x
+    assert np.any(wanted <= low + 1e-9)
+    assert found == pytest.approx(wanted, abs=1e-7)
+
+
+def test_a_fit_gone_on_with_ends_where_one_from_the_start_does(problem: Problem) -> None:
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [effect("viscous_friction", sigma_2=3e3)]))
+    before, viscous = fit(hidden, weight(hidden)), effect("viscous_friction", sigma_2=1e3)
+    anew, gone_on = fit(hidden, weight(hidden), [viscous]), fit(hidden, weight(hidden), [viscous], before)
+    assert gone_on.cost == pytest.approx(anew.cost, rel=1e-4)
+    assert gone_on.effects[0][1]["sigma_2"] == pytest.approx(anew.effects[0][1]["sigma_2"], rel=1e-3)
+    # Other weights have another linearisation, and nothing is taken for settled that is not.
+    half = np.where(np.arange(hidden.measured.size) % 2, weight(hidden), 0.0)
+    assert fit(hidden, half, [viscous], before).cost == pytest.approx(fit(hidden, half, [viscous]).cost, rel=1e-4)
+    stuck = replace(before, x=before.x + 0.1 * problem.scales(), settled=True)
+    assert fit(hidden, weight(hidden), start=stuck).cost == pytest.approx(before.cost, rel=1e-3)
 
 
 def test_the_jacobian_at_the_end_is_that_of_the_end(problem: Problem) -> None:

@@ -336,7 +336,8 @@ def test_an_onset_must_explain_clearly_more_to_stand_for_a_group() -> None:
 
     def made_up(candidate: Candidate, cost: float, since: tuple[float, ...] = ()) -> trial.Trial:
         nothing = np.zeros((1, 1))
-        made = Fit(nothing[0], ((replace(candidate, since=since), {}),), nothing[0], cost, nothing, nothing, nothing[0], nothing[0])
+        named = ((replace(candidate, since=since), {}),)
+        made = Fit(nothing[0], named, nothing[0], cost, nothing, nothing, nothing[0], nothing[0], nothing[0], True)
         return trial.Trial(score, made, cost)
 
     always, late = made_up(candidates[0], 500.0), made_up(candidates[1], 480.0, (10.0, 10.0))

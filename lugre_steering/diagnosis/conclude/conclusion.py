@@ -126,12 +126,12 @@ def _whole(done: Finished, final: Fit) -> tuple[Fit, Fit]:
     there = done.compared
     if not final.effects:
         return fit(done.problem, done.weight, (), final.x), there.found.baseline
-    bent = fit(there.problem, there.weight, there.found.final.effects, there.found.final.x)
+    bent = fit(there.problem, there.weight, there.found.final.effects, there.found.final)
     for index, (candidate, values) in enumerate(bent.effects):
         if candidate.since:
             effects = [*bent.effects]
             effects[index] = (replace(candidate, since=onset.timed(there.problem, there.weight, bent, index)), values)
-            again = fit(there.problem, there.weight, effects, bent.x)
+            again = fit(there.problem, there.weight, effects, bent)
             bent = again if again.cost < bent.cost else bent
     return fit(done.problem, done.weight, bent.effects, bent.x[: done.problem.nuisances], linearisations=20), bent
 

@@ -94,12 +94,12 @@ def _lines(done: Finished, bent: Fit, index: int, item: Found) -> str:
     rest = [effect for i, effect in enumerate(bent.effects) if i != index]
 
     def with_line(line: str) -> Trial:
-        fitted = fit(problem, weight, [*rest, (replace(candidate, line=line), values)], bent.x, linearisations=6)
+        fitted = fit(problem, weight, [*rest, (replace(candidate, line=line), values)], bent, linearisations=6)
         return Trial(item.score, fitted, fitted.cost)
 
     own = with_line(candidate.line)
     others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
-    before = fit(problem, weight, rest, bent.x, linearisations=6).cost
+    before = fit(problem, weight, rest, bent, linearisations=6).cost
     equal = tied(problem, weight, done.compared.roles, own, others, before, law=0.0)
     key = candidate.free[0]
     unit = done.unit(candidate.parameter(key).unit)

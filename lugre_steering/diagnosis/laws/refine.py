@@ -178,7 +178,7 @@ def closed_law(
 
 def with_law(problem: Problem, weight: Array, before: Fit, law: tuple[Candidate, dict[str, float]]) -> Fit:
     """A fit with one law more, everything set free."""
-    return fit(problem, weight, [*before.effects, law], before.x, linearisations=5, tolerance=1e-4)
+    return fit(problem, weight, [*before.effects, law], before, linearisations=5, tolerance=1e-4)
 
 
 def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: int) -> Fit:

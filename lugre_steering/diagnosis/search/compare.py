@@ -70,7 +70,7 @@ def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | Non
         now = doubt(problem, result, weight) if own_doubt is None else own_doubt
         before, sizes = problem, [problem.doubted(now, TYPICAL * share) for share in SIZES]
         problem = min(sizes, key=lambda each: _expected(each, weight, result))
-        result = fit(problem, weight, result.effects, result.x, tolerance=TRIAL_TOLERANCE)
+        result = fit(problem, weight, result.effects, result, tolerance=TRIAL_TOLERANCE)
         if problem.typical == before.typical and abs(problem.doubt - before.doubt) < ALIKE * before.doubt:
             break
     return problem, result

@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from lugre_steering import units
 from lugre_steering.chain.compiled import njit
-from lugre_steering.fitting.fit import Fit, fit, normalised
+from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
@@ -60,27 +60,30 @@ def strongest(problem: Problem, baseline: Fit, weight: Array) -> Pattern:
     """The pattern that explains most of what a fit leaves over (its effects stay), recalibrated beside it."""
     families = _families(problem, baseline)
     trials = [(family, value) for family in families for value in family.grid]
-    family, value = min(trials, key=lambda trial: _left(problem, baseline, weight, trial[0].columns(trial[1]))[0])
+    basis = baseline.basis()
+    family, value = min(trials, key=lambda trial: _left(problem, baseline, basis, trial[0].columns(trial[1]))[0])
     near = 1.0 + 1.0 / len(family.grid)
     value = float(np.exp(minimize_scalar(
-        lambda log: _left(problem, baseline, weight, family.columns(float(np.exp(log))))[0],
+        lambda log: _left(problem, baseline, basis, family.columns(float(np.exp(log))))[0],
         bounds=(np.log(value / near), np.log(value * near)), method="bounded", options={"xatol": 1e-4},
     ).x))  # fmt: skip
     columns, beside, rest = (family.more or family.columns)(value), baseline, copy.copy(problem)
     for _ in range(ROUNDS):
-        coefficients = _left(problem, beside, weight, columns)[1]
+        coefficients = _left(problem, beside, beside.basis(), columns)[1]
         torque = columns @ coefficients
         rest.measured = problem.measured - torque
-        beside = fit(rest, weight, beside.effects, beside.x, linearisations=6)
+        beside = fit(rest, weight, beside.effects, beside, linearisations=6)
     return Pattern(torque, beside, family.text(value, coefficients))
 
 
-def _left(problem: Problem, beside: Fit, weight: Array, columns: Array) -> tuple[float, Array]:
-    """Energy left over by a pattern and a linear recalibration together, and the pattern's coefficients (k,)."""
-    both = np.column_stack([columns * weight[:, None], normalised(beside.jacobian)])
-    error = (problem.measured - beside.prediction) * weight
-    solution = np.linalg.lstsq(both, error, rcond=1e-10)[0]
-    return float(np.sum((error - both @ solution) ** 2)), np.asarray(solution[: columns.shape[1]], np.float64)
+def _left(problem: Problem, beside: Fit, basis: Array, columns: Array) -> tuple[float, Array]:
+    """Energy left over by a pattern and a linear recalibration (``basis``) together, and the pattern's coefficients (k,)."""
+    pattern = columns * beside.weight[:, None]
+    pattern -= basis @ (basis.T @ pattern)
+    error = (problem.measured - beside.prediction) * beside.weight
+    error -= basis @ (basis.T @ error)
+    coefficients = np.linalg.lstsq(pattern, error, rcond=1e-10)[0]
+    return float(np.sum((error - pattern @ coefficients) ** 2)), np.asarray(coefficients, np.float64)
 
 
 def _families(problem: Problem, baseline: Fit) -> tuple[_Family, ...]:

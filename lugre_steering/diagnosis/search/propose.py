@@ -66,14 +66,14 @@ def proposed(
 
 def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposal:
     """What leads in some rounds once more, with all parts of its laws, in one world."""
-    current = fit(problem, weight, seen[0].current.effects, seen[0].current.x)
+    current = fit(problem, weight, seen[0].current.effects, seen[0].current)
     leading: dict[str, Trial] = {}
     for own in seen:
         best = own.before - own.trials[0].cost if own.trials else 0.0
         leading |= {trial.candidate.label: trial for trial in own.trials if own.before - trial.cost > LEADING * best}
     trials = []
     for trial in leading.values():
-        again = fit(problem, weight, trial.fit.effects, trial.fit.x, tolerance=TRIAL_TOLERANCE)
+        again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE)
         trials.append(refine(problem, weight, replace(trial, fit=again, cost=again.cost)))
     return Proposal(problem, current, seen[0].scores, ranked(trials, current.cost))
 

@@ -55,4 +55,4 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> lis
 
 
 def _fitted(problem: Problem, weight: Array, effects: Sequence[tuple[Candidate, Values]], near: Fit) -> Fit:
-    return fit(problem, weight, effects, near.x, tolerance=TRIAL_TOLERANCE)
+    return fit(problem, weight, effects, near, tolerance=TRIAL_TOLERANCE)

@@ -111,14 +111,14 @@ def search(
 
 def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
     """Energy that the last name of ``best`` takes, the bends as large as the data ask for without it and with it."""
-    return left(*settled(there, weight, fit(there, weight, current.effects, current.x), there.doubt)) - left(there, best)
+    return left(*settled(there, weight, fit(there, weight, current.effects, current), there.doubt)) - left(there, best)
 
 
 def _round(
     problem: Problem, noise: Noise, weight: Array, current: Fit, further: bool, progress: Callable[[str], None]
 ) -> Proposal:
     """What is proposed beside a fit."""
-    current = fit(problem, weight, current.effects, current.x)
+    current = fit(problem, weight, current.effects, current)
     scores = screen(problem, current, weight, noise.draws, [candidate.effect.id for candidate, _ in current.effects])
     if further:  # a wrong shape of the first shows at some events, which late variants fit like a glove
         scores = [score for score in scores if not score.candidate.since]
@@ -131,7 +131,7 @@ def _rivals(
     """Rivals that would do as well as one effect of a fit: of those it has had, or of a given one the known ones and best fingerprints."""
     own = current.effects[index]
     rest = [effect for i, effect in enumerate(current.effects) if i != index]
-    without = fit(problem, weight, rest, current.x, linearisations=6)
+    without = fit(problem, weight, rest, current, linearisations=6)
     best: dict[str, Score] = {}
     for score in screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest]):
         best.setdefault(score.candidate.effect.id, score)
@@ -155,7 +155,7 @@ def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fi
         if kept[index].given:
             continue
         rest = [effect for i, effect in enumerate(current.effects) if i != index]
-        without = fit(problem, weight, rest, current.x, linearisations=20, tolerance=TRIAL_TOLERANCE)
+        without = fit(problem, weight, rest, current, linearisations=20, tolerance=TRIAL_TOLERANCE)
         if without.cost - current.cost < needed(problem, current, weight):
             dropped = kept.pop(index)
             # Together they explained what the latest now explains alone.

@@ -70,17 +70,17 @@ class Round:
 
     def _joint(self, score: Score) -> Trial:
         if not _cornered(self.problem, self.current):
-            return self._fitted(score, self.current.x, linearisations=START + GO_ON, worth=self.worth)
+            return self._fitted(score, self.current, linearisations=START + GO_ON, worth=self.worth)
         # Recalibration was bent to imitate what is missing; from there the way back may be closed.
-        started = [self._fitted(score, x, linearisations=START) for x in (self.current.x, self.problem.start())]
+        started = [self._fitted(score, x, linearisations=START) for x in (self.current, self.problem.start())]
         ahead = min(started, key=lambda each: each.cost)
         gone_on = fit(
-            self.problem, self.weight, ahead.fit.effects, ahead.fit.x, linearisations=GO_ON, tolerance=TRIAL_TOLERANCE,
+            self.problem, self.weight, ahead.fit.effects, ahead.fit, linearisations=GO_ON, tolerance=TRIAL_TOLERANCE,
             worth=self.worth,
         )
         return Trial(score, gone_on, gone_on.cost)
 
-    def _fitted(self, score: Score, start: Array, *, linearisations: int = START + GO_ON, worth: float = np.inf) -> Trial:
+    def _fitted(self, score: Score, start: Array | Fit, *, linearisations: int = START + GO_ON, worth: float = np.inf) -> Trial:
         """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
         candidate = score.candidate
         shapes = dict(candidate.shapes)
@@ -125,7 +125,8 @@ class Round:
             and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
         ]  # fmt: skip
         typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))
-        starts = [*((score, trial.fit.x) for score in variants[:VARIANTS]), (typical, self.problem.start())]
+        starts: list[tuple[Score, Array | Fit]] = [(score, trial.fit) for score in variants[:VARIANTS]]
+        starts.append((typical, self.problem.start()))
         best = trial
         for score, x in starts:
             best = min([best, self._fitted(score, x, worth=best.cost)], key=lambda each: each.cost)
@@ -149,7 +150,7 @@ def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
     *earlier, (candidate, values) = trial.fit.effects
     since = onset.timed(problem, weight, trial.fit, len(earlier))
     effects = [*earlier, (replace(candidate, since=since), values)]
-    result = fit(problem, weight, effects, trial.fit.x, linearisations=8, tolerance=TRIAL_TOLERANCE)
+    result = fit(problem, weight, effects, trial.fit, linearisations=8, tolerance=TRIAL_TOLERANCE)
     return Trial(trial.score, result, result.cost) if result.cost < trial.cost else trial
 
 
@@ -174,7 +175,7 @@ def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
     kept = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
     richer = replace(candidate, free=(*candidate.free, *kept))
-    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit, linearisations=12, tolerance=TRIAL_TOLERANCE)
     left = result.cost
     while weak := _weak(result, values, kept, problem.doubt):
         # Two that do the same work are both weak, yet not both superfluous.
@@ -204,4 +205,4 @@ def _without(problem: Problem, weight: Array, result: Fit, values: Values, dropp
     *earlier, (candidate, fitted) = result.effects
     leaner = replace(candidate, free=tuple(name for name in candidate.free if name not in dropped))
     start = {**values, **{name: value for name, value in fitted.items() if name not in dropped}}
-    return fit(problem, weight, [*earlier, (leaner, start)], result.x, linearisations=8)
+    return fit(problem, weight, [*earlier, (leaner, start)], result, linearisations=8)
