@@ -23,7 +23,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import Suspect, WrongSheet, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_instead, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import BagFinding, Finding, Recording
@@ -83,12 +83,15 @@ def diagnose_recordings(
         return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
     problem, roles = clocks.problem, split(clocks.problem)
     progress("comparing with the vehicle file")
-    if roles.fit.sum() >= MIN_SAMPLES and (wrong := wrong_sheet(problem)) is not None:
-        return _wrong_sheet(qualities, vehicle, [*findings, *_by_bag(clocks.findings)], wrong)
+    suspected = wrong_sheet(problem) if roles.fit.sum() >= MIN_SAMPLES else None
+    if suspected is not None and suspected.certain:
+        return _wrong_sheet(qualities, vehicle, [*findings, *_by_bag(clocks.findings)], suspected)
     if lacking := _lacking(problem, int(roles.fit.sum())):
         return _undetermined(qualities, vehicle, findings, problem, lacking)
     progress("recalibrating the baseline")
     done = investigate(problem, seed, progress)
+    if suspected is not None and not physics_instead(problem, done.found.final.effects, suspected):
+        return _wrong_sheet(qualities, vehicle, [*findings, *_by_bag(clocks.findings)], suspected)
     if (again := _other_clocks(pieces, clocks, done.found.final)) is not None:
         clocks = again
         done = investigate(clocks.problem, seed, progress)

@@ -77,11 +77,15 @@ class SheetFinding(BagFinding):
 
 @dataclass(frozen=True)
 class WrongSheet:
-    """``times``: measured over expected torque; entries most likely wrong, worst first."""
+    """``times``: measured over expected torque; entries most likely wrong, worst first.
+
+    ``certain``: recalibration stopped at its bounds, where no name can be told from what only makes up for it.
+    """
 
     times: float
     suspects: tuple[Suspect, ...]
     why: str | None = None
+    certain: bool = True
 
     @property
     def statement(self) -> str:
@@ -115,7 +119,16 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     fits = suspect.relative_error < PUT_RIGHT or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise:
         return None
-    return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]))
+    return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]), certain=bool(stuck))
+
+
+def physics_instead(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
+    """Whether with ``effects`` the rest of the sheet is no surprise any more, and less is left than with its worst suspect put right."""
+    if wrong.certain or not effects:
+        return False
+    thin, _ = _doubted(thinned(problem)[0])
+    named = fit(thin, _weight(thin), effects, robust=True, linearisations=25)
+    return named.cost < BETTER * wrong.suspects[0].cost and _surprise(thin, named) < SURPRISE
 
 
 def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = (), rival: float = 1.0) -> WrongSheet | None:

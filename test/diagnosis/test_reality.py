@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from small_problem import effect
 
 from lugre_steering.calibration.coverage import QUICK, record
 from lugre_steering.data.dataset import prepare
@@ -23,12 +24,12 @@ from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_instead, wrong_entry, wrong_sheet
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.online import sheet_words
 from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.simulate.command import load_vehicle
-from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle import EffectEntry, Vehicle
 
 VEHICLE = load_vehicle(None)
 Change = Callable[[Array], Array]
@@ -135,6 +136,22 @@ def test_a_wrong_load_is_told_first(factor: float, times: float) -> None:
     assert "axle.load_N" in [suspect["key"] for suspect in entry["suspects"][:3]]
     load = next(suspect for suspect in entry["suspects"] if suspect["key"] == "axle.load_N")
     assert load["factor"] == pytest.approx(times, rel=0.25)
+
+
+def test_physics_that_leaves_less_than_a_suspected_entry_is_named_instead() -> None:
+    """A heat path left out drives friction and capacity far from the sheet; a mistyped load does too, and no name excuses it."""
+    warmed = VEHICLE.replace(effects=(EffectEntry("heat_partition", {"ground_share": 0.7}),))
+    problem, mistyped = (synchronised(record(warmed, QUICK, 6), sheet).problem for sheet in (VEHICLE, with_load(0.5)))
+    named = [effect("heat_partition", ground_share=0.5)]
+
+    def suspected(cost: float, certain: bool = False) -> WrongSheet:
+        return WrongSheet(1.0, (Suspect("axle.load_N", 1.2, 0.01, cost),), certain=certain)
+
+    assert physics_instead(problem, named, suspected(1e9))
+    assert not physics_instead(problem, named, suspected(0.0))
+    assert not physics_instead(problem, named, suspected(1e9, certain=True))
+    assert not physics_instead(problem, [], suspected(1e9))
+    assert not physics_instead(mistyped, named, suspected(1e9))
 
 
 def test_the_bore_of_one_cylinder_is_found() -> None:

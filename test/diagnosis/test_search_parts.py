@@ -17,6 +17,7 @@ from lugre_steering.effects.relief_saturation import CEILINGS
 from lugre_steering.fitting import noise, split
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem
+from lugre_steering.fitting.sheet import thinned
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import EffectEntry
 
@@ -185,6 +186,25 @@ def test_errors_count_by_how_long_they_last(problem: Problem) -> None:
         doubts.append(compare.doubt(seen, result, weight(problem)))
     # The tail below the least correlation that counts is left out: 5 % of the sum.
     assert np.mean(doubts) == pytest.approx(4.0 * (1.0 + phi) / (1.0 - phi), rel=0.15)
+
+
+def test_errors_of_recordings_at_several_rates_last_as_long_as_they_do(problem: Problem) -> None:
+    """Seconds, not samples: of noise with a memory tau at 50 and at 5 Hz, what comes in 2 tau counts as one."""
+    rng, tau = np.random.default_rng(4), 0.3
+    mixed = Problem(problem.vehicle, [problem.runs[0], thinned(problem, rate_Hz=5.0)[0].runs[1]])
+    used, result = np.ones(mixed.measured.size), fit(mixed, np.ones(mixed.measured.size), linearisations=1)
+    doubts = []
+    for _ in range(20):
+        parts = []
+        for run in mixed.runs:
+            keeps, error = np.exp(-(run.time[1] - run.time[0]) / tau), np.zeros(run.time.size)
+            for i in range(1, error.size):
+                error[i] = keeps * error[i - 1] + rng.standard_normal() * (1.0 - keeps**2) ** 0.5
+            parts.append(2.0 * error)
+        mixed.measured = result.prediction + np.concatenate(parts)
+        doubts.append(compare.doubt(mixed, result, used))
+    samples_per_s = used.size / sum(run.time[-1] - run.time[0] for run in mixed.runs)
+    assert np.mean(doubts) == pytest.approx(4.0 * 2.0 * tau * samples_per_s, rel=0.15)
 
 
 def replace_bends(problem: Problem, bends: Array) -> Problem:
