@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from small_problem import SIGMA, small_problem, weight, with_torque
+from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
-from lugre_steering.diagnosis.laws.find import FoundLaws, find
+from lugre_steering.diagnosis.laws.find import FoundLaws, find, truer
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.effects.own import read_effects
@@ -69,6 +69,17 @@ def test_a_torque_that_remembers_the_rate_is_found_with_its_time_constant() -> N
     entry = entries(found)[0]
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert entry.memory_size == pytest.approx(1.5, rel=0.2)
+
+
+@pytest.mark.parametrize("beyond", [0.1, None])
+def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | None) -> None:
+    """Viscous friction is that name where a loss begins beyond an angle, and is right where it acts everywhere."""
+    where = (lambda theta: theta > beyond) if beyond is not None else np.ones_like
+    problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * where(run.theta), axis=0)))
+    assert found is not None
+    roles = split(problem)
+    named = fit(problem, np.where(roles.fit, weight(problem), 0.0), [effect("viscous_friction", sigma_2=1e3)])
+    assert truer(problem, np.where(roles.held, weight(problem), 0.0), named, found) == (beyond is not None)
 
 
 def test_nothing_hidden_gives_no_law() -> None:

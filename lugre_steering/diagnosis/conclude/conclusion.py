@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
-from lugre_steering.diagnosis.laws.find import find
+from lugre_steering.diagnosis.laws.find import find, truer
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
@@ -44,15 +44,18 @@ def conclude(
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
+    left = _left(done, named or clock)
+    lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress) if left.structured else None
+    if named and lawful is not None and not truer(problem, done.held, found.final, lawful):
+        lawful = None
+    elif named and lawful is not None:
+        named, left = False, _left(done, False)
     final = found.final if named or clock else found.baseline
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
-    left = _left(done, named or clock)
     verdict: Verdict
-    lawful, beside, laws, law = None, done, [], ""
-    if left.structured and not named:
-        lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress)
+    beside, laws, law = done, [], ""
     if lawful is not None:
         beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
         laws = described(lawful)

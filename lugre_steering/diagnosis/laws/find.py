@@ -27,6 +27,8 @@ SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
 PER_VALUE = 0.01
 """Share of the gain that one more value of a law must bring to be preferred."""
+TRUER = 0.5
+"""Share of what names leave beyond noise that laws must leave at most to stand in their place."""
 TIED = 0.03
 """Share of the gain within which two laws cannot be told apart."""
 
@@ -105,6 +107,13 @@ def find(
         return None
     whole = fit(lawful, every, current.effects, current.x, linearisations=6)
     return FoundLaws(lawful, current, whole, judged, tuple(gains), ties, first_bar, ceiling)
+
+
+def truer(problem: Problem, held: Array, named: Fit, laws: FoundLaws) -> bool:
+    """Whether laws leave far less of the samples ``held`` out (weights) beyond noise than names do, and are no more of them."""
+    noise = float(np.count_nonzero(held))
+    beyond = [float(np.sum(((problem.measured - result.prediction) * held) ** 2)) - noise for result in (named, laws.fitted)]
+    return len(laws.gains) <= len(named.effects) and beyond[1] < TRUER * beyond[0]
 
 
 def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
