@@ -621,6 +621,7 @@ def prove(
     simulator: Annotated[str, typer.Option(help="2 (a world like the sheet's), 3 (other friction, machines, sensors) or all")] = "all",
     kinds: Annotated[str | None, typer.Option(help="only these kinds of cases, e.g. 'dirty,sheet'")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="repeat or resume the run with this seed [a new one]")] = None,
+    each: Annotated[int | None, typer.Option(min=1, help="at most so many at random of each kind of each simulator")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="also run other methods, on one in four of the recordings")] = False,
     as_json: Json = False,
 ) -> None:
@@ -632,7 +633,7 @@ def prove(
 
     with progress_bar() as progress:
         result = run(
-            out, quick=quick, cases=cases, simulator=simulator, kinds=kinds, seed=seed, peers=peers,
+            out, quick=quick, cases=cases, simulator=simulator, kinds=kinds, seed=seed, each=each, peers=peers,
             announce=lambda text: print(f"lugre-steering: {text}", file=sys.stderr), progress=progress,
         )  # fmt: skip
     if as_json:

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from itertools import combinations
+from itertools import combinations, zip_longest
 
 import numpy as np
 
@@ -132,6 +132,14 @@ def quick(cases: Sequence[Hiding]) -> list[Hiding]:
         chosen[case.kind].append(case)
     share = {case.name: i / len(group) for group in chosen.values() for i, case in enumerate(group)}
     return sorted((case for group in chosen.values() for case in group), key=lambda case: share[case.name])
+
+
+def sampled(cases: Sequence[Hiding], each: int) -> list[Hiding]:
+    """At most so many at random of each kind of each simulator; one of every kind first, so that a run cut short has them all."""
+    groups: dict[tuple[int, str], list[Hiding]] = {}
+    for case in sorted(cases, key=lambda case: case.seed):  # seeds are drawn by the seed of the campaign
+        groups.setdefault((case.simulator, case.kind), []).append(case)
+    return [case for some in zip_longest(*(group[:each] for group in groups.values())) for case in some if case is not None]
 
 
 def matching(cases: Sequence[Hiding], pattern: str) -> list[Hiding]:

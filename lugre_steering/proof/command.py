@@ -37,6 +37,7 @@ def run(
     simulator: str = "all",
     kinds: str | None = None,
     seed: int | None = None,
+    each: int | None = None,
     peers: bool = False,
     announce: Callable[[str], None] = lambda _: None,
     progress: Callable[[str, int, int | None], None] = lambda *_: None,
@@ -49,8 +50,9 @@ def run(
             announce(note)
     seed = secrets.randbelow(2**31) if seed is None else seed
     chosen = _chosen(seed, simulator, kinds, cases, quick)
+    chosen = chosen if each is None else campaign.sampled(chosen, each)
     flags = {"--quick": quick, "--peers": peers, f"--simulator {simulator}": simulator != "all"}
-    flags |= {f"--kinds {kinds}": kinds is not None, f"--cases '{cases}'": cases is not None}
+    flags |= {f"--each {each}": each is not None, f"--kinds {kinds}": kinds is not None, f"--cases '{cases}'": cases is not None}
     command = " ".join(["lugre-steering prove --out DIR", f"--seed {seed}", *(flag for flag, given in flags.items() if given)])
     announce(f"{len(chosen)} cases, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
     with output_folder(out):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -296,6 +297,16 @@ def test_campaign_repeats_with_its_seed_only() -> None:
     some = campaign.matching(campaign.campaign(7), "single/end_stop/*")
     assert {case.effects for case in some} == {("end_stop",)}
     assert set(some) <= set(campaign.campaign(7))
+
+
+def test_a_sample_has_some_of_every_kind_of_each_simulator_and_others_with_another_seed() -> None:
+    cases = campaign.campaign(7)
+    few = campaign.sampled(cases, 3)
+    counted = Counter((case.simulator, case.kind) for case in few)
+    assert set(counted) == {(case.simulator, case.kind) for case in cases}
+    assert set(counted.values()) == {3}
+    assert len({(case.simulator, case.kind) for case in few[: len(counted)]}) == len(counted)  # cut short it still has all
+    assert {case.name for case in few} != {case.name for case in campaign.sampled(campaign.campaign(8), 3)}
 
 
 def test_quick_has_every_kind_and_different_effects() -> None:
