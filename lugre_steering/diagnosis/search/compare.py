@@ -128,10 +128,13 @@ def _volume(problem: Problem, gram: Array) -> float:
     return float(np.linalg.slogdet(np.eye(prior.size) + gram / np.outer(prior, prior))[1])
 
 
-def needed(problem: Problem, result: Fit, weight: Array) -> float:
-    """Energy that a name must take to be believed, where ``result`` has it."""
+def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) -> float:
+    """Energy that a name must take to be believed, where ``result`` has it; ``stands``: what the names before it took.
+
+    Of what freedoms and names do, some part is always of another form than nature.
+    """
     own = OWN_ERROR * float(np.count_nonzero(weight)) * (OWN_SHARE if problem.bends.shape[1] else 1.0)
-    return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + own
+    return SURE * problem.doubt + FORM_TAKEN * (form_energy(problem, result, weight) + stands) + own
 
 
 def tied(

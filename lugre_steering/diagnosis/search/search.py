@@ -81,7 +81,9 @@ def search(
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
         there, best = clearest(weight, seen)
-        if not best.effects[len(current.effects) :] or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight):
+        stands = sum(item.gain for item in found[given:])
+        nothing = not best.effects[len(current.effects) :]
+        if nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands):
             break
         progress(f"a closer look at {best.effects[-1][0].label}")
         seen = [closer(world, weight, seen) for world in ([there] if further else worlds(there))]
@@ -90,7 +92,7 @@ def search(
         chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
         there, best = settled(own.problem, weight, chosen.fit)
         taken = _taken(there, weight, current, best)
-        if taken < needed(there, best, weight):
+        if taken < needed(there, best, weight, stands):
             break
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
         found.append(Found(chosen.score, names, tuple(own.trials), taken))
