@@ -67,12 +67,16 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
-    parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
-    changes = np.concatenate([np.gradient(torque, run.time) for run, torque in parts])
-    clocks = np.column_stack([LATE_S * changes * (problem.bag == bag) for bag in bags])
     words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
     freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
-    return freer.bent([clocks]), words  # clocks are apart whatever the friction is like
+    return freer.bent([clocks(problem, base)]), words
+
+
+def clocks(problem: Problem, torque: Array) -> Array:
+    """Columns (n, bags): what a torque (n,) changes by if the sensors of a bag are LATE_S apart, whatever the friction is like."""
+    parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)
+    changes = np.concatenate([np.gradient(part, run.time) for run, part in parts])
+    return np.column_stack([LATE_S * changes * (problem.bag == bag) for bag in range(len(problem.runs))])
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:

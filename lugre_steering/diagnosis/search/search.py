@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lugre_steering.diagnosis.form import clocks
 from lugre_steering.diagnosis.search import flexible, rig
 from lugre_steering.diagnosis.search.compare import clearest, foreign, left, needed, settled, simplest, tied, worlds
 from lugre_steering.diagnosis.search.fingerprint import Score, screen
@@ -167,9 +168,11 @@ def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fi
 
 
 def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given: int) -> tuple[Problem, Fit]:
-    """The problem where the law of each name may bend too, and the fit there; ``plain``: without any bends of names."""
+    """The problem where the law of each name may bend too, and what it adds be late; ``plain``: without any bends of names."""
     shapes = [flexible.bends(problem, current, i) for i in range(given, len(current.effects))]
     columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
+    if plain.bends.shape[1]:
+        columns.append(clocks(problem, current.prediction))
     freed = plain.bent(columns)
     x = np.append(current.x[: plain.nuisances], np.zeros(freed.nuisances - plain.nuisances))
     return settled(freed, weight, fit(freed, weight, current.effects, x))
