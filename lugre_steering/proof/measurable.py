@@ -65,7 +65,11 @@ class Chain:
 
     def measured(self, id_: str, parameters: Mapping[str, Any], scale: float) -> tuple[float | None, float | None, float | None]:
         """Value and interval of an effect's measure: each parameter is moved to the ends of its interval, and the changes that
-        this makes are added as squares. The covariance of parameters is not told, so that a trade-off between two makes it too wide."""
+        this makes are added as squares. The covariance of parameters is not told, so that a trade-off between two makes it too wide.
+
+        None for an effect that the vehicle file does not hold, as it acted in an earlier recording only."""
+        if all(c.effect.id != id_ for c, _ in self.effects):
+            return None, None, None
         without = self.torque([(c, values) for c, values in self.effects if c.effect.id != id_])
 
         def value(name: str = "", moved: float = 0.0) -> float | None:

@@ -87,3 +87,5 @@ def test_chain_measures_its_own_effects(tmp_path: Path) -> None:
     assert (value, low, high) == pytest.approx((500.0, 450.0, 560.0), rel=0.02)
     value, low, high = chain.measured("time_delay", {"delay": {"value": 0.02, "ci95": [0.019, 0.021]}}, SLIDING)
     assert (value, low, high) == pytest.approx((0.02, 0.019, 0.021), rel=0.03)
+    # What acted in an earlier recording only is not in the file, and nothing can be said of it there.
+    assert chain.measured("pressure_drift", {"aux_b": {"value": 1e3, "ci95": [900.0, 1100.0]}}, SLIDING) == (None, None, None)
