@@ -43,7 +43,8 @@ BETTER, GOOD = 0.5, 0.45
 """A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
 WEAK_BETTER = 0.8
 """The same for the unit of a line that hardly works, whose magnitude speaks too."""
-TIE = 1.15
+TIE, SHOWN = 1.15, 3
+"""Error over the least at which hypotheses are as good, and how many others of them are told."""
 OPPOSED = -0.5
 """Correlation of measured and nominal torque, with negative work, that is a flipped sign however poor the model."""
 ABSURD_SHARE = 0.05
@@ -217,11 +218,19 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     best = min(h.error for h in convincing)
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
-    rivals = "".join(f" The same data would come from this: {h.statement}." for h in tied if h is not first)
+    rivals = as_well([(h.error, h.statement) for h in tied if h is not first])
     agrees = f" (relative error of the nominal model {as_is:.2f} as recorded, {first.error:.2f} with that undone)"
     if first.error > POOR:
         rivals += f" That is still poor: more than one wiring fault is possible, or clocks more than {SKEW_RANGE_S:g} s apart."
     return _noted(vehicle, first.faults, f"{agrees}.{rivals}")
+
+
+def as_well(others: Sequence[tuple[float, str]]) -> str:
+    """What else explains the data as well, in sentences; ``others``: error and statement of each."""
+    told = "".join(f" The same data would come from this: {statement}." for _, statement in sorted(others)[:SHOWN])
+    if len(others) > SHOWN:
+        told += f" {len(others) - SHOWN} more would show the same: where so many do, check arms and bores in the vehicle file first."
+    return told
 
 
 def _noted(vehicle: Vehicle, faults: Faults, note: str) -> Faults:

@@ -22,7 +22,7 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import inspect
-from lugre_steering.data.wiring import SKEW_RANGE_S
+from lugre_steering.data.wiring import SKEW_RANGE_S, as_well
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
@@ -643,3 +643,13 @@ def test_too_little_data_is_no_error(left: int, sound: Recording) -> None:
     short = angle("left", lambda s: Signal(s.time_s[:left], s.value[:left]))(sound)
     assert not inspect(short, VEHICLE).blocking
     assert inspect(Recording("empty", 0, {}, {}), VEHICLE).findings == ()
+
+
+def test_many_explanations_are_counted_and_not_all_told() -> None:
+    assert as_well([]) == ""
+    assert as_well([(0.2, "lines a and b are exchanged")]) == " The same data would come from this: lines a and b are exchanged."
+    many = as_well([(0.2 - 0.01 * i, f"plug {i} is wrong") for i in range(20)])
+    assert many.startswith(" The same data would come from this: plug 19 is wrong.")
+    assert "plug 0 " not in many
+    assert "17 more would show the same" in many
+    assert "arms and bores" in many
