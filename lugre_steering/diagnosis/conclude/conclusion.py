@@ -38,7 +38,7 @@ def conclude(
     """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     problem, found = done.problem, done.found
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
-    # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect.
+    # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
     # and an improvement that may be none is none.
     clock = _clocks_alone(found.final, len(problem.runs))
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
