@@ -23,6 +23,7 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import prepare
+from lugre_steering.data.quality import inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.report.page import write_report
@@ -36,6 +37,7 @@ from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
 from lugre_steering.units import label, law, title, words
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.sections import Gravity
 
 CONFIG = Path(__file__).parents[1] / "config"
 EXAMPLES = ("single_joint_example", "linear_axis_example", "one_angle_sensor_example")
@@ -338,3 +340,15 @@ def test_gravity_of_a_joint_is_known_or_found(tmp_path: Path, known: bool) -> No
     conservative += jacking["even"] * np.sin(theta) ** 2 + found["slope_bias"]["torque"]
     np.testing.assert_allclose(conservative, 6.0 * np.cos(theta) + 18.0 * np.sin(theta), atol=0.3)
     assert "Gravity" in next(e for e in done.json["effects"] if e["id"] == "kingpin_jacking")["statement"]
+
+
+@pytest.mark.parametrize(("sign", "refused"), [(1.0, False), (-1.0, True)])
+def test_a_pendulum_whose_sheet_lacks_its_gravity_is_no_wiring_fault(tmp_path: Path, sign: float, refused: bool) -> None:
+    """Gravity ten times the friction hides it; a torque with the wrong sign still shows, as friction then wins work."""
+    heavy = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=Gravity(0.0, 400.0))
+    write_bag(tmp_path / "bag", simulate(heavy, motion_of(BUILT_IN["varied-rates"], heavy), sensing_of(heavy)), "test")
+    recording = read_recording(tmp_path / "bag", heavy.channels)
+    torque = recording.measured_torque
+    assert torque is not None
+    seen = dataclasses.replace(recording, measured_torque=Signal(torque.time_s, sign * torque.value))
+    assert bool(inspect(seen, heavy.replace(gravity=None)).blocking) == refused

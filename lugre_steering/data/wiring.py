@@ -214,7 +214,9 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
         if abs(correlation) < UNLIKE:  # which channel it is, an error that stays poor does not tell
             convincing = [h for h in convincing if h.topics == max(other.topics for other in convincing)]
     if not convincing:
-        return _no_torque(vehicle) if tiny else _unlike(vehicle, correlation) if abs(correlation) < UNLIKE else ()
+        if tiny:
+            return _no_torque(vehicle)
+        return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE and not _lacks_terms(vehicle, run, total) else ()
     best = min(h.error for h in convincing)
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
@@ -223,6 +225,21 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     if first.error > POOR:
         rivals += f" That is still poor: more than one wiring fault is possible, or clocks more than {SKEW_RANGE_S:g} s apart."
     return _noted(vehicle, first.faults, f"{agrees}.{rivals}")
+
+
+def _lacks_terms(vehicle: Vehicle, run: Run, expected: Array) -> bool:
+    """Whether inertia, viscous friction, offset and gravity, which the sheet of a single joint or axis may lack and diagnosis finds,
+    explain with its friction what that alone does not."""
+    if vehicle.hydraulics is not None or vehicle.rubber is not None:
+        return False
+    theta, omega, alpha = run.theta[0], run.omega[0], run.alpha[0]
+    gravity = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else []
+    columns = np.column_stack([expected, alpha, omega, np.ones_like(theta), *gravity])[run.valid]
+    measured = run.measured[run.valid]
+    values = np.linalg.lstsq(columns, measured, rcond=1e-10)[0]
+    explained = 1.0 - float(np.var(measured - columns @ values)) / max(float(np.var(measured)), 1e-300)
+    lost = float((columns[:, [0, 2]] @ values[[0, 2]]) @ omega[run.valid])  # by friction; a flipped sign would win work
+    return lost > 0.0 and explained > GOOD
 
 
 def as_well(others: Sequence[tuple[float, str]]) -> str:
