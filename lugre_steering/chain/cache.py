@@ -33,7 +33,23 @@ class _DamagedError(Exception):
 
 
 class _SealedFile(caching.IndexDataCacheFile):
-    """Index and data files of one function, each sealed when written and looked at before it is read."""
+    """Index and data files of one function, each sealed when written and looked at before it is read.
+
+    Numba numbers the data files: two processes that keep two forms at once would give both one number, and run each other's code. Here
+    a form has a name of its own, is there before the index tells of it, and one process at a time adds to the index.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        name = f"{_SEAL(f'{self._index_name} {key!r}'.encode()).hexdigest()[:24]}.nbc"
+        self._save_data(name, data)
+        turn = _Turn(f"{self._index_path}.turn")
+        try:
+            turn.wait()
+            forms = self._load_index()
+            forms[key] = name
+            self._save_index(forms)
+        finally:
+            turn.end()
 
     def _load_index(self) -> Any:
         _check(self._index_path)
