@@ -126,6 +126,7 @@ def test_a_node_that_is_stopped_says_so_and_leads_the_commands_to_zero() -> None
 
 
 def test_two_nodes_of_one_name_a_missing_topic_and_another_clock_are_told_on_the_console() -> None:
+    begin = time.monotonic()
     with LiveNode() as one, LiveNode() as _, World() as world:
         for _ in range(40):
             world.send(Sample(0, time.time_ns() - 100 * SECOND, 0.0))
@@ -136,7 +137,7 @@ def test_two_nodes_of_one_name_a_missing_topic_and_another_clock_are_told_on_the
 
         world.wait(lambda: told("of this name: their outputs mix") and told("angle/right missing"), 15.0)
         assert told("is use_sim_time to be set?")
-        assert node_output(one).count("angle/right missing") < 5
+        assert node_output(one).count("angle/right missing") <= time.monotonic() - begin  # once a second at most
 
 
 def test_quality_of_service_can_be_overridden() -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from lugre_steering.diagnosis.conclude import limits, verify
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
-from lugre_steering.diagnosis.laws.find import find, truer
+from lugre_steering.diagnosis.laws.find import FoundLaws, find, truer
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
@@ -31,45 +31,46 @@ CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 
 
+@dataclass(frozen=True)
+class _Stands:
+    """What stands: names, laws in their place, or only a clock that is apart; ``judged`` on held-out data, ``left`` beside it."""
+
+    named: bool
+    clock: bool
+    lawful: FoundLaws | None
+    judged: verify.Judged
+    left: LeftOver
+
+    @property
+    def better(self) -> bool:
+        return self.named or self.lawful is not None
+
+    @property
+    def verdict(self) -> Verdict:
+        if self.named:
+            return "missing_physics"
+        return "unlisted_physics" if self.lawful is not None or self.left.structured else "consistent"
+
+
 def conclude(
     done: Finished, findings: Sequence[BagFinding], recordings: Sequence[Recording], *,
     seed: int, material: float, progress: Callable[[str], None],
 ) -> Diagnosis:
     """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     problem, found = done.problem, done.found
-    judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
-    # The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
-    # and an improvement that may be none is none.
-    clock = _clocks_alone(found.final, len(problem.runs))
-    # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
-    stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
-    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
-    left = _left(done, named or clock)
-    lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress) if left.structured else None
-    if named and lawful is not None and not truer(problem, done.held, found.final, lawful):
-        lawful = None
-    elif named and lawful is not None:
-        named, left = False, _left(done, False)
-    final = found.final if named or clock else found.baseline
+    stands = _stands(done, seed, progress)
+    final = found.final if stands.named or stands.clock else found.baseline
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
-    verdict: Verdict
-    beside, laws, law = done, [], ""
-    if lawful is not None:
-        beside, judged, final, whole = replace(done, problem=lawful.problem), lawful.judged, lawful.fitted, lawful.fit
-        laws = described(lawful)
+    beside, laws, law, left = done, [], "", stands.left
+    if (lawful := stands.lawful) is not None:
+        beside, final, whole, laws = replace(done, problem=lawful.problem), lawful.fitted, lawful.fit, described(lawful)
         law = sentence(laws, done.torque)
         left = beside_laws(left, left_over(beside, final), law, formula(laws, problem.vehicle))
-    if named:
-        verdict = "missing_physics"
-    elif left.structured:
-        verdict = "unlisted_physics"
-    else:
-        verdict = "consistent"
-    effects = named_effects(done, whole, bent, material) if named else []
-    better = named or lawful is not None
-    after = judged.after if better else judged.before
+    effects = named_effects(done, whole, bent, material) if stands.named else []
+    judged = stands.judged
+    after = judged.after if stands.better else judged.before
     vehicle = augmented_vehicle(beside, whole, effects, after)
     if lawful is not None:
         vehicle = vehicle.replace(laws=(*vehicle.laws, *entries(lawful)))
@@ -77,12 +78,12 @@ def conclude(
     ended = [effect.id for effect in effects if effect.id not in kept]
     causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
-    advice = next_experiment(done, verdict, whole)
-    headline, statistics = statement(done, verdict, effects, judged, causal, left, ended, law, advice)
+    advice = next_experiment(done, stands.verdict, whole)
+    headline, statistics = statement(done, stands.verdict, effects, judged, causal, left, ended, law, advice)
     return Diagnosis(
         schema=SCHEMA,
         bags=tuple(run.name for run in problem.runs),
-        verdict=verdict,
+        verdict=stands.verdict,
         statement=f"{headline} {statistics}",
         headline=headline,
         noise_floor_Nm=done.noise.floor,
@@ -90,8 +91,8 @@ def conclude(
         augmented=Augmented(
             rmse_Nm=verify.rmse(problem, final, problem.valid),
             heldout_rmse_Nm=after,
-            improvement=judged.gain if better else 0.0,
-            improvement_ci95=judged.interval if better else (0.0, 0.0),
+            improvement=judged.gain if stands.better else 0.0,
+            improvement_ci95=judged.interval if stands.better else (0.0, 0.0),
             causal_rmse_Nm=causal,
             vehicle=vehicle,
         ),
@@ -101,11 +102,27 @@ def conclude(
         data_quality=tuple(findings),
         next_experiment=advice,
         laws=tuple(laws),
-        traces=traces(beside, whole, final, None if judged.rotated else found.final if named else final),
+        traces=traces(beside, whole, final, None if judged.rotated else found.final if stands.named else final),
         evidence=evidence(done.compared, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
         sheet=problem.vehicle,
     ).in_words()
+
+
+def _stands(done: Finished, seed: int, progress: Callable[[str], None]) -> _Stands:
+    """The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
+    and an improvement that may be none is none."""
+    problem, found = done.problem, done.found
+    judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
+    clock = _clocks_alone(found.final, len(problem.runs))
+    # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
+    stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
+    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
+    left = _left(done, named or clock)
+    lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress) if left.structured else None
+    if lawful is None or (named and not truer(problem, done.held, found.final, lawful)):
+        return _Stands(named, clock, None, judged, left)
+    return _Stands(False, clock, lawful, lawful.judged, _left(done, False) if named else left)
 
 
 def _left(done: Finished, named: bool) -> LeftOver:
