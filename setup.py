@@ -60,6 +60,7 @@ setup(
         "test": [
             *DOCS,
             "pytest>=7.4",
+            "pytest-rerunfailures>=15.0",
             "pytest-xdist>=3.7",
             "hypothesis>=6.80",
             "jsonschema>=4.17",

@@ -70,7 +70,7 @@ class Options:
 @njit(nogil=True, cache=True)
 def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residuals):
     """Push messages in the order given; returns how many estimates and residuals were written."""
-    n_estimates, n_residuals = 0, 0
+    n_estimates, n_residuals = np.int64(0), np.int64(0)  # plain zeros are types of their own, and all would be compiled twice
     for i in range(channel.size):
         k = channel[i]
         core.config[0].message += 1

@@ -91,11 +91,11 @@ def run_manoeuvre(
         refuse_foreign([picture])
         done = simulation(what, vehicle, given)
         label = f"{what}, vehicle '{vehicle.name}'"
-        write_bag(folder, done.run, label, storage)
         if note is None:
             from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
 
             draw_simulation(done.run, label, picture)
+        write_bag(folder, done.run, label, storage)  # last: a bag that is there stands in the way of another run
     done = dataclasses.replace(done, bag=str(folder), picture=str(picture) if note is None else None, picture_note=note)
     return done.json
 

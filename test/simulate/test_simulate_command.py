@@ -166,16 +166,17 @@ def test_an_experiment_that_fails_gives_exit_code_1(tmp_path: Path, monkeypatch:
     assert invoke("paper-pavements", "--out", str(tmp_path))[0] == 1
 
 
-def test_an_interrupted_recording_can_be_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("moment", ["write.Writer.write", "figure.draw_simulation"])
+def test_an_interrupted_recording_can_be_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
     vehicle = command.load_vehicle(None)
     with monkeypatch.context() as patch:
-        patch.setattr("lugre_steering.simulate.write.Writer.write", interrupted)
+        patch.setattr(f"lugre_steering.simulate.{moment}", interrupted)
         with pytest.raises(KeyboardInterrupt):
             command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
-    assert list(tmp_path.iterdir()) == []
+    assert not [path for path in tmp_path.iterdir() if path.suffix != ".png"]
     command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
     with pytest.raises(DataError, match="exists already"):
         command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
