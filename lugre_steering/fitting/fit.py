@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dposv
 
 from lugre_steering.effects.entry import Parameter
 from lugre_steering.fitting.problem import Candidate, Problem, in_threads
@@ -284,14 +284,14 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
     As bounded-variable least squares (Stark and Parker, Comput. Stat. 10 (1995) 129), but on normal equations, whose cost is independent
     of the number of samples. After MOST_SETS sets of bounds the best one yet is returned.
     """
-    step = cho_solve(cho_factor(normal), -gradient)
+    step = _solved(normal, -gradient)
     held = (step < low) | (step > high)
     step = np.clip(step, low, high)
     for _ in range(MOST_SETS * step.size if held.any() else 0):
         free = ~held
         wanted = step.copy()
         if free.any():
-            wanted[free] = cho_solve(cho_factor(normal[np.ix_(free, free)]), -(gradient + normal[:, held] @ step[held])[free])
+            wanted[free] = _solved(normal[np.ix_(free, free)], -(gradient + normal[:, held] @ step[held])[free])
         change = wanted - step
         beyond = (wanted < low) | (wanted > high)
         if beyond.any():  # as far as the first bound, which then holds
@@ -307,3 +307,11 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
             break
         held[np.argmax(inward)] = False
     return np.asarray(np.clip(step, low, high))
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Solution of a positive definite system by LAPACK itself: SciPy's own checks take longer than such a small system."""
+    _, solution, wrong = dposv(matrix, right)
+    if wrong:
+        raise np.linalg.LinAlgError("the normal equations are not positive definite")
+    return np.asarray(solution)

@@ -34,16 +34,21 @@ R = TypeVar("R")
 
 def in_threads(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     """Map over threads (the compiled chain releases the interpreter lock), results in order."""
-    if len(items) < 2:
+    if len(items) < 2 or _wanted_threads() == 1:
         return [function(item) for item in items]
     return list(_pool().map(function, items))
 
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    """One pool for the process; the mapped functions never map themselves. LUGRE_STEERING_THREADS limits its size."""
+    """One pool for the process; the mapped functions never map themselves."""
+    return ThreadPoolExecutor(_wanted_threads())
+
+
+def _wanted_threads() -> int:
+    """As many as processors, or as LUGRE_STEERING_THREADS says."""
     wanted = os.environ.get("LUGRE_STEERING_THREADS", "")
-    return ThreadPoolExecutor(int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1)
+    return int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1
 
 
 def is_rig(vehicle: Vehicle) -> bool:

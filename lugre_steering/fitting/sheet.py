@@ -41,6 +41,8 @@ EXPLAINED, BETTER = 0.8, 0.9
 """Share of what the baseline leaves that a wrong entry must explain, and share of what named physics leaves that it may leave."""
 PUT_RIGHT = 0.03
 """Error that is left, as share of the torque, with which a sheet counts as put right."""
+FORETOLD = 0.5
+"""Share of what a wrong entry must explain that its linearisation foretells at least."""
 OFF, SEVERAL = 0.03, 1.1
 """Relative error from which an entry is wrong, and what several wrong entries must be worth against one."""
 TIED = 1.1
@@ -139,7 +141,8 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
-    found = sorted((suspect for suspect, _ in _off((*_levels(thin), *_geometries(thin, baseline)))), key=lambda item: item.cost)
+    entries = (*_levels(thin), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
+    found = sorted((suspect for suspect, _ in _off(entries)), key=lambda item: item.cost)
     if not found:
         return None
     floor = float(np.count_nonzero(thin.valid))
@@ -253,18 +256,22 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
         yield suspect if name else replace(suspect, cost=SEVERAL * suspect.cost), _surprise(trial, result, freed)
 
 
-def _geometries(problem: Problem, baseline: Fit) -> Iterator[tuple[Suspect, float]]:
-    """Hypotheses about single cylinders, and the surprise that each leaves."""
+def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[tuple[Suspect, float]]:
+    """Hypotheses about single cylinders, and the surprise that each leaves; sizes only where ``least`` of what is left beyond noise is
+    foretold to go."""
     hydraulics = problem.vehicle.hydraulics
     for name, cylinder in hydraulics.cylinders.items() if hydraulics is not None else ():
         key = f"hydraulics.cylinders.{name}"
         for entry, scale in (("bore_m", _bore), ("knuckle_m", _knuckle)):
-            factor = 1.0
-            trial, result = problem, baseline
-            for _ in range(2):
-                factor = _better(problem, trial, result, name, partial(scale, cylinder), factor)
-                trial = _changed(problem, name, scale(cylinder, factor))
+            change, trial, result = partial(scale, cylinder), problem, baseline
+            factor, share = _better(problem, trial, result, name, change, 1.0)
+            if share < least:
+                continue
+            for again in (True, False):
+                trial = _changed(problem, name, change(factor))
                 result = _fitted(trial, start=baseline.x)
+                if again:
+                    factor, _ = _better(problem, trial, result, name, change, factor)
             yield _suspect(problem, trial, result, f"{key}.{entry}", factor), _surprise(trial, result)
         trial = _changed(problem, name, replace(cylinder, cap=cylinder.rod, rod=cylinder.cap))
         result = _fitted(trial, start=baseline.x)
@@ -282,16 +289,19 @@ def _knuckle(cylinder: Cylinder, factor: float) -> Cylinder:
 
 def _better(
     problem: Problem, trial: Problem, result: Fit, name: str, change: Callable[[float], Cylinder], factor: float
-) -> float:
-    """The factor on one entry that explains most of what is left, by how it changes the measured torque."""
+) -> tuple[float, float]:
+    """The factor on one entry that explains most of what is left, by how it changes the measured torque, and which share of what is
+    left beyond noise it would explain."""
     weight = _weight(trial)
     turned = (_changed(problem, name, change(factor * 1.02)).measured - trial.measured) * weight / 0.02
     basis = result.basis()
     own = turned - basis @ (basis.T @ turned)
     left = (trial.measured - result.prediction) * weight
-    power = float(own @ own)
-    step = -float(own @ left) / power if power > 0.0 else 0.0
-    return float(np.clip(factor * np.exp(np.clip(step, -0.5, 0.5)), *SCALES))
+    power, along = float(own @ own), float(own @ left)
+    if not power > 0.0:
+        return factor, 0.0
+    beyond = max(float(left @ left) - float(np.count_nonzero(weight)), 1e-30)
+    return float(np.clip(factor * np.exp(np.clip(-along / power, -0.5, 0.5)), *SCALES)), along**2 / power / beyond
 
 
 def _changed(problem: Problem, name: str, cylinder: Cylinder) -> Problem:
