@@ -34,19 +34,19 @@ def level(theta, time, change, angle_low, angle_high, time_start, time_end):
 
 
 def windows(seen: Seen) -> list[Variant]:
-    """Angle windows and time windows over what was visited, each from one edge to another."""
-    found: list[Variant] = []
-    for low, high, ends in (
-        (seen.lowest - 0.01, seen.highest + 0.01, ("angle_low", "angle_high")),
-        (-1.0, seen.longest + 1.0, ("time_start", "time_end")),
-    ):
-        edges = np.linspace(low, high, WINDOW_EDGES)
-        found += [
-            dict(zip(ends, (float(a), float(b)), strict=True))
-            for a, b in itertools.combinations(edges, 2)
-            if b - a < 0.99 * (edges[-1] - edges[0])
-        ]
-    return found
+    """Angle windows and time windows over what was visited, each from one edge to another.
+
+    A window up to an end of what was visited is what lies outside it, with the other sign: of the two, the smaller one of angle and the
+    later one of time are told.
+    """
+    angles = np.linspace(seen.lowest - 0.01, seen.highest + 0.01, WINDOW_EDGES)
+    times = np.linspace(-1.0, seen.longest + 1.0, WINDOW_EDGES)
+    last = WINDOW_EDGES - 1
+    pairs = [(i, j) for i, j in itertools.combinations(range(WINDOW_EDGES), 2) if j - i < last]
+    return [
+        *({"angle_low": float(angles[i]), "angle_high": float(angles[j])} for i, j in pairs if 0 < i < j < last or 2 * (j - i) <= last),
+        *({"time_start": float(times[i]), "time_end": float(times[j])} for i, j in pairs if i > 0),
+    ]
 
 
 EFFECT = Effect(
