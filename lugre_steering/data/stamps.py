@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from lugre_steering.recording import Array, IntArray, Signal
 
@@ -25,6 +26,10 @@ BLOCK_S = 120.0
 PLACES = 24
 """Places of the grid within a period that are tried: no message comes early, but the latest may come a period late."""
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
+SMOOTHED, TOGETHER = 9, 50
+"""Samples over which a slope is taken, as noise in it would pass for late stamps, and differences that count as one error."""
+SURE = 2.0
+"""Standard deviations by which values must deny their stamps."""
 SCATTER_S = 2e-4
 """Scatter that harms nothing."""
 
@@ -99,11 +104,15 @@ def evened(signal: Signal) -> tuple[Signal, float]:
     whole = runs[:, -1] - runs[:, 0] == width - 1
     if whole.sum() < 20:
         return signal, 0.0
-    slope = np.gradient(signal.value, grid.even)
+    slope = savgol_filter(signal.value, SMOOTHED, 2, deriv=1) / grid.period
     late = np.lib.stride_tricks.sliding_window_view((signal.time_s - grid.even) * slope, width)[whole] @ DIFFERENCE
     change = np.lib.stride_tricks.sliding_window_view(signal.value, width)[whole] @ DIFFERENCE
     power = float(late @ late)
+    if power <= 0.0:
+        return signal, 0.0
     # Of truly uneven sampling the values follow the stamps with a factor of one, of late stamps not at all.
-    if power <= 0.0 or float(late @ change) > 0.5 * power:
+    factor = float(late @ change) / power
+    errors = np.add.reduceat(late * (change - factor * late), np.arange(0, late.size, TOGETHER))
+    if factor + SURE * float(np.linalg.norm(errors)) / power > 0.5:
         return signal, 0.0
     return Signal(grid.even, signal.value), grid.scatter

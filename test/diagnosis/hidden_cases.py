@@ -19,8 +19,8 @@ from lugre_steering.recording import Recording, Signal
 from lugre_steering.vehicle import load
 
 VEHICLE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
-STRIDE = 3
-"""At 33 Hz a diagnosis takes a third of the time."""
+STRIDE = 5
+"""At 20 Hz a diagnosis takes a quarter of the time."""
 
 
 def made(folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white") -> tuple[CaseData, list[Path]]:
