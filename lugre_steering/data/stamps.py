@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from lugre_steering.recording import Array, IntArray, Signal
 
@@ -104,7 +103,7 @@ def evened(signal: Signal) -> tuple[Signal, float]:
     whole = runs[:, -1] - runs[:, 0] == width - 1
     if whole.sum() < 20:
         return signal, 0.0
-    slope = savgol_filter(signal.value, SMOOTHED, 2, deriv=1) / grid.period
+    slope = _slopes(grid.even, signal.value)
     late = np.lib.stride_tricks.sliding_window_view((signal.time_s - grid.even) * slope, width)[whole] @ DIFFERENCE
     change = np.lib.stride_tricks.sliding_window_view(signal.value, width)[whole] @ DIFFERENCE
     power = float(late @ late)
@@ -116,3 +115,15 @@ def evened(signal: Signal) -> tuple[Signal, float]:
     if factor + SURE * float(np.linalg.norm(errors)) / power > 0.5:
         return signal, 0.0
     return Signal(grid.even, signal.value), grid.scatter
+
+
+def _slopes(time: Array, value: Array) -> Array:
+    """Slope (n,) of the straight line through the SMOOTHED samples around each, wherever losses have left them."""
+    here = np.arange(time.size)
+    sums = np.zeros((4, time.size))
+    for shift in range(-(SMOOTHED // 2), SMOOTHED // 2 + 1):
+        there = np.clip(here + shift, 0, time.size - 1)
+        t, v = time[there] - time, value[there] - value
+        sums += t, v, t * v, t * t
+    t, v, tv, tt = sums / SMOOTHED
+    return np.asarray((tv - t * v) / (tt - t * t))

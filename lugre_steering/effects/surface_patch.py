@@ -44,7 +44,7 @@ def windows(seen: Seen) -> list[Variant]:
     last = WINDOW_EDGES - 1
     pairs = [(i, j) for i, j in itertools.combinations(range(WINDOW_EDGES), 2) if j - i < last]
     return [
-        *({"angle_low": float(angles[i]), "angle_high": float(angles[j])} for i, j in pairs if 0 < i < j < last or 2 * (j - i) <= last),
+        *({"angle_low": float(angles[i]), "angle_high": float(angles[j])} for i, j in pairs if (i > 0 and j < last) or 2 * (j - i) <= last),
         *({"time_start": float(times[i]), "time_end": float(times[j])} for i, j in pairs if i > 0),
     ]
 

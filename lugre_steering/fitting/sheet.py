@@ -263,19 +263,22 @@ def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator
     for name, cylinder in hydraulics.cylinders.items() if hydraulics is not None else ():
         key = f"hydraulics.cylinders.{name}"
         for entry, scale in (("bore_m", _bore), ("knuckle_m", _knuckle)):
-            change, trial, result = partial(scale, cylinder), problem, baseline
-            factor, share = _better(problem, trial, result, name, change, 1.0)
+            change = partial(scale, cylinder)
+            factor, share = _better(problem, problem, baseline, name, change, 1.0)
             if share < least:
                 continue
-            for again in (True, False):
-                trial = _changed(problem, name, change(factor))
-                result = _fitted(trial, start=baseline.x)
-                if again:
-                    factor, _ = _better(problem, trial, result, name, change, factor)
+            trial, result = _refitted(problem, baseline, name, change(factor))
+            factor, _ = _better(problem, trial, result, name, change, factor)
+            trial, result = _refitted(problem, baseline, name, change(factor))
             yield _suspect(problem, trial, result, f"{key}.{entry}", factor), _surprise(trial, result)
-        trial = _changed(problem, name, replace(cylinder, cap=cylinder.rod, rod=cylinder.cap))
-        result = _fitted(trial, start=baseline.x)
+        trial, result = _refitted(problem, baseline, name, replace(cylinder, cap=cylinder.rod, rod=cylinder.cap))
         yield _suspect(problem, trial, result, f"{key}.cap and .rod exchanged", None), _surprise(trial, result)
+
+
+def _refitted(problem: Problem, baseline: Fit, name: str, cylinder: Cylinder) -> tuple[Problem, Fit]:
+    """The problem of a vehicle with another cylinder, and its fit."""
+    trial = _changed(problem, name, cylinder)
+    return trial, _fitted(trial, start=baseline.x)
 
 
 def _bore(cylinder: Cylinder, factor: float) -> Cylinder:

@@ -20,7 +20,7 @@ from lugre_steering.vehicle import load
 
 VEHICLE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
 STRIDE = 5
-"""At 20 Hz a diagnosis takes a quarter of the time."""
+"""At 20 Hz, as slow field recordings have it."""
 
 
 def made(folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white") -> tuple[CaseData, list[Path]]:
@@ -30,7 +30,7 @@ def made(folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white")
 
 
 def thinned(bags: list[Path]) -> list[Recording]:
-    """The bags with every third sample."""
+    """The bags with one sample of STRIDE."""
 
     def every(signal: Signal) -> Signal:
         return Signal(signal.time_s[::STRIDE], signal.value[::STRIDE])
@@ -42,7 +42,7 @@ def thinned(bags: list[Path]) -> list[Recording]:
 
 
 def thinned_bag(bag: Path, folder: Path) -> Path:
-    """A bag with every third message of each topic."""
+    """A bag with one message of STRIDE of each topic."""
     seen: Counter[str] = Counter()
     kept: list[Message] = []
     with Reader(bag) as reader:

@@ -3,13 +3,14 @@
 """Parts of the conclusion on a small problem whose answer is known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.conclude import experiment, left_over, limits, unlisted
+from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits, unlisted
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.statement import at_end
@@ -123,3 +124,16 @@ def test_each_recording_is_filtered_from_rest() -> None:
     assert np.all(filtered[400:] == 0.0)
     ramp = unlisted._low_pass(np.ones(200), time[400:], 1.0)
     assert ramp[49] == pytest.approx(1.0 - np.exp(-1.0), abs=0.01)
+
+
+@pytest.mark.parametrize(("doubt", "expected"), [(1.0, np.sqrt(1.0 / 9.0)), (200.0, np.sqrt(200.0 / 800.0))])
+def test_a_value_is_no_surer_than_blocks_agree(doubt: float, expected: float) -> None:
+    """A mean of 800 samples whose errors are one with alternating sign in each of ten blocks: the standard error of ten, unless the
+    doubt says more."""
+    cluster = np.repeat(np.arange(40), 20)
+    measured = np.where(cluster // 4 % 2 == 0, 1.0, -1.0)
+    problem, roles = SimpleNamespace(measured=measured, doubt=doubt), SimpleNamespace(cluster=cluster)
+    there = SimpleNamespace(problem=problem, weight=np.ones(800), roles=roles)
+    mean = SimpleNamespace(prediction=np.zeros(800), jacobian=np.ones((800, 1)), covariance=np.array([[1.0 / 800.0]]))
+    found = effects._deviation(SimpleNamespace(compared=there), mean)  # type: ignore[arg-type]
+    assert found[0] == pytest.approx(expected, rel=1e-9)

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +12,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 from lugre_steering.bench import faults
-from lugre_steering.bench.neighbour import Sample
 from lugre_steering.bench.soak import compressed
 
 
@@ -30,18 +28,8 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Iterator[faults.Campai
 
 @pytest.mark.parametrize("name", ["left angle frozen", "noise of one degree", "pressures in bar"])
 def test_a_fault_is_told_limited_and_recovered(campaign: faults.Campaign, name: str) -> None:
-    for _ in range(4):
-        mark = len(campaign.neighbour.sent)
-        score = campaign.samples(name, *faults.faults_of(campaign.vehicle, campaign.rng)[name])
-        if score.passed or not slept(campaign.neighbour.sent[mark:]):
-            break
+    score = campaign.samples(name, *faults.faults_of(campaign.vehicle, campaign.rng)[name])
     assert score.passed, score
-
-
-def slept(sent: list[Sample]) -> bool:
-    """Whether the machine stood still for longer than inputs may: a fault of its own, on which the other one cannot be judged."""
-    stamps = [sample.stamp_ns for sample in sent if sample.channel == 0]
-    return max((b - a for a, b in itertools.pairwise(stamps)), default=0) > 100_000_000
 
 
 def test_a_node_that_is_killed_comes_back(campaign: faults.Campaign) -> None:
