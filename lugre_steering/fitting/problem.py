@@ -185,15 +185,15 @@ class Problem:
 
     def __init__(
         self, vehicle: Vehicle, runs: Sequence[Run], calibrations: Sequence[SheetValue] | None = None, *, more_laws: int = 0,
-        bends: Array | None = None,
+        beside_names: bool = False, bends: Array | None = None,
     ) -> None:
-        """``more_laws``: so many laws are tried in place of effects of the catalogue, of which only the vehicle's are there.
+        """``more_laws``: so many laws are tried, ``beside_names`` of the catalogue or in place of them, with the vehicle's alone.
 
         ``bends`` (n, k): torques [N m] by which the friction law itself may be of another shape, each at its largest.
         """
         self.vehicle = vehicle
         self.runs = list(runs)
-        self.model: Model = build_model(vehicle, lean=more_laws > 0, more_laws=more_laws)
+        self.model: Model = build_model(vehicle, lean=more_laws > 0 and not beside_names, more_laws=more_laws)
         self.calibrations = tuple(calibrations_for(vehicle) if calibrations is None else calibrations)
         self.measured = np.concatenate([run.measured for run in runs])
         self.valid = np.concatenate([run.valid for run in runs])

@@ -40,7 +40,7 @@ def stop(**more: Any) -> NamedEffect:
 
 
 def test_what_where_how_much_and_what_to_do() -> None:
-    assert headline.missing(finished(), [stop()], None, kept=True) == (
+    assert headline.missing(finished(), [stop()], "", None, kept=True) == (
         "Missing from the model: elastic end stop of the steering (end_stop), mostly beyond 28.6 deg of steering angle to either side "
         "(20 % of the time), up to 12.3 kN m (25 % of the torque). Use augmented.yaml, which has it, in replay and in the live node."
     )
@@ -49,14 +49,14 @@ def test_what_where_how_much_and_what_to_do() -> None:
 def test_sensors_are_to_be_checked_and_ties_to_be_told_apart_by_a_drive() -> None:
     drift = stop(id="pressure_offset", stage="measurement", where=(Place("a", ((0.0, 100.0),), "time", (0.0, 100.0), "s"),))
     advice = Experiment("slow-sweeps: half sweeps at 0.5, 1, 4 and 2 deg/s", ("a", "b"), "")
-    said = headline.missing(finished(), [stop(), drift], advice, kept=True)
+    said = headline.missing(finished(), [stop(), drift], "", advice, kept=True)
     assert "(end_stop), mostly beyond" in said
     assert "; and a pressure sensor reads a constant too much (pressure_offset), 50 % of the time, up to" in said
     assert said.endswith(
         "Use augmented.yaml, which has them, in replay and in the live node, and check the pressure sensors, lines and valves, "
         "and drive slow-sweeps next, which tells apart what may be confused."
     )
-    assert "augmented.yaml" not in headline.missing(finished(), [stop()], None, kept=False)
+    assert "augmented.yaml" not in headline.missing(finished(), [stop()], "", None, kept=False)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_sensors_are_to_be_checked_and_ties_to_be_told_apart_by_a_drive() -> Non
 )
 def test_places_are_told_where_they_are_some(coordinate: str, ends: tuple[float, float], place: str) -> None:
     where = (Place("a", ((10.0, 30.0),), coordinate, ends, "rad"),)
-    assert place in headline.missing(finished(), [stop(where=where)], None, kept=True)
+    assert place in headline.missing(finished(), [stop(where=where)], "", None, kept=True)
 
 
 def test_other_verdicts_say_the_error_and_what_to_do() -> None:

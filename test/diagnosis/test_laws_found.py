@@ -79,7 +79,7 @@ def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | 
     assert found is not None
     roles = split(problem)
     named = fit(problem, np.where(roles.fit, weight(problem), 0.0), [effect("viscous_friction", sigma_2=1e3)])
-    assert truer(problem, np.where(roles.held, weight(problem), 0.0), named, found) == (beyond is not None)
+    assert truer(problem, np.where(roles.held, weight(problem), 0.0), named, found, None) == (beyond is not None)
 
 
 def test_nothing_hidden_gives_no_law() -> None:

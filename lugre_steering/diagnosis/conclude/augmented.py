@@ -27,7 +27,7 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
         done = replace(done, problem=problem)
     entries = list(problem.vehicle.effects)
     last = len(problem.runs) - 1
-    for candidate, values in whole.effects if effects else ():
+    for candidate, values in whole.effects[: len(effects)]:
         if not candidate.active_in(last) or candidate.start(last) > problem.runs[last].time[-1]:
             continue
         keep = {p.name: float(values[p.name]) for p in candidate.effect.parameters if values.get(p.name)}

@@ -33,7 +33,8 @@ CONTRADICTED = 0.02
 
 @dataclass(frozen=True)
 class _Stands:
-    """What stands: names, laws in their place, or only a clock that is apart; ``judged`` on held-out data, ``left`` beside it."""
+    """What stands: names, laws beside or without them, or only a clock that is apart; ``judged`` on held-out data, ``left`` beside
+    the names alone."""
 
     named: bool
     clock: bool
@@ -68,7 +69,7 @@ def conclude(
         beside, final, whole, laws = replace(done, problem=lawful.problem), lawful.fitted, lawful.fit, described(lawful)
         law = sentence(laws, done.torque)
         left = beside_laws(left, left_over(beside, final), law, formula(laws, problem.vehicle))
-    effects = named_effects(done, whole, bent, material) if stands.named else []
+    effects = named_effects(beside, whole, bent, material) if stands.named else []
     judged = stands.judged
     after = judged.after if stands.better else judged.before
     vehicle = augmented_vehicle(beside, whole, effects, after)
@@ -102,7 +103,7 @@ def conclude(
         data_quality=tuple(findings),
         next_experiment=advice,
         laws=tuple(laws),
-        traces=traces(beside, whole, final, None if judged.rotated else found.final if stands.named else final),
+        traces=traces(beside, whole, final, None if judged.rotated else found.final if stands.named and not laws else final),
         evidence=evidence(done.compared, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
         sheet=problem.vehicle,
@@ -119,10 +120,17 @@ def _stands(done: Finished, seed: int, progress: Callable[[str], None]) -> _Stan
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
     left = _left(done, named or clock)
-    lawful = find(problem, done.noise, done.roles, found.baseline, seed, progress) if left.structured else None
-    if lawful is None or (named and not truer(problem, done.held, found.final, lawful)):
+    if not left.structured:
         return _Stands(named, clock, None, judged, left)
-    return _Stands(False, clock, lawful, lawful.judged, _left(done, False) if named else left)
+    alone = find(problem, done.noise, done.roles, found.baseline, seed, progress)
+    if not named:
+        return _Stands(False, clock, alone, judged if alone is None else alone.judged, left)
+    beside = find(problem, done.noise, done.roles, found.final, seed, progress)
+    if alone is not None and truer(problem, done.held, found.final, alone, beside):
+        return _Stands(False, clock, alone, alone.judged, _left(done, False))
+    if beside is not None:
+        judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)
+    return _Stands(True, clock, beside, judged, left)
 
 
 def _left(done: Finished, named: bool) -> LeftOver:

@@ -28,15 +28,15 @@ BOTH_SIDES = 0.5
 
 
 def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> list[NamedEffect]:
-    """Entries of the effects in ``whole`` (fitted to all data), largest share first; ``bent``: the same beside all freedoms, which says
-    how sure their values are; ``material``: see ``_statement``."""
+    """Entries of the named effects in ``whole`` (fitted to all data; laws come after them), largest share first; ``bent``: the same
+    beside all freedoms, which says how sure their values are; ``material``: see ``_statement``."""
     problem, found = done.problem, done.found
     intervals = _intervals(done, whole, bent)
     start = cost(problem, found.baseline, done.fitted)
     removed = start - cost(problem, found.final, done.fitted)
     total = sum(item.gain for item in found.found)
     entries = []
-    for index, ((candidate, _), item) in enumerate(zip(whole.effects, found.found, strict=True)):
+    for index, ((candidate, _), item) in enumerate(zip(whole.effects, found.found, strict=False)):
         part = locate.contribution(problem, whole, index)
         size = float(np.max(np.abs(part)))
         rivals = [rival for rival in item.rivals if rival != candidate.effect.id]
@@ -59,7 +59,7 @@ def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedVa
     deviation = _deviation(done, bent)[done.compared.problem.nuisances :]
     position = 0
     found: list[dict[str, FittedValue]] = []
-    for (candidate, values), (_, shifted) in zip(whole.effects, bent.effects, strict=True):
+    for (candidate, values), (_, shifted) in zip(whole.effects, bent.effects, strict=False):
         parameters: dict[str, FittedValue] = {}
         for key in candidate.free:
             half = verify.NORMAL * float(np.hypot(deviation[position], values[key] - shifted[key]))

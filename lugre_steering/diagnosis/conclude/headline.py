@@ -22,10 +22,12 @@ NOT_A_PLACE = frozenset({"time", "direction"})
 """Coordinates whose range says nothing that the share of the time does not say better."""
 
 
-def missing(done: Finished, effects: Sequence[NamedEffect], advice: Experiment | None, kept: bool) -> str:
-    """What the model leaves out, and what to do; ``kept``: augmented.yaml has all of it."""
-    them = "it" if len(effects) == 1 else "them"
-    found = "; and ".join(_found(done, effect) for effect in effects)
+def missing(done: Finished, effects: Sequence[NamedEffect], law: str, advice: Experiment | None, kept: bool) -> str:
+    """What the model leaves out, and what to do; ``law``: one that was found beside the effects, if any; ``kept``: augmented.yaml has
+    all of it."""
+    them = "it" if len(effects) == 1 and not law else "them"
+    beside = [f"beside that {law}, which no entry of the catalogue is"] if law else []
+    found = "; and ".join([*(_found(done, effect) for effect in effects), *beside])
     acts = [f"Use augmented.yaml, which has {them}, in replay and in the live node"] if kept else []
     acts += dict.fromkeys(CHECKS[effect.stage] for effect in effects if effect.stage in CHECKS)
     if advice is not None:

@@ -61,8 +61,8 @@ def statement(
             rest = f"{left.text[:1].upper()}{left.text[1:]}."
             return headline.lawful(law), f"{_gain(done, judged, 'the law')} {floor} {rest}"
         return headline.unlisted(done, judged.before, left.text), f"{floor} Where it lives: unexplained in diagnosis.json."
-    told = headline.missing(done, effects, advice, not ended)
-    them = "it" if len(effects) == 1 else "them"
+    told = headline.missing(done, effects, law, advice, not ended)
+    them = "it" if len(effects) == 1 and not law else "them"
     return told, " ".join([_gain(done, judged, them), floor, *_remarks(done, effects, judged, causal, left, ended)])
 
 

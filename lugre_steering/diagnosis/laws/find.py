@@ -13,7 +13,7 @@ from lugre_steering.diagnosis.conclude import verify
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
-from lugre_steering.diagnosis.loudness import OWN_ERROR
+from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
@@ -28,7 +28,7 @@ SECOND = 0.1
 PER_VALUE = 0.01
 """Share of the gain that one more value of a law must bring to be preferred."""
 TRUER = 0.5
-"""Share of what names leave beyond noise that laws must leave at most to stand in their place."""
+"""Share of what another model leaves beyond noise that one must leave at most to be far truer."""
 TIED = 0.03
 """Share of the gain within which two laws cannot be told apart."""
 
@@ -53,7 +53,8 @@ class Tried:
 
 @dataclass(frozen=True)
 class FoundLaws:
-    """Laws that stand, in ``fit`` (all valid data) of ``problem``, which has places for them; ``judged`` on samples held out.
+    """Laws that stand, in ``fit`` (all valid data) of ``problem``, which has places for them, after the names that they stand beside;
+    ``judged`` on samples held out, against these alone.
 
     ``gains``: energy that each took away when it was added; ``ties``: laws that fit as well as the first; ``bar``: the largest gain
     in errors that hide nothing; ``ceiling``: energy that the best further law would foretell beside those found.
@@ -68,18 +69,27 @@ class FoundLaws:
     bar: float
     ceiling: float
 
+    @property
+    def names(self) -> int:
+        """How many named effects come before the laws in the fits."""
+        return len(self.fit.effects) - len(self.gains)
+
+    def beyond(self, held: Array) -> float:
+        """Energy per sample held out (weights) beyond noise, or beyond what a simulation's own error may leave."""
+        return max(excess(self.problem, self.fitted, held), OWN_ERROR)
+
 
 def find(
-    problem: Problem, noise: Noise, roles: Split, baseline: Fit, seed: int, progress: Callable[[str], None] = lambda _: None
+    problem: Problem, noise: Noise, roles: Split, before: Fit, seed: int, progress: Callable[[str], None] = lambda _: None
 ) -> FoundLaws | None:
-    """Laws in what a fitted baseline without named effects leaves over; None where none stands."""
-    lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS)
+    """Laws in what a fit leaves over, with or without named effects; None where none stands."""
+    lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS, beside_names=bool(before.effects))
     weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
     every = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
     samples = float(roles.fit.sum())
     gains: list[float] = []
     ties: tuple[Tried, ...] = ()
-    current, first_bar, ceiling = baseline, 0.0, 0.0
+    current, first_bar, ceiling = before, 0.0, 0.0
     for index in range(MOST_LAWS):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
@@ -102,18 +112,19 @@ def find(
     if not gains:
         return None
     progress("proving the law")
-    judged = verify.verify(lawful, every, baseline, current, roles, seed)
+    judged = verify.verify(lawful, every, before, current, roles, seed)
     if not judged.interval[0] > 0.0:
         return None
     whole = fit(lawful, every, current.effects, current.x, linearisations=6)
     return FoundLaws(lawful, current, whole, judged, tuple(gains), ties, first_bar, ceiling)
 
 
-def truer(problem: Problem, held: Array, named: Fit, laws: FoundLaws) -> bool:
-    """Whether laws leave far less of the samples ``held`` out (weights) beyond noise than names do, and are no more of them."""
-    noise = float(np.count_nonzero(held))
-    beyond = [float(np.sum(((problem.measured - result.prediction) * held) ** 2)) - noise for result in (named, laws.fitted)]
-    return len(laws.gains) <= len(named.effects) and beyond[1] < TRUER * beyond[0]
+def truer(problem: Problem, held: Array, named: Fit, alone: FoundLaws, beside: FoundLaws | None) -> bool:
+    """Whether laws ``alone``, no more of them than names, leave far less of the samples ``held`` out (weights) beyond noise than the
+    names do, and these help them little: with laws ``beside`` them they do not leave far less again."""
+    if len(alone.gains) > len(named.effects) or not alone.beyond(held) < TRUER * excess(problem, named, held):
+        return False
+    return beside is None or not beside.beyond(held) < TRUER * alone.beyond(held)
 
 
 def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lugre_steering.diagnosis.laws.cells import HATS, Cell, Traces
-from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.fit import Fit, normalised
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array, IntArray
@@ -25,6 +25,8 @@ FOLDS, FOLD_CLUSTERS = 5, 2
 SMOOTHING = (1e-4, 1e-2, 1.0)
 """Weights of the second differences of a free f, as shares of its own energy."""
 RIDGE = 1e-6
+FREE = 1e3
+"""Length of the columns of what is named, in noise standard deviations: so long that priors of one leave it free."""
 PERMUTED = 16
 
 
@@ -85,8 +87,9 @@ class Screen:
         self.problem, self.traces = problem, traces
         self.rows = Rows.of(problem, weight, roles)
         residual = problem.measured - fitted.prediction
-        scale = problem.scales()
-        self.nuisance = self.rows.mean(fitted.jacobian[:, : problem.nuisances] * scale / np.where(weight > 0.0, weight, 1.0)[:, None])
+        slopes = fitted.jacobian / np.where(weight > 0.0, weight, 1.0)[:, None]
+        named = FREE * normalised(self.rows.mean(slopes[:, problem.nuisances :]))
+        self.nuisance = np.column_stack([self.rows.mean(slopes[:, : problem.nuisances] * problem.scales()), named])
         own = self.rows.mean(residual[:, None])
         self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
 

@@ -43,9 +43,12 @@ def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
     made, first = [], found.problem.nuisances
     spread = np.sqrt(np.maximum(np.diag(found.fit.covariance), 0.0))
     gain = 1.0 - (found.judged.after / found.judged.before) ** 2
-    for candidate, values in found.fit.effects:
-        law, deviations = _law(candidate.effect), dict(zip(candidate.free, spread[first:], strict=False))
+    for index, (candidate, values) in enumerate(found.fit.effects):
+        deviations = dict(zip(candidate.free, spread[first:], strict=False))
         first += len(candidate.free)
+        if index < found.names:
+            continue
+        law = _law(candidate.effect)
         cell = law.at(values)
         numbers: dict[str, float] = {}
         knots: tuple[float, ...] = ()
@@ -122,12 +125,13 @@ def described(found: FoundLaws) -> list[dict[str, Any]]:
     """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties."""
     torque = 0.5 * float(np.ptp(found.problem.measured))
     made = []
-    cells = [_law(candidate.effect).at(values) for candidate, values in found.fit.effects]
+    effects = found.fit.effects[found.names :]
+    cells = [_law(candidate.effect).at(values) for candidate, values in effects]
     last = len(found.problem.vehicle.laws) + MOST_LAWS - 1  # a place that is free, or that of the last law itself
     traces = trace(found.problem, found.fit, last, [cell.axis for cell in cells])
-    for index, (entry, (candidate, values)) in enumerate(zip(entries(found), found.fit.effects, strict=True)):
+    for index, (entry, (candidate, values)) in enumerate(zip(entries(found), effects, strict=True)):
         law = _law(candidate.effect)
-        largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, index)), 99.0))
+        largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, found.names + index)), 99.0))
         made.append({
             "id": law.id, "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
             "memory_size": entry.memory_size, "form": entry.form, "values": entry.values, "intervals": {
@@ -136,7 +140,9 @@ def described(found: FoundLaws) -> list[dict[str, Any]]:
             "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
             "share_of_ceiling": sum(found.gains) / (sum(found.gains) + found.ceiling),
             "ties": [_tie(tie) for tie in found.ties] if not index else [],
-            "f": {**_picture(found, index, law, values), **_points(found, index, traces, law, values)},
+            "f": {
+                **_picture(found, found.names + index, law, values), **_points(found, found.names + index, traces, law, values),
+            },
         })  # fmt: skip
     return made
 

@@ -76,6 +76,7 @@ def search(
     found = [_told(item, _rivals(now, noise, weight, split, current, item, i)) for i, item in enumerate(found)]
     problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
     given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
+    sure, waiting = (found, now, current), False
     while len(found) < given + MAX_EFFECTS:
         progress("fingerprints")
         further = len(found) > given
@@ -93,12 +94,19 @@ def search(
         chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
         there, best = settled(own.problem, weight, chosen.fit)
         taken = _taken(there, weight, current, best)
-        if taken < needed(there, best, weight, stands):
+        short = taken < needed(there, best, weight, stands)
+        if short and (waiting or len(found) + 1 == given + MAX_EFFECTS):
             break
         names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
-        found.append(Found(chosen.score, names, tuple(own.trials), taken))
-        found, current = _pruned(there, weight, found, best)
+        both = [*found, Found(chosen.score, names, tuple(own.trials), taken)]
+        found, current = (both, best) if short else _pruned(there, weight, both, best)
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
+        if waiting and len(found) < len(both):
+            break
+        waiting = short  # what another one keeps in doubt may stand beside that one
+        if not waiting:
+            sure = found, now, current
+    found, now, current = sure
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
             found[i] = _told(item, _rivals(now, noise, weight, split, current, item, i))
