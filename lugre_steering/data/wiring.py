@@ -15,6 +15,7 @@ from itertools import combinations, product
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
+from scipy.optimize import lsq_linear
 from scipy.signal import correlate
 from scipy.stats import theilslopes
 
@@ -235,11 +236,13 @@ def _lacks_terms(vehicle: Vehicle, run: Run, expected: Array) -> bool:
     theta, omega, alpha = run.theta[0], run.omega[0], run.alpha[0]
     gravity = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else []
     columns = np.column_stack([expected, alpha, omega, np.ones_like(theta), *gravity])[run.valid]
-    measured = run.measured[run.valid]
-    values = np.linalg.lstsq(columns, measured, rcond=1e-10)[0]
-    explained = 1.0 - float(np.var(measured - columns @ values)) / max(float(np.var(measured)), 1e-300)
-    lost = float((columns[:, [0, 2]] @ values[[0, 2]]) @ omega[run.valid])  # by friction; a flipped sign would win work
-    return lost > 0.0 and explained > GOOD
+    columns, measured = columns / np.linalg.norm(columns, axis=0), run.measured[run.valid]
+    free = measured - columns @ np.linalg.lstsq(columns, measured, rcond=1e-10)[0]
+    # Friction wins no work and inertia weighs: where these explain far more with the other sign, a sign is flipped.
+    least = np.where(np.arange(columns.shape[1]) < 3, 0.0, -np.inf)
+    own = measured - columns @ lsq_linear(columns, measured, (least, np.inf)).x
+    explained = 1.0 - float(np.var(own)) / max(float(np.var(measured)), 1e-300)
+    return explained > GOOD and float(np.std(free)) > BETTER * float(np.std(own))
 
 
 def as_well(others: Sequence[tuple[float, str]]) -> str:

@@ -29,7 +29,7 @@ from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import BagFinding, Finding, Recording
 from lugre_steering.vehicle import Vehicle
 
-MIN_SLIDING, MIN_SAMPLES = 2.0, 500
+MIN_SLIDING, MIN_SAMPLES = 2.0, 300
 """Travel, in presliding lengths, below which friction level and stiffness cannot be told apart; samples that a fit needs."""
 MATERIAL_SHARE = 0.005
 """Default share of the torque amplitude above which an effect is called material; it only labels."""

@@ -50,19 +50,19 @@ def excess(problem: Problem, result: Fit, weight: Array) -> float:
 
 
 def form_energy(problem: Problem, result: Fit, weight: Array) -> float:
-    """Energy, in noise variances, of what the freedoms of the friction law do beyond what a recalibration does as well."""
+    """Energy, in noise variances, of what the freedoms of the friction law do beyond what a recalibration does as well, on as many
+    samples as have a weight: measured where the fit has slopes, which are none of those held out."""
     if not problem.bends.shape[1]:
         return 0.0
-    fitted = np.any(result.jacobian != 0.0, axis=1)  # samples held out have no slopes
     torque = problem.bends @ result.x[problem.first_bend : problem.nuisances]
-    done = beyond_calibration(problem, result, weight * fitted, torque)
-    return done * float(np.count_nonzero(weight)) / max(int(np.count_nonzero(weight * fitted)), 1)
+    done = beyond_calibration(problem, result, torque)
+    return done * float(np.count_nonzero(weight)) / max(int(np.count_nonzero(result.weight)), 1)
 
 
-def beyond_calibration(problem: Problem, result: Fit, weight: Array, torque: Array) -> float:
-    """Energy of a torque (n,), in noise variances, beyond what a recalibration does as well."""
-    used = weight > 0.0
-    columns, values = normalised(result.jacobian[used, : problem.first_bend]), (torque * weight)[used]
+def beyond_calibration(problem: Problem, result: Fit, torque: Array) -> float:
+    """Energy of a torque (n,), in noise variances, beyond what a recalibration does as well; on the samples that were fitted."""
+    used = result.weight > 0.0
+    columns, values = normalised(result.jacobian[used, : problem.first_bend]), (torque * result.weight)[used]
     return float(np.sum((values - columns @ np.linalg.lstsq(columns, values, rcond=1e-8)[0]) ** 2))
 
 

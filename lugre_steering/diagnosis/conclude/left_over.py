@@ -91,7 +91,7 @@ def _form(done: Finished, final: Fit) -> str:
     problem = done.problem
     parts = problem.bends * final.x[problem.first_bend : problem.nuisances]
     energy = {
-        words: beyond_calibration(problem, final, done.weight, parts[:, [own == words for own in done.form]].sum(axis=1))
+        words: beyond_calibration(problem, final, parts[:, [own == words for own in done.form]].sum(axis=1))
         for words in dict.fromkeys(done.form) if words
     }
     most = max(energy.values())
