@@ -14,7 +14,9 @@ import pytest
 from hidden_cases import VEHICLE, cut, made, overlap, thinned, thinned_bag
 
 from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.proof.campaign import Hiding
 from lugre_steering.proof.simulator import Concealed
+from lugre_steering.proof.sizing import make
 from lugre_steering.vehicle import load
 
 
@@ -59,3 +61,11 @@ def test_one_effect_per_stage_is_named(tmp_path: Path, hidden: str, count: int, 
     assert result.json["verdict"] == "missing_physics"
     assert [effect["id"] for effect in result.json["effects"]] == [hidden]
     assert result.json["augmented"]["improvement_ci95"][0] > 0.0
+
+
+def test_two_names_of_which_each_keeps_the_other_in_doubt_are_found_together(tmp_path: Path) -> None:
+    """The slow error that a drift leaves makes a small asymmetry doubtful, and the other way round."""
+    effects = ("direction_asymmetry", "pressure_drift")
+    case, _ = make(Hiding("pair", "pair", effects, ratio=1.0, noise="coloured", seed=3048347980), VEHICLE)
+    result = diagnose_recordings(thinned(case.write(tmp_path / "seen", tmp_path / "unseen")), load(VEHICLE))
+    assert {effect["id"] for effect in result.json["effects"]} == set(effects)

@@ -12,7 +12,7 @@ from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
-from lugre_steering.diagnosis.loudness import FORM_LEFT
+from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
 from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import fit
 from lugre_steering.recording import Array
@@ -62,9 +62,13 @@ def test_no_name_is_given_to_friction_of_another_form() -> None:
     assert done.needs_form  # it is seen
     assert not done.found.found
     assert done.beside_form is not None
-    left = left_over(done.beside_form, done.beside_form.found.baseline, done.needs_form)
+    there, baseline = done.beside_form, done.beside_form.found.baseline
+    left = left_over(there, baseline, done.needs_form)
     assert not left.structured
     assert "form" in left.entry.description
+    # The form does as much on the samples held out, where no pattern may make up for it.
+    per_sample = [form_energy(there.problem, baseline, used) / np.count_nonzero(used) for used in (there.fitted, there.held)]
+    assert per_sample[1] == pytest.approx(per_sample[0]) and per_sample[0] > 1.0
 
 
 def test_a_stop_beside_it_is_named_alone_and_fitted_as_a_vehicle_file_can_hold_it() -> None:

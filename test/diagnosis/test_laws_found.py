@@ -82,6 +82,27 @@ def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | 
     assert truer(problem, np.where(roles.held, weight(problem), 0.0), named, found, None) == (beyond is not None)
 
 
+def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
+    """Viscous friction, and a torque that remembers the rate: a law alone would have to be both."""
+
+    def both(run):  # type: ignore[no-untyped-def]
+        decay = np.exp(-(run.time[1] - run.time[0]) / 1.5)
+        return np.sum(run.omega, axis=0) * 6e3 + 4e3 * lfilter([1.0 - decay], [1.0, -decay], run.omega.sum(axis=0))
+
+    problem, alone = searched(by_run(both))
+    assert alone is not None
+    roles, weights = split(problem), weight(problem)
+    named = fit(problem, np.where(roles.fit, weights, 0.0), [effect("viscous_friction", sigma_2=3e3)])
+    noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(7).standard_normal((16, problem.valid.size)), 0.0)
+    beside = find(problem, noise, roles, named, 1)
+    assert beside is not None and beside.names == 1
+    (entry,) = entries(beside)
+    assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
+    assert [law["title"] for law in described(beside)] == [entry.title]
+    assert not truer(problem, np.where(roles.held, weights, 0.0), named, alone, beside)
+    assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
+
+
 def test_nothing_hidden_gives_no_law() -> None:
     assert searched(0.0)[1] is None
 
