@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from lugre_steering.diagnosis.conclude import limits, verify
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
@@ -14,9 +15,11 @@ from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
-from lugre_steering.diagnosis.laws.find import FoundLaws, find, truer
+from lugre_steering.diagnosis.laws.find import FoundLaws, find
+from lugre_steering.diagnosis.laws.rival import in_place
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
@@ -29,6 +32,14 @@ from lugre_steering.recording import BagFinding, Recording
 
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
+
+
+class _Tested(NamedTuple):
+    """Whether names stand, whether they are only a clock that is apart, and how they do on held-out data."""
+
+    named: bool
+    clock: bool
+    judged: verify.Judged
 
 
 @dataclass(frozen=True)
@@ -58,8 +69,10 @@ def conclude(
     seed: int, material: float, progress: Callable[[str], None],
 ) -> Diagnosis:
     """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
-    problem, found = done.problem, done.found
-    stands = _stands(done, seed, progress)
+    tested = _tested(done, seed)
+    if not tested.named and done.found.found and (late := begun_late(done)) is not done:
+        done, tested = late, _tested(late, seed)
+    stands, problem, found = _stands(done, tested, seed, progress), done.problem, done.found
     final = found.final if stands.named or stands.clock else found.baseline
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
@@ -110,7 +123,7 @@ def conclude(
     ).in_words()
 
 
-def _stands(done: Finished, seed: int, progress: Callable[[str], None]) -> _Stands:
+def _tested(done: Finished, seed: int) -> _Tested:
     """The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
     and an improvement that may be none is none."""
     problem, found = done.problem, done.found
@@ -119,14 +132,20 @@ def _stands(done: Finished, seed: int, progress: Callable[[str], None]) -> _Stan
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
+    return _Tested(named, clock, judged)
+
+
+def _stands(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> _Stands:
+    """What remains of the names beside laws for what they leave over."""
+    problem, found, (named, clock, judged) = done.problem, done.found, tested
     left = _left(done, named or clock)
-    if not left.structured:
+    if not left.structured and not (named and done.needs_form):
         return _Stands(named, clock, None, judged, left)
     alone = find(problem, done.noise, done.roles, found.baseline, seed, progress)
     if not named:
         return _Stands(False, clock, alone, judged if alone is None else alone.judged, left)
-    beside = find(problem, done.noise, done.roles, found.final, seed, progress)
-    if alone is not None and truer(problem, done.held, found.final, alone, beside):
+    beside = find(problem, done.noise, done.roles, found.final, seed, progress) if left.structured else None
+    if alone is not None and in_place(done, alone, beside):
         return _Stands(False, clock, alone, alone.judged, _left(done, False))
     if beside is not None:
         judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)

@@ -27,8 +27,6 @@ SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
 PER_VALUE = 0.01
 """Share of the gain that one more value of a law must bring to be preferred."""
-TRUER = 0.5
-"""Share of what another model leaves beyond noise that one must leave at most to be far truer."""
 TIED = 0.03
 """Share of the gain within which two laws cannot be told apart."""
 
@@ -75,7 +73,7 @@ class FoundLaws:
         return len(self.fit.effects) - len(self.gains)
 
     def beyond(self, held: Array) -> float:
-        """Energy per sample held out (weights) beyond noise, or beyond what a simulation's own error may leave."""
+        """Energy per sample held out (weights) beyond noise, at least what a simulation's own error may leave."""
         return max(excess(self.problem, self.fitted, held), OWN_ERROR)
 
 
@@ -117,14 +115,6 @@ def find(
         return None
     whole = fit(lawful, every, current.effects, current.x, linearisations=6)
     return FoundLaws(lawful, current, whole, judged, tuple(gains), ties, first_bar, ceiling)
-
-
-def truer(problem: Problem, held: Array, named: Fit, alone: FoundLaws, beside: FoundLaws | None) -> bool:
-    """Whether laws ``alone``, no more of them than names, leave far less of the samples ``held`` out (weights) beyond noise than the
-    names do, and these help them little: with laws ``beside`` them they do not leave far less again."""
-    if len(alone.gains) > len(named.effects) or not alone.beyond(held) < TRUER * excess(problem, named, held):
-        return False
-    return beside is None or not beside.beyond(held) < TRUER * alone.beyond(held)
 
 
 def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:

@@ -1,0 +1,50 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Names that began within the recordings, which only the data held out show: what was fitted has no earlier occasion to see them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.search import onset
+from lugre_steering.diagnosis.search.compare import SURE, doubt
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Problem
+from lugre_steering.recording import Array
+
+
+def begun_late(done: Finished) -> Finished:
+    """The search with the instants from which its names act, where all data leave far less with them than without."""
+    problem, weight = done.problem, done.weight
+    begun = fit(problem, weight, done.found.final.effects, done.found.final.x, linearisations=8)
+    for index, (candidate, _) in enumerate(begun.effects):
+        if candidate.since or candidate.bags is not None or candidate.effect.never_late:
+            continue
+        from_start = _since(begun, index, tuple(float(run.time[0]) for run in problem.runs))
+        late = _fitted(problem, weight, _since(from_start, index, onset.timed(problem, weight, from_start, index)))
+        if late.cost < begun.cost - SURE * doubt(problem, late, weight):
+            begun = late
+    if all(candidate.since == own.since for (candidate, _), (own, _) in zip(begun.effects, done.found.final.effects, strict=True)):
+        return done
+    there = done.compared
+    beside = replace(there, found=replace(there.found, final=_at(there, begun)))
+    return replace(done, found=replace(done.found, final=_at(done, begun)), beside_form=beside if done.beside_form else None)
+
+
+def _since(result: Fit, index: int, since: tuple[float, ...]) -> Fit:
+    effects = list(result.effects)
+    effects[index] = (replace(effects[index][0], since=since), effects[index][1])
+    return replace(result, effects=tuple(effects))
+
+
+def _fitted(problem: Problem, weight: Array, result: Fit) -> Fit:
+    return fit(problem, weight, result.effects, result.x, linearisations=8)
+
+
+def _at(done: Finished, begun: Fit) -> Fit:
+    """The final fit of a search, to its own data, with other instants."""
+    final = done.found.final
+    for index, (candidate, _) in enumerate(begun.effects):
+        final = _since(final, index, candidate.since)
+    return _fitted(done.problem, done.fitted, final)

@@ -1,0 +1,49 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Names and laws as rivals in one comparison: beside the freedoms of the friction law, by the number that names are compared by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
+from lugre_steering.diagnosis.loudness import excess
+from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, left, settled
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Problem
+
+TRUER = 0.5
+"""Share of what another model leaves beyond noise that one must leave at most to be far truer."""
+
+
+def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool:
+    """Whether laws ``alone`` stand in place of the names: with clearly more evidence beside the freedoms, no worse in a vehicle file, and
+    not far worse than the names with laws ``beside`` them."""
+    if beside is not None and beside.beyond(done.held) < TRUER * alone.beyond(done.held):
+        return False
+    return alone.beyond(done.held) < excess(done.problem, done.found.final, done.held) and _more_evident(done, alone)
+
+
+def _more_evident(done: Finished, laws: FoundLaws) -> bool:
+    """By the doubt of the model that leaves least in doubt; a name wins a draw."""
+    there, weight = done.compared, done.compared.fitted
+    named = there.problem, there.found.final
+    law = settled(*_beside_form(done, laws))
+    doubt = min(named[0].doubt, law[0].doubt)
+    energies = []
+    for problem, result in (named, law, (there.problem, there.found.baseline)):
+        problem, result = settled(problem, weight, fit(problem, weight, result.effects, result.x), doubt)
+        energies.append(left(problem, result) + PER_VALUE * doubt * sum(len(candidate.free) for candidate, _ in result.effects))
+    return energies[1] < energies[0] - MARGIN * (energies[2] - energies[0])
+
+
+def _beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, np.ndarray, Fit]:
+    """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
+    there, of_names = done.compared.problem, done.compared.form.count("")
+    columns = there.bends[:, : there.bends.shape[1] - of_names]
+    problem = Problem(there.vehicle, there.runs, there.calibrations, more_laws=MOST_LAWS, bends=columns)
+    problem.shapes = there.shapes - of_names
+    problem = problem.doubted(there.doubt, there.typical)
+    x = np.append(laws.fitted.x[: problem.first_bend], np.zeros(columns.shape[1]))
+    return problem, done.compared.fitted, fit(problem, done.compared.fitted, laws.fitted.effects, x)
