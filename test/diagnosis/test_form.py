@@ -68,7 +68,8 @@ def test_no_name_is_given_to_friction_of_another_form() -> None:
     assert "form" in left.entry.description
     # The form does as much on the samples held out, where no pattern may make up for it.
     per_sample = [form_energy(there.problem, baseline, used) / np.count_nonzero(used) for used in (there.fitted, there.held)]
-    assert per_sample[1] == pytest.approx(per_sample[0]) and per_sample[0] > 1.0
+    assert per_sample[1] == pytest.approx(per_sample[0])
+    assert per_sample[0] > 1.0
 
 
 def test_a_stop_beside_it_is_named_alone_and_fitted_as_a_vehicle_file_can_hold_it() -> None:

@@ -13,14 +13,17 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
-from lugre_steering.diagnosis.laws.find import FoundLaws, find, truer
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.laws.find import FoundLaws, find
+from lugre_steering.diagnosis.laws.rival import in_place
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
+from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.effects.own import read_effects
 from lugre_steering.errors import EffectError
-from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.fitting.split import split
 from lugre_steering.recording import Array
 from lugre_steering.simulate.command import load_vehicle
@@ -31,11 +34,25 @@ NOTHING = small_problem()
 
 def searched(hidden: Array | float) -> tuple[Problem, FoundLaws | None]:
     problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + hidden)
+    return problem, in_what_is_left(problem, fitted(problem))
+
+
+def fitted(problem: Problem, *named: tuple[Candidate, dict[str, float]]) -> Fit:
+    return fit(problem, np.where(split(problem).fit, weight(problem), 0.0), named)
+
+
+def in_what_is_left(problem: Problem, before: Fit) -> FoundLaws | None:
+    return find(problem, white(problem), split(problem), before, 1)
+
+
+def white(problem: Problem) -> Noise:
     draws = SIGMA * np.random.default_rng(7).standard_normal((16, problem.valid.size))
-    noise = Noise(np.full(problem.valid.size, SIGMA), draws, 0.0)
-    roles = split(problem)
-    baseline = fit(problem, np.where(roles.fit, weight(problem), 0.0))
-    return problem, find(problem, noise, roles, baseline, 1)
+    return Noise(np.full(problem.valid.size, SIGMA), draws, 0.0)
+
+
+def named(problem: Problem, final: Fit) -> Finished:
+    """A search that came to ``final``."""
+    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), (), None))
 
 
 def by_run(part: object) -> Array:
@@ -77,9 +94,8 @@ def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | 
     where = (lambda theta: theta > beyond) if beyond is not None else np.ones_like
     problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * where(run.theta), axis=0)))
     assert found is not None
-    roles = split(problem)
-    named = fit(problem, np.where(roles.fit, weight(problem), 0.0), [effect("viscous_friction", sigma_2=1e3)])
-    assert truer(problem, np.where(roles.held, weight(problem), 0.0), named, found, None) == (beyond is not None)
+    viscous = named(problem, fitted(problem, effect("viscous_friction", sigma_2=1e3)))
+    assert in_place(viscous, found, None) == (beyond is not None)
 
 
 def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
@@ -91,15 +107,14 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
 
     problem, alone = searched(by_run(both))
     assert alone is not None
-    roles, weights = split(problem), weight(problem)
-    named = fit(problem, np.where(roles.fit, weights, 0.0), [effect("viscous_friction", sigma_2=3e3)])
-    noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(7).standard_normal((16, problem.valid.size)), 0.0)
-    beside = find(problem, noise, roles, named, 1)
-    assert beside is not None and beside.names == 1
+    viscous = fitted(problem, effect("viscous_friction", sigma_2=3e3))
+    beside = in_what_is_left(problem, viscous)
+    assert beside is not None
+    assert beside.names == 1
     (entry,) = entries(beside)
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert [law["title"] for law in described(beside)] == [entry.title]
-    assert not truer(problem, np.where(roles.held, weights, 0.0), named, alone, beside)
+    assert not in_place(named(problem, viscous), alone, beside)
     assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
 
 
