@@ -19,7 +19,7 @@ from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
-from lugre_steering.diagnosis.laws.rival import in_place
+from lugre_steering.diagnosis.laws.rival import in_place, leaves_names
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Limit, Verdict
 from lugre_steering.diagnosis.search import onset
@@ -147,6 +147,8 @@ def _stands(done: Finished, tested: _Tested, seed: int, progress: Callable[[str]
     beside = find(problem, done.noise, done.roles, found.final, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):
         return _Stands(False, clock, alone, alone.judged, _left(done, False))
+    if beside is not None and not leaves_names(done, beside):
+        beside = None
     if beside is not None:
         judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)
     return _Stands(True, clock, beside, judged, left)

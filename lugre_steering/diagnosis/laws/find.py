@@ -100,7 +100,7 @@ def find(
             break
         tried = _tried(lawful, weight, current, screen, screened, place, progress)
         best, gain = tried[0], current.cost - tried[0].fit.cost
-        if gain < least or _held(problem, best.fit, roles, noise) >= _held(problem, current, roles, noise):
+        if gain < least or _unseen(problem, best.fit, roles, noise) >= _unseen(problem, current, roles, noise):
             ceiling = max(gain, 0.0)
             break
         if not index:
@@ -117,9 +117,10 @@ def find(
     return FoundLaws(lawful, current, whole, judged, tuple(gains), ties, first_bar, ceiling)
 
 
-def _held(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
-    """Energy left of the samples held out, in noise variances."""
-    return float(np.sum(((problem.measured - result.prediction)[roles.held] / noise.sigma[roles.held]) ** 2))
+def _unseen(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
+    """Energy left of all valid samples that were not fitted, in noise variances: laws that cancel each other show there."""
+    unseen = problem.valid & ~roles.fit
+    return float(np.sum(((problem.measured - result.prediction)[unseen] / noise.sigma[unseen]) ** 2))
 
 
 def _tried(

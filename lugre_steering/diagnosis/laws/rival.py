@@ -9,7 +9,7 @@ import numpy as np
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
 from lugre_steering.diagnosis.loudness import excess
-from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, left, settled
+from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, doubt, left, settled
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 
@@ -25,16 +25,27 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
     return alone.beyond(done.held) < excess(done.problem, done.found.final, done.held) and _more_evident(done, alone)
 
 
+def leaves_names(done: Finished, beside: FoundLaws) -> bool:
+    """Whether every name is still needed with laws ``beside`` it; one that is not has a rival there, and no companion."""
+    problem, fitted = beside.problem, beside.fitted
+    least = SURE * doubt(problem, fitted, done.fitted)
+    for index in range(beside.names):
+        rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
+        if fit(problem, done.fitted, rest, fitted, linearisations=6).cost - fitted.cost < least:
+            return False
+    return True
+
+
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:
     """By the doubt of the model that leaves least in doubt; a name wins a draw."""
     there, weight = done.compared, done.compared.fitted
     named = there.problem, there.found.final
     law = settled(*_beside_form(done, laws))
-    doubt = min(named[0].doubt, law[0].doubt)
+    least = min(named[0].doubt, law[0].doubt)
     energies = []
     for problem, result in (named, law, (there.problem, there.found.baseline)):
-        problem, result = settled(problem, weight, fit(problem, weight, result.effects, result.x), doubt)
-        energies.append(left(problem, result) + PER_VALUE * doubt * sum(len(candidate.free) for candidate, _ in result.effects))
+        problem, result = settled(problem, weight, fit(problem, weight, result.effects, result.x), least)
+        energies.append(left(problem, result) + PER_VALUE * least * sum(len(candidate.free) for candidate, _ in result.effects))
     return energies[1] < energies[0] - MARGIN * (energies[2] - energies[0])
 
 
