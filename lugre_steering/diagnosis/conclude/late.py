@@ -9,6 +9,7 @@ from dataclasses import replace
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.search import onset
 from lugre_steering.diagnosis.search.compare import SURE, doubt
+from lugre_steering.diagnosis.search.trial import RETIMED
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
@@ -21,8 +22,9 @@ def begun_late(done: Finished) -> Finished:
     for index, (candidate, _) in enumerate(begun.effects):
         if candidate.since or candidate.bags is not None or candidate.effect.never_late:
             continue
-        from_start = _since(begun, index, tuple(float(run.time[0]) for run in problem.runs))
-        late = _fitted(problem, weight, _since(from_start, index, onset.timed(problem, weight, from_start, index)))
+        late = _since(begun, index, tuple(float(run.time[0]) for run in problem.runs))
+        for _ in range(RETIMED):  # the values of one that was always there are no good to time it by
+            late = _fitted(problem, weight, _since(late, index, onset.timed(problem, weight, late, index)))
         if late.cost < begun.cost - SURE * doubt(problem, late, weight):
             begun = late
     if all(candidate.since == own.since for (candidate, _), (own, _) in zip(begun.effects, done.found.final.effects, strict=True)):
