@@ -216,7 +216,7 @@ def test_charts_hold_names_as_they_are_and_no_end_of_their_script(vehicle: Vehic
     law = {
         "id": "law_1", "title": HOSTILE, "largest_Nm": 1.0, "largest_share": 0.1, "coordinate": "none", "memory": "none",
         "form": "constant", "range": [0.0, 1.0], "values": {}, "intervals": {}, "ties": [], "channel": "gain", "heldout_gain": 0.5,
-        "share_of_ceiling": 0.5,
+        "share_of_ceiling": 0.5, "nearest_listed": [],
     }  # fmt: skip
     traces = tuple(dataclasses.replace(t, contributions={"law_1": t.measured}, intervals={}) for t in full.traces)
     page = page_of(dataclasses.replace(full, verdict="unlisted_physics", effects=(), laws=(law,), traces=traces))

@@ -80,7 +80,8 @@ def test_other_verdicts_say_the_error_and_what_to_do() -> None:
         "Use augmented.yaml, the recalibrated vehicle file."
     )
     assert "misses 500 N m (1.0 % of the torque)" in headline.unlisted(finished(), 500.0, "it follows the angle")
-    assert headline.lawful("a loss (up to 5 N m)").endswith("Use augmented.yaml, which has it under 'laws'.")
+    assert headline.lawful("a loss (up to 5 N m)", ()).endswith("catalogue is that. Use augmented.yaml, which has it under 'laws'.")
+    assert "(nearest: end_stop, which explains less)" in headline.lawful("a loss (up to 5 N m)", ["end_stop"])
 
 
 @pytest.mark.parametrize(

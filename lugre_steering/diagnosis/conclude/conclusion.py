@@ -52,6 +52,8 @@ class _Stands:
     lawful: FoundLaws | None
     judged: verify.Judged
     left: LeftOver
+    nearest: tuple[str, ...] = ()
+    """Names in whose place laws stand."""
 
     @property
     def better(self) -> bool:
@@ -79,7 +81,7 @@ def conclude(
         final = whole  # timed by all data
     beside, laws, law, left = done, [], "", stands.left
     if (lawful := stands.lawful) is not None:
-        beside, final, whole, laws = replace(done, problem=lawful.problem), lawful.fitted, lawful.fit, described(lawful)
+        beside, final, whole, laws = replace(done, problem=lawful.problem), lawful.fitted, lawful.fit, described(lawful, stands.nearest)
         law = sentence(laws, done.torque)
         left = beside_laws(left, left_over(beside, final), law, formula(laws, problem.vehicle))
     effects = named_effects(beside, whole, bent, material) if stands.named else []
@@ -93,7 +95,7 @@ def conclude(
     causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
     advice = next_experiment(done, stands.verdict, whole)
-    headline, statistics = statement(done, stands.verdict, effects, judged, causal, left, ended, law, advice)
+    headline, statistics = statement(done, stands.verdict, effects, judged, causal, left, ended, law, stands.nearest, advice)
     return Diagnosis(
         schema=SCHEMA,
         bags=tuple(run.name for run in problem.runs),
@@ -146,7 +148,8 @@ def _stands(done: Finished, tested: _Tested, seed: int, progress: Callable[[str]
         return _Stands(False, clock, alone, judged if alone is None else alone.judged, left)
     beside = find(problem, done.noise, done.roles, found.final, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):
-        return _Stands(False, clock, alone, alone.judged, _left(done, False))
+        nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
+        return _Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
     if beside is not None and not leaves_names(done, beside):
         beside = None
     if beside is not None:

@@ -35,9 +35,10 @@ def missing(done: Finished, effects: Sequence[NamedEffect], law: str, advice: Ex
     return f"Missing from the model: {found}. {sentence(', and '.join(acts))}"
 
 
-def lawful(said: str) -> str:
-    """For a law that nobody had listed, as ``said``."""
-    return f"Missing from the model: {said}; no entry of the catalogue is that. Use augmented.yaml, which has it under 'laws'."
+def lawful(said: str, nearest: Sequence[str]) -> str:
+    """For a law that nobody had listed, as ``said``; ``nearest``: entries of the catalogue that resemble it."""
+    like = f" (nearest: {' and '.join(nearest)}, which explains less)" if nearest else ""
+    return f"Missing from the model: {said}; no entry of the catalogue is that{like}. Use augmented.yaml, which has it under 'laws'."
 
 
 def unlisted(done: Finished, error: float, said: str) -> str:

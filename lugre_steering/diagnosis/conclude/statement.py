@@ -47,11 +47,11 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
 
 def statement(
     done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver,
-    ended: Sequence[str], law: str, advice: Experiment | None,
+    ended: Sequence[str], law: str, nearest: Sequence[str], advice: Experiment | None,
 ) -> tuple[str, str]:
     """Headline and statistics, for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
     looking ahead, ``left``: what remains, ``ended``: effects that do not act in the last bag, ``law``: the one found for it, if any,
-    ``advice``: the next experiment."""
+    ``nearest``: names in whose place it stands, ``advice``: the next experiment."""
     floor = f"Noise alone makes {done.torque(done.noise.floor)}."
     if verdict == "consistent":
         unseen = "From what size on an effect would have shown: detection_limits of diagnosis.json."
@@ -59,7 +59,7 @@ def statement(
     if verdict == "unlisted_physics":
         if law:
             rest = f"{left.text[:1].upper()}{left.text[1:]}."
-            return headline.lawful(law), f"{_gain(done, judged, 'the law')} {floor} {rest}"
+            return headline.lawful(law, nearest), f"{_gain(done, judged, 'the law')} {floor} {rest}"
         return headline.unlisted(done, judged.before, left.text), f"{floor} Where it lives: unexplained in diagnosis.json."
     told = headline.missing(done, effects, law, advice, not ended)
     them = "it" if len(effects) == 1 and not law else "them"

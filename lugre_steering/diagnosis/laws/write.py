@@ -121,8 +121,9 @@ def _shape_words(law: Law, values: Mapping[str, float], along: str, vehicle: Veh
     return f"in proportion to the {along}" if law.form == "linear" and known["value"] == 0.0 else f"a function of the {along}"
 
 
-def described(found: FoundLaws) -> list[dict[str, Any]]:
-    """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties."""
+def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties;
+    ``nearest``: entries of the catalogue in whose place they stand."""
     torque = 0.5 * float(np.ptp(found.problem.measured))
     made = []
     effects = found.fit.effects[found.names :]
@@ -139,7 +140,7 @@ def described(found: FoundLaws) -> list[dict[str, Any]]:
             "range": list(entry.range), "largest_Nm": largest, "largest_share": largest / torque,
             "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
             "share_of_ceiling": sum(found.gains) / (sum(found.gains) + found.ceiling),
-            "ties": [_tie(tie) for tie in found.ties] if not index else [],
+            "ties": [_tie(tie) for tie in found.ties] if not index else [], "nearest_listed": list(nearest),
             "f": {
                 **_picture(found, found.names + index, law, values), **_points(found, found.names + index, traces, law, values),
             },

@@ -53,6 +53,7 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("of what any law of this kind could", words.percent(law["share_of_ceiling"])),
         ("not to be trusted", f"outside {low} to {high}, which nobody saw" if law["coordinate"] != "none" else ""),
         ("fits as well", ties),
+        ("nearest in the catalogue, which explains less", ", ".join(law["nearest_listed"])),
     ]
 
 
