@@ -127,13 +127,18 @@ def conclude(
 
 def _tested(done: Finished, seed: int) -> _Tested:
     """The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
-    and an improvement that may be none is none."""
-    problem, found = done.problem, done.found
+    and an improvement that may be none is none: beside the freedoms with which names are compared, as without them the form of the
+    friction law may be most of the error. In a vehicle file, which cannot hold freedoms, a name must do no harm."""
+    problem, found, there = done.problem, done.found, done.compared
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
+    beside = judged
+    if found.found and done.needs_form and judged.gain > -CONTRADICTED:
+        beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
     clock = _clocks_alone(found.final, len(problem.runs))
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
-    named = bool(found.found) and judged.gain > -CONTRADICTED and judged.interval[0] > 0.0 and not clock and not stuck
+    better = judged.gain > -CONTRADICTED and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
+    named = bool(found.found) and better and not clock and not stuck
     return _Tested(named, clock, judged)
 
 
