@@ -374,9 +374,9 @@ def _examine(
     stuck, clipped = _held(look, others, None if channel.kind is not Kind.PRESSURE else pressure_range, channel.kind)
     at = look.intervals(stuck)
     off = all(look.value[first] == 0.0 for first, _ in stuck)
-    held = "repeats one value exactly for {} s; not used there, replace the sensor or its driver"
-    off_s = "reads exactly zero for {} s, switched off or a broken wire; not used there"
-    report("stuck_sensor", at, (off_s if off else held).format(f"{_total(at):.1f}"))
+    frozen = f"repeats one value exactly for {_total(at):.1f} s; not used there, replace the sensor or its driver"
+    zero = f"reads exactly zero for {_total(at):.1f} s, switched off or a broken wire; not used there"
+    report("stuck_sensor", at, zero if off else frozen)
     at = look.intervals(clipped)
     name, extreme = ("clipped_angle", "end") if channel.kind is Kind.ANGLE else ("saturation", "upper limit")
     report(name, at, f"stands at the {extreme} of its range for {_total(at):.1f} s; the true value lies beyond, not used there")

@@ -236,7 +236,7 @@ def _lacks_terms(vehicle: Vehicle, run: Run, expected: Array) -> bool:
     theta, omega, alpha = run.theta[0], run.omega[0], run.alpha[0]
     gravity = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else []
     columns = np.column_stack([expected, alpha, omega, np.ones_like(theta), *gravity])[run.valid]
-    columns, measured = columns / np.linalg.norm(columns, axis=0), run.measured[run.valid]
+    columns, measured = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), run.measured[run.valid]
     free = measured - columns @ np.linalg.lstsq(columns, measured, rcond=1e-10)[0]
     # Friction wins no work and inertia weighs: where these explain far more with the other sign, a sign is flipped.
     least = np.where(np.arange(columns.shape[1]) < 3, 0.0, -np.inf)

@@ -214,6 +214,9 @@ def test_pressure_at_the_range_of_its_sensor(sound: Recording) -> None:
 def test_a_dead_line_is_stuck_all_the_time(sound: Recording) -> None:
     (found,) = inspect(pressure(scaled(0.0), "main_b")(sound), VEHICLE).findings
     assert (found.finding, found.topic) == ("stuck_sensor", PRESSURE["main_b"])
+    assert "switched off or a broken wire" in found.statement
+    stands = inspect(angle("left", between(20.0, 25.0, frozen))(sound), VEHICLE).findings
+    assert "replace the sensor" in next(f.statement for f in stands if f.finding == "stuck_sensor")
     assert overlap(found.intervals_s, [(0.0, float(sound.pressure["main_b"].time_s[-1]))]) > 0.99
 
 

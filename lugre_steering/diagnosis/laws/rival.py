@@ -12,6 +12,7 @@ from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, doubt, left, settled
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.recording import Array
 
 TRUER = 0.5
 """Share of what another model leaves beyond noise that one must leave at most to be far truer."""
@@ -49,7 +50,7 @@ def _more_evident(done: Finished, laws: FoundLaws) -> bool:
     return energies[1] < energies[0] - MARGIN * (energies[2] - energies[0])
 
 
-def _beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, np.ndarray, Fit]:
+def _beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
     """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
     there, of_names = done.compared.problem, done.compared.form.count("")
     columns = there.bends[:, : there.bends.shape[1] - of_names]
