@@ -72,10 +72,14 @@ class Channel:
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel: ``time_s`` (n,) strictly increasing seconds from the recording's first stamp, ``value`` (n,)."""
+    """One channel: ``time_s`` (n,) strictly increasing seconds from the recording's first stamp, ``value`` (n,).
+
+    ``even``: stamps that came late by chance have been put back in their places, or none had.
+    """
 
     time_s: Array
     value: Array
+    even: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from lugre_steering.data.dataset import GAP_S, angle_noise
 from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.sensing import worse_than_said
+from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring, span
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -98,7 +100,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
 
 def _against_model(usable: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
     """What the nominal model and the other channels say; of a long recording, about the pieces that will be examined."""
-    pieces, _ = in_pieces([usable])
+    pieces, _ = in_pieces([with_even_stamps(usable)])
     found: dict[tuple[str, str], Finding] = {}
     for finding in _each(inspect_dead, pieces, vehicle) or inspect_wiring(pieces, vehicle) or _each(inspect_angles, pieces, vehicle):
         first = found.setdefault((finding.finding, finding.topic), finding)
@@ -239,12 +241,12 @@ class _Look:
         flickers = (uniform_filter1d(turns, _samples(0.5, period)) > 0.35) & loud
         return _Look(time, value, period, resolution, sheet, sigma, flickers)
 
-    @property
+    @cached_property
     def noisy(self) -> bool:
         """The sensor shows noise well above its resolution somewhere, so it cannot repeat a value for long."""
         return float(self.flickers.sum()) * self.period >= 1.0
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """Level below which nothing counts as noise."""
         return max(self.sheet, 0.5 * self.resolution, 1e-9 * float(np.abs(self.value).max()))
@@ -446,11 +448,14 @@ def _held(
     ends = np.append(starts[1:], value.size) - 1
     long = ends - starts + 1 >= CLIPPED_SAMPLES
     for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
+        lasting, extreme = look.time[last] - look.time[first] > STUCK_S, value[first] in (low, high)
+        if not (lasting or extreme):
+            continue
         jumps = _jumps(look, first, last)
-        if value[first] in (low, high) and look.noisy and not jumps:
+        if extreme and look.noisy and not jumps:
             # A pressure sensor that cannot read below zero rests at zero: no fault.
             pinned[first : last + 1] |= kind is not Kind.PRESSURE or value[first] > 0.0
-        elif look.time[last] - look.time[first] > STUCK_S and (
+        elif lasting and (
             look.noisy or jumps or (kind is Kind.ANGLE and any(_moved(o, look.time[first], look.time[last]) for o in others))
         ):
             stuck.append((first, last))

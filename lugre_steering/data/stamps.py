@@ -8,11 +8,11 @@ stamps are told from truly uneven sampling by the values: a late stamp leaves th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.recording import Array, IntArray, Signal
+from lugre_steering.recording import Array, IntArray, Recording, Signal
 
 COHERENT = 0.3
 """Coherence below which there is no grid to return to: scatter of a quarter of a period."""
@@ -70,7 +70,9 @@ def _grid(time: Array) -> Grid | None:
     while True:
         part = elapsed[elapsed <= reach]
         trial = about + np.linspace(-width, width, max(3, 2 * int(np.ceil(4.0 * width * reach)) + 1))
-        phases = np.exp(2j * np.pi * np.outer(trial, part)).mean(axis=1)
+        first, further = np.exp(2j * np.pi * np.outer([trial[0], trial[1] - trial[0]], part))
+        turns = np.broadcast_to(further, (trial.size - 1, part.size))
+        phases = np.cumprod(np.vstack([first, turns]), axis=0).mean(axis=1)  # one turn further per trial: no exponential of each
         best = int(np.abs(phases).argmax())
         about, coherence = float(trial[best]), float(np.abs(phases[best]))
         if reach >= elapsed[-1]:
@@ -93,8 +95,25 @@ def _disorder(periods: Array, number: Array) -> float:
     return float(np.mean(np.diff(number) == 0.0)) + 4.0 * float(np.var(periods - number))
 
 
+def with_even_stamps(recording: Recording) -> Recording:
+    """The recording with even stamps where those that it has are late by chance, and known to be so."""
+
+    def even(signal: Signal) -> Signal:
+        return replace(evened(signal)[0], even=True)
+
+    torque = recording.measured_torque
+    return replace(
+        recording,
+        angle={name: even(signal) for name, signal in recording.angle.items()},
+        pressure={name: even(signal) for name, signal in recording.pressure.items()},
+        measured_torque=None if torque is None else even(torque),
+    )
+
+
 def evened(signal: Signal) -> tuple[Signal, float]:
     """The signal with even stamps where those it has are late by chance, and their scatter [s] (zero where they may stay)."""
+    if signal.even:
+        return signal, 0.0
     grid = sampling_grid(signal.time_s)
     if grid is None or grid.scatter < SCATTER_S:
         return signal, 0.0

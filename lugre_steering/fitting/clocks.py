@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.data.dataset import prepare
+from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, SheetValue, Values, is_rig
 from lugre_steering.fitting.split import CLUSTER_S
-from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.recording import Array, Finding, Kind, Recording
 from lugre_steering.vehicle import Vehicle
 
 LONGEST_S = 0.035
@@ -64,6 +65,7 @@ def synchronised(
     effects: Effects = (),
 ) -> Synchronised:
     """Recordings prepared with one clock; ``effects``: what is known to act beside, as physics left out can pass for an offset."""
+    recordings = [with_even_stamps(recording) for recording in recordings]
     problem = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], calibrations)
     as_stamped = Synchronised(problem, np.zeros(len(recordings)), {})
     if is_rig(vehicle):  # its inertia, which the sheet lacks, would pass for an offset
@@ -157,8 +159,8 @@ def _earlier(recording: Recording, shift: float) -> Recording:
     """The recording with what gives the torque stamped ``shift`` [s] earlier."""
     torque = recording.measured_torque
     return replace(
-        recording, pressure={line: Signal(s.time_s - shift, s.value) for line, s in recording.pressure.items()},
-        measured_torque=None if torque is None else Signal(torque.time_s - shift, torque.value),
+        recording, pressure={line: replace(s, time_s=s.time_s - shift) for line, s in recording.pressure.items()},
+        measured_torque=None if torque is None else replace(torque, time_s=torque.time_s - shift),
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import torque_in_phases
+from lugre_steering.chain.step import copied, torque_in_phases
 from lugre_steering.data.dataset import Run
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
@@ -313,7 +313,7 @@ class Problem:
     ) -> Array:
         """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion."""
         run = run or self.runs[bag]
-        record = self.model.parameters[0].copy()
+        record = copied(self.model.parameters[0])
         for field, value in self.fields(x).items():
             record[field] = value
         record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
@@ -323,7 +323,7 @@ class Problem:
             warmer = float(x[len(self.calibrations) + 2 * len(self.runs) + bag])
         phases = []
         for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)}):
-            acting = record.copy()
+            acting = copied(record)
             for since, air in run.air:
                 if since <= start:
                     acting["air_temperature"] = air + warmer

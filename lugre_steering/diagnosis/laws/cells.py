@@ -99,10 +99,14 @@ class Traces:
                     for cycles in CYCLES:
                         yield Cell(channel, axis, low, high, 2, float((high - low) / cycles))
 
-    def columns(self, cell: Cell, bag: int) -> Array:
-        """Change of the torque (n, pieces) of a bag by each piece of a free f."""
-        sides = zip(self.signals[cell.channel][bag], self.axes[cell.axis][bag], strict=True)
-        return np.asarray(np.sum([signal[:, None] * cell.basis(place) for signal, place in sides], axis=0), np.float64)
+    def pieces(self, cell: Cell) -> list[Array]:
+        """What each piece of a free f is, by bag (sides, n, pieces); the same for every channel."""
+        return [np.array([cell.basis(place) for place in bag]) for bag in self.axes[cell.axis]]
+
+    def columns(self, cell: Cell, pieces: Sequence[Array]) -> Array:
+        """Change of the torque (n of all bags, pieces) by each piece of a free f."""
+        bags = zip(self.signals[cell.channel], pieces, strict=True)
+        return np.concatenate([np.einsum("sn,snp->np", np.asarray(signal), piece) for signal, piece in bags])
 
 
 def axes_of(problem: Problem) -> list[Axis]:

@@ -128,13 +128,15 @@ def _tried(
     progress: Callable[[str], None],
 ) -> list[Tried]:
     """The leading cells fitted in the chain, the best of them simplified; best first, a value more must pay."""
-    tried = []
+    tried: list[Tried] = []
     for one in shortlist(screened):
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
         traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
         best = screen.search(traces, one.cell)[0]
         start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
-        tried.append(Tried(best, with_law(problem, weight, current, start)))
+        least = min((each.fit.cost for each in tried), default=np.inf)
+        tie = least + TIED * (current.cost - least) if tried else np.inf
+        tried.append(Tried(best, with_law(problem, weight, current, start, tie)))
     tried.sort(key=lambda each: each.fit.cost)
     tried = [
         replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)

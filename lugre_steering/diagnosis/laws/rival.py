@@ -32,7 +32,7 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     least = SURE * doubt(problem, fitted, done.fitted)
     for index in range(beside.names):
         rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
-        if fit(problem, done.fitted, rest, fitted, linearisations=6).cost - fitted.cost < least:
+        if fit(problem, done.fitted, rest, fitted, linearisations=6, worth=fitted.cost + least).cost - fitted.cost < least:
             return False
     return True
 

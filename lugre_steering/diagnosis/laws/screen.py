@@ -9,7 +9,7 @@ that hide nothing, which go through the very same search.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -93,13 +93,9 @@ class Screen:
         own = self.rows.mean(residual[:, None])
         self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
 
-    def columns(self, traces: Traces, cell: Cell) -> Array:
-        bags = [traces.columns(cell, bag) for bag in range(len(self.problem.runs))]
-        return self.rows.mean(np.concatenate(bags))
-
     def pieces(self, traces: Traces, cell: Cell) -> Array:
         """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
-        columns, m = self.columns(traces, cell), self.nuisance.shape[1]
+        columns, m = self.rows.mean(traces.columns(cell, traces.pieces(cell))), self.nuisance.shape[1]
         gram, right, _ = _normal(np.column_stack([self.nuisance, columns]), self.errors[:, :1])
         return np.asarray(np.linalg.solve(gram + _penalty(gram, m, SMOOTHING[0]), right)[m:, 0])
 
@@ -107,19 +103,26 @@ class Screen:
         """All cells, best first; or of other traces at the same fit those of the channel and the pieces of one."""
         traces = near or self.traces
         cells = [cell for cell in traces.cells() if like is None or _alike(cell, like)]
-        base = _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[0])
+        base = _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[:1])
 
-        def one(cell: Cell) -> Screened:
-            columns = self.columns(traces, cell)
+        def one(cell: Cell, pieces: Sequence[Array]) -> Screened:
+            columns = self.rows.mean(traces.columns(cell, pieces))
             norm = float(np.sqrt(np.mean(np.sum(columns**2, axis=0))))
             if norm < 1e-12:
                 return Screened(cell, 0.0, np.zeros(self.errors.shape[1] - 1))
             smoothing = SMOOTHING if cell.pieces > HATS else SMOOTHING[:1]
-            left = np.min([_left(self.nuisance, columns / norm, self.errors, self.rows.fold, share) for share in smoothing], axis=0)
-            gains = base - left
+            gains = base - _left(self.nuisance, columns / norm, self.errors, self.rows.fold, smoothing)
             return Screened(cell, float(gains[0]), gains[1:])
 
-        return sorted(in_threads(one, cells), key=lambda found: -found.gain)
+        def of_one_basis(alike: Sequence[Cell]) -> list[Screened]:
+            pieces = traces.pieces(alike[0])
+            return [one(cell, pieces) for cell in alike]
+
+        by_basis: dict[Cell, list[Cell]] = {}
+        for cell in cells:
+            by_basis.setdefault(replace(cell, channel=""), []).append(cell)
+        found = [screened for group in in_threads(of_one_basis, list(by_basis.values())) for screened in group]
+        return sorted(found, key=lambda screened: -screened.gain)
 
 
 def _alike(one: Cell, other: Cell) -> bool:
@@ -153,18 +156,20 @@ def _penalty(gram: Array, m: int, smoothing: float) -> Array:
     return penalty
 
 
-def _left(beside: Array, columns: Array, errors: Array, fold: IntArray, smoothing: float) -> Array:
-    """Energy (k,) of errors (n, k) that columns and recalibration, fitted without it, leave of each fold in turn."""
+def _left(beside: Array, columns: Array, errors: Array, fold: IntArray, smoothing: Sequence[float]) -> Array:
+    """Energy (k,) of errors (n, k) that columns and recalibration, fitted without it, leave of each fold in turn: the least of all
+    ``smoothing``."""
     both = np.column_stack([beside, columns])
     folds = [_normal(both[fold == k], errors[fold == k]) for k in range(FOLDS + 1)]
     gram = np.sum([g for g, _, _ in folds], axis=0)
     right = np.sum([r for _, r, _ in folds], axis=0)
-    penalty = _penalty(gram, beside.shape[1], smoothing)
-    left = np.zeros(errors.shape[1])
-    for g, r, energy in folds[:FOLDS]:
-        values = np.linalg.solve(gram - g + penalty, right - r)
-        left += energy - 2.0 * np.sum(values * r, axis=0) + np.sum(values * (g @ values), axis=0)
-    return left
+    left = np.zeros((len(smoothing), errors.shape[1]))
+    for share, total in zip(smoothing, left, strict=True):
+        penalty = _penalty(gram, beside.shape[1], share)
+        for g, r, energy in folds[:FOLDS]:
+            values = np.linalg.solve(gram - g + penalty, right - r)
+            total += energy - 2.0 * np.sum(values * r, axis=0) + np.sum(values * (g @ values), axis=0)
+    return np.asarray(left.min(axis=0))
 
 
 def bar(found: Sequence[Screened]) -> float:

@@ -19,6 +19,7 @@ from lugre_steering.recording import Array
 INSTANTS = 16
 """Instants tried in each recording before the best is refined."""
 RESOLUTION_S = 1.0
+Start = tuple[float, ...]
 ALIKE = 10.0
 """Energy, in noise variances, within which two instants fit alike."""
 
@@ -60,13 +61,35 @@ def undetermined(problem: Problem, weight: Array, result: Fit) -> Mask:
         left = _left(problem, weight, result, index)
         for bag, start in enumerate(candidate.since):
             run = problem.runs[bag]
-            # Before the first sample it was always there, after the last one never.
-            instants = np.append(np.arange(run.time[0], run.time[-1] + 2.0 * RESOLUTION_S, RESOLUTION_S), start)
-            energy = np.array([left((*candidate.since[:bag], instant, *candidate.since[bag + 1 :])) for instant in instants])
-            alike = np.clip(instants[energy < energy[-1] + ALIKE], run.time[0] - RESOLUTION_S, run.time[-1] + RESOLUTION_S)
+            alike = _alike(left, candidate.since, bag)
+            first, last = _span_of(alike, float(run.time[0]), float(run.time[-1]) + RESOLUTION_S, start)
             part = slice(problem.edges[bag], problem.edges[bag + 1])
-            unsure[part] |= (run.time > alike.min() - RESOLUTION_S) & (run.time < alike.max() + RESOLUTION_S)
+            unsure[part] |= (run.time > first - RESOLUTION_S) & (run.time < last + RESOLUTION_S)
     return unsure
+
+
+def _alike(left: Callable[[Start], float], since: Start, bag: int) -> Callable[[float], bool]:
+    """Whether another instant in a bag fits as well as that of ``since``."""
+
+    def energy(instant: float) -> float:
+        return left((*since[:bag], instant, *since[bag + 1 :]))
+
+    most = energy(since[bag]) + ALIKE
+    return lambda instant: energy(instant) < most
+
+
+def _span_of(alike: Callable[[float], bool], low: float, high: float, start: float) -> tuple[float, float]:
+    """First and last instant that is alike, to RESOLUTION_S: before ``low`` it was always there, after ``high`` never."""
+    instants = np.linspace(low, high, 2 * INSTANTS)
+    found = [float(t) for t in instants if alike(float(t))] + [float(np.clip(start, low, high))]
+    ends = []
+    for inside, step in ((min(found), instants[0] - instants[1]), (max(found), instants[1] - instants[0])):
+        outside = float(np.clip(inside + step, low, high))
+        while abs(outside - inside) > RESOLUTION_S:
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if alike(middle) else (inside, middle)
+        ends.append(inside)
+    return ends[0], ends[1]
 
 
 def _left(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[[Sequence[float]], float]:
