@@ -272,8 +272,19 @@ def test_the_next_experiment_stays_within_the_travel_of_a_linear_axis() -> None:
     assert np.abs(motion_of(sweeps, vehicle).theta).max() == pytest.approx(0.15, rel=0.01)
     speed = float(re.search(r"at ([\d.]+) m/s", sweeps.description)[1])  # type: ignore[index]
     assert np.abs(motion_of(sweeps, vehicle).rate).max() == pytest.approx(speed, rel=0.02)
+
+
+def test_the_next_experiment_of_a_joint_turns_as_far_as_it_was_recorded_and_warms_no_rubber() -> None:
     joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
-    assert experiment.manoeuvres(SimpleNamespace(vehicle=joint)) is BUILT_IN  # type: ignore[arg-type]
+    runs = [SimpleNamespace(theta=np.radians(np.array([[-10.0, 60.0]])))]
+    offered = experiment.manoeuvres(SimpleNamespace(vehicle=joint, runs=runs, presliding=1e-3))  # type: ignore[arg-type]
+    assert not any("heat" in manoeuvre.description for manoeuvre in offered.values())
+    sweeps = offered["double-cycle"]
+    assert np.degrees(np.abs(motion_of(sweeps, joint).theta).max()) == pytest.approx(35.0, rel=0.01)
+    speed = float(re.search(r"at ([\d.]+) deg/s", sweeps.description)[1])  # type: ignore[index]
+    assert np.degrees(np.abs(motion_of(sweeps, joint).rate).max()) == pytest.approx(speed, rel=0.03)
+    tracks = vehicle_file.load(CONFIG / "test_vehicle.yaml")
+    assert experiment.manoeuvres(SimpleNamespace(vehicle=tracks)) is BUILT_IN  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("rate_deg_s", "to_deg", "level"), [(40.0, 20.0, 35.0), (0.1, 3.0, 42.0)])

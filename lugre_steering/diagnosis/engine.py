@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
@@ -107,7 +109,11 @@ def diagnose_recordings(
         return _wrong_sheet(qualities, vehicle, findings, wrong)
     findings += _by_bag(weather_findings(done.problem, done.found.final))
     progress("verifying on held-out data")
-    return conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
+    result = conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
+    if cut:
+        return result
+    unused = left_out(done, done.found.final.effects if result.effects else (), recordings, pieces, clocks.late)
+    return replace(result, data_quality=(*result.data_quality, *_by_bag(unused)))
 
 
 def _misplaced(done: Finished) -> WrongSheet | None:

@@ -85,7 +85,7 @@ def synchronised(
         if np.abs(late).max() > LONGEST_S:
             return as_stamped
         problem = Problem(vehicle, [
-            prepare(_earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, late, strict=True)
+            prepare(earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, late, strict=True)
         ], calibrations)  # fmt: skip
         baseline = _baseline(problem, effects, baseline)
     if not late.any() or _alike(late, deviation) or _slow_sensor(as_stamped.problem, start, baseline, late):
@@ -155,7 +155,7 @@ def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bo
     return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
 
 
-def _earlier(recording: Recording, shift: float) -> Recording:
+def earlier(recording: Recording, shift: float) -> Recording:
     """The recording with what gives the torque stamped ``shift`` [s] earlier."""
     torque = recording.measured_torque
     return replace(

@@ -193,6 +193,7 @@ class Problem:
         """
         self.vehicle = vehicle
         self.runs = list(runs)
+        self._places = (more_laws, beside_names)
         self.model: Model = build_model(vehicle, lean=more_laws > 0 and not beside_names, more_laws=more_laws)
         self.calibrations = tuple(calibrations_for(vehicle) if calibrations is None else calibrations)
         self.measured = np.concatenate([run.measured for run in runs])
@@ -261,6 +262,11 @@ class Problem:
         bent.bends = np.hstack([self.bends, *columns])
         bent.shapes = int(bent.bends.shape[1] - self.bends.shape[1] + self.shapes)
         return bent
+
+    def over(self, runs: Sequence[Run]) -> Problem:
+        """The same vehicle, with as many places for laws, in other runs; without bends."""
+        more_laws, beside_names = self._places
+        return Problem(self.vehicle, runs, self.calibrations, more_laws=more_laws, beside_names=beside_names)
 
     def doubted(self, doubt: float, typical: float) -> Problem:
         """The same with another doubt, and another typical size of bends."""

@@ -31,7 +31,7 @@ class Window:
     """The latest values of a duration [ns], in a ring of fixed size."""
 
     def __init__(self, size: int) -> None:
-        self.values = np.zeros(size, np.int64)
+        self.values = np.full(size, 0, np.int64)  # written once now, so that memory does not grow as the ring fills
         self.count = 0
         self.max_ns = 0
 

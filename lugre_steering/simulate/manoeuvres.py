@@ -100,6 +100,9 @@ def cycles(limit_deg: float, rate_deg_s: float, count: int, hold_s: float = 3.0)
 LIMIT_DEG = 28.0
 """Mean steering angle at the limits of the test vehicle (inner track 32 deg); the paper's own limit is lost."""
 
+HEATING = ("six-cycles", "heat-and-rest")
+"""Built-in manoeuvres that only tell something of rubber that warms."""
+
 BUILT_IN = {
     m.name: m
     for m in (

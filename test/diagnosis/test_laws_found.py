@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +15,13 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
+from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.laws.find import FoundLaws, find
+from lugre_steering.diagnosis.laws.cells import Axis, Cell
+from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
+from lugre_steering.diagnosis.laws.refine import free_law, with_law
 from lugre_steering.diagnosis.laws.rival import in_place
+from lugre_steering.diagnosis.laws.screen import Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.law_entry import LawEntry
@@ -86,6 +92,26 @@ def test_a_torque_that_remembers_the_rate_is_found_with_its_time_constant() -> N
     entry = entries(found)[0]
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert entry.memory_size == pytest.approx(1.5, rel=0.2)
+
+
+def test_laws_that_tie_are_separated_by_the_next_experiment() -> None:
+    """A loss beyond an angle against one at every angle: each differs from the other by the whole of it where the tracks turn fastest."""
+    problem, found = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
+    assert found is not None
+    cell = Cell("viscous_loss", Axis("none"), -1.0, 1.0, 1)
+    rival = with_law(found.problem, weight(problem), fitted(problem), free_law(found.problem, cell, 0, np.array([1e3])))
+    tied = replace(found, ties=(Tried(Screened(cell, 0.0, np.zeros(1)), rival),))
+    done = named(problem, fitted(problem))
+    advice = next_experiment(done, "unlisted_physics", found.fit, tied)
+    assert advice is not None
+    first, second = advice.separates
+    assert "only beyond" in first
+    assert "angle" not in second
+    best, others = float(re.search(r"differ by (\d+)", advice.why)[1]), re.search(r"tried \((.*)\)", advice.why)[1]  # type: ignore[index]
+    assert all(best >= float(other.rsplit(" ", 1)[1]) for other in others.split(", "))
+    alone = next_experiment(done, "unlisted_physics", found.fit, replace(found, ties=()))
+    assert alone is not None
+    assert "dependence on rate" in alone.separates
 
 
 @pytest.mark.parametrize("beyond", [0.1, None])

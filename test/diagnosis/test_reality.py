@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,11 +21,16 @@ from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.data.sensing import sensed
 from lugre_steering.data.stamps import evened
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_instead, wrong_entry, wrong_sheet
+from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.online import sheet_words
 from lugre_steering.recording import Array, Recording, Signal
@@ -114,6 +120,30 @@ def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
     problem = clocks.problem
     assert clocks.findings == {}
     np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
+
+
+@pytest.mark.parametrize(("lasts_s", "told"), [(0.5, False), (6.0, True)])
+def test_what_is_left_out_is_weighed_where_it_is_much(lasts_s: float, told: bool) -> None:
+    """A cable that is off for a while: those samples are not used, and with them the model would err by much more."""
+
+    def unplugged(signal: Signal) -> Signal:
+        off = np.abs(signal.time_s - 0.5 * signal.time_s[-1]) < 0.5 * lasts_s
+        return Signal(signal.time_s, np.where(off, 0.0, signal.value))
+
+    raw = [replace(r, pressure={line: unplugged(s) if line == "main_a" else s for line, s in r.pressure.items()}) for r in sound()]
+    used = [inspect(r, VEHICLE).recording for r in raw]
+    problem = Problem(VEHICLE, [prepare(r, VEHICLE) for r in used])
+    sigma = np.concatenate([run.sigma for run in problem.runs])
+    roles, noise = split(problem), Noise(sigma, np.zeros((1, sigma.size)), 0.0)
+    baseline = fit(problem, np.where(roles.fit, 1.0 / sigma, 0.0))
+    done = Finished(problem, noise, roles, Search(baseline, baseline, (), (), (), None))
+    found = left_out(done, (), raw, used, np.zeros(len(raw)))
+    assert bool(found) == told
+    for recording, finding in zip(raw, found.values(), strict=False):
+        share = lasts_s / float(recording.angle["left"].time_s[-1])
+        said, worse, better = (float(n) for n in re.findall(r"([\d.]+)(?: %| N m)", finding.statement))
+        assert said / 100.0 == pytest.approx(share, abs=0.02)
+        assert worse > 10.0 * better
 
 
 def test_a_hot_start_is_weather() -> None:

@@ -94,7 +94,7 @@ def conclude(
     ended = [effect.id for effect in effects if effect.id not in kept]
     causal = causal_rmse(vehicle, recordings, problem.runs)
     progress("next experiment")
-    advice = next_experiment(done, stands.verdict, whole)
+    advice = next_experiment(done, stands.verdict, whole, lawful)
     headline, statistics = statement(done, stands.verdict, effects, judged, causal, left, ended, law, stands.nearest, advice)
     return Diagnosis(
         schema=SCHEMA,

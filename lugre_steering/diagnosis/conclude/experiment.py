@@ -13,12 +13,16 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.laws.find import FoundLaws
+from lugre_steering.diagnosis.laws.refine import Law
+from lugre_steering.diagnosis.laws.write import law_words
 from lugre_steering.diagnosis.result import Experiment
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Candidate, Problem
+from lugre_steering.fitting.problem import Candidate, Problem, is_rig
 from lugre_steering.recording import Array
-from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
+from lugre_steering.simulate.manoeuvres import BUILT_IN, HEATING, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
+from lugre_steering.vehicle import Vehicle
 
 SAMPLE_S = 0.02
 SHORTEST_TRAVEL = 20.0
@@ -27,23 +31,25 @@ Named = tuple[Candidate, Mapping[str, float]]
 
 
 def manoeuvres(problem: Problem) -> Mapping[str, Manoeuvre]:
-    """The built-in manoeuvres; for a linear axis scaled to the travel it was recorded over, as none is known otherwise."""
-    if not units.is_linear(problem.vehicle):
+    """The built-in manoeuvres; for a joint or axis scaled to the travel it was recorded over, as none is known otherwise, and without
+    those that warm rubber."""
+    if not is_rig(problem.vehicle):
         return BUILT_IN
     low, high = _reach(problem)
     factor = 0.5 * (high - low) / float(np.radians(LIMIT_DEG))
-    return {name: _scaled(manoeuvre, factor, problem.vehicle.coordinate.unit) for name, manoeuvre in BUILT_IN.items()}
+    return {name: _scaled(manoeuvre, factor, problem.vehicle) for name, manoeuvre in BUILT_IN.items() if name not in HEATING}
 
 
 def _reach(problem: Problem) -> tuple[float, float]:
-    """Ends of the recorded travel of a linear axis, widened if it hardly moved."""
+    """Ends of the recorded travel of a joint or axis, widened if it hardly moved."""
     low, high = min(float(run.theta.min()) for run in problem.runs), max(float(run.theta.max()) for run in problem.runs)
     middle, half = 0.5 * (low + high), 0.5 * max(high - low, SHORTEST_TRAVEL * problem.presliding)
     return middle - half, middle + half
 
 
-def _scaled(manoeuvre: Manoeuvre, factor: float, unit: str) -> Manoeuvre:
-    """Angles and rates multiplied by a factor, in the description too, where they are given in ``unit``."""
+def _scaled(manoeuvre: Manoeuvre, factor: float, vehicle: Vehicle) -> Manoeuvre:
+    """Angles and rates multiplied by a factor, in the description too, where they are given in the unit of a linear axis."""
+    unit, told = (vehicle.coordinate.unit, factor * float(np.radians(1.0))) if units.is_linear(vehicle) else ("deg", factor)
 
     def part(segment: Segment) -> Segment:
         if isinstance(segment, Sweep):
@@ -51,7 +57,7 @@ def _scaled(manoeuvre: Manoeuvre, factor: float, unit: str) -> Manoeuvre:
         return replace(segment, amplitude_deg=factor * segment.amplitude_deg) if isinstance(segment, Chirp) else segment
 
     def written(degrees: re.Match[str]) -> str:
-        return re.sub(r"[\d.]+", lambda n: f"{factor * np.radians(float(n[0])):.2g}", degrees[1]) + f" {unit}"
+        return re.sub(r"[\d.]+", lambda n: f"{told * float(n[0]):.2g}", degrees[1]) + f" {unit}"
 
     description = re.sub(r"([\d.]+(?:(?:, | to | and )[\d.]+)*) deg", written, manoeuvre.description)
     return replace(manoeuvre, description=description, segments=tuple(part(s) for s in manoeuvre.segments))
@@ -62,12 +68,12 @@ def _run(problem: Problem, manoeuvre: Manoeuvre, x: Array, sigma: float) -> Run:
     motion = motion_of(manoeuvre, problem.vehicle)
     keep = slice(None, None, max(1, round(SAMPLE_S / (motion.time[1] - motion.time[0]))))
     time, theta = motion.time[keep], motion.theta[:, keep]
-    if units.is_linear(problem.vehicle):
+    if is_rig(problem.vehicle):
         theta = theta + 0.5 * sum(_reach(problem))
     omega = np.gradient(theta, time, axis=1)
     rates = omega, np.gradient(omega, time, axis=1)
     at_rest = ideal_run(problem.vehicle, manoeuvre.name, time, theta, rates, np.zeros(time.size), sigma)
-    torque = Problem(problem.vehicle, [at_rest], problem.calibrations).predict(0, x)
+    torque = problem.over([at_rest]).predict(0, x)
     return ideal_run(problem.vehicle, manoeuvre.name, time, theta, rates, torque, sigma)
 
 
@@ -82,7 +88,7 @@ def separation(
     x = problem.one_bag(fit.x)
     for manoeuvre in manoeuvres(problem).values():
         try:
-            trial = Problem(problem.vehicle, [_run(problem, manoeuvre, x, sigma)], problem.calibrations)
+            trial = problem.over([_run(problem, manoeuvre, x, sigma)])
         except DataError:  # these cylinders cannot drive it
             continue
         difference = trial.predict(0, x, first) - trial.predict(0, x, second)
@@ -106,23 +112,21 @@ def recommend(problem: Problem, energies: Mapping[str, float]) -> tuple[str, str
     return best, manoeuvres(problem)[best].description, energies[best]
 
 
-def next_experiment(done: Finished, verdict: str, whole: Fit) -> Experiment | None:
-    """For a tie the manoeuvre that separates the rivals best; for unlisted structure those that vary one quantity at a time."""
+def next_experiment(done: Finished, verdict: str, whole: Fit, laws: FoundLaws | None = None) -> Experiment | None:
+    """For a tie of names or of laws the manoeuvre that separates the rivals best; for unlisted structure those that vary one quantity
+    at a time."""
     for index, item in enumerate(done.found.found if verdict == "missing_physics" else ()):
         rivals = [trial for trial in item.trials if trial.candidate.effect.id in item.rivals]
         if rivals:
             chosen = whole.effects[index]
             energies = separation(done.problem, whole, [chosen], [rivals[0].fit.effects[-1]], done.noise.floor)
-            if not energies:
-                continue
-            best, description, energy = recommend(done.problem, energies)
-            others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
-            return Experiment(
-                f"{best}: {description}",
-                (chosen[0].effect.id, rivals[0].candidate.effect.id),
-                f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
-                f"more than in any other manoeuvre tried ({others})",
-            )
+            if energies:
+                return _between(done.problem, energies, (chosen[0].effect.id, rivals[0].candidate.effect.id))
+    if laws is not None and laws.ties:
+        sides = laws.fitted.effects[: laws.names + 1], laws.ties[0].fit.effects
+        energies = separation(laws.problem, laws.fitted, *sides, done.noise.floor)
+        if energies:
+            return _between(laws.problem, energies, tuple(_in_words(side[-1], done.problem.vehicle) for side in sides))
     if verdict == "unlisted_physics":
         return Experiment(
             "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",
@@ -130,3 +134,20 @@ def next_experiment(done: Finished, verdict: str, whole: Fit) -> Experiment | No
             "the structure follows none of the catalogue's laws; runs that vary one quantity at a time show which it depends on",
         )
     return None
+
+
+def _between(problem: Problem, energies: Mapping[str, float], rivals: tuple[str, ...]) -> Experiment:
+    """The manoeuvre that separates two rivals best."""
+    best, description, energy = recommend(problem, energies)
+    others = ", ".join(f"{key} {np.sqrt(value):.0f}" for key, value in energies.items() if key != best)
+    return Experiment(
+        f"{best}: {description}", rivals,
+        f"there the two explanations differ by {np.sqrt(energy):.0f} standard deviations in all after recalibration, "
+        f"more than in any other manoeuvre tried ({others})",
+    )  # fmt: skip
+
+
+def _in_words(law: Named, vehicle: Vehicle) -> str:
+    candidate, values = law
+    assert isinstance(candidate.effect, Law)
+    return law_words(candidate.effect, values, vehicle)
