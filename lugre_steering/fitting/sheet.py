@@ -9,7 +9,7 @@ only itself: each hypothesis is fitted and ranked by what it leaves, in shares o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -22,7 +22,7 @@ from lugre_steering.recording import Array, BagFinding, IntArray
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.loads import vertical_load
-from lugre_steering.vehicle.sections import Cylinder
+from lugre_steering.vehicle.sections import Cylinder, Hydraulics
 
 WIDE, FARTHEST = 1.0, 2.6
 """Standard deviation and bound of the logarithm of an entry under suspicion: a factor of e, up to 13."""
@@ -52,6 +52,8 @@ LOAD = SheetValue("load", ("static_torque", "coulomb_torque", "aligning_torque")
 LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 LEVELS = ("friction_level", "stiffness")
+Resized = Callable[[float], Mapping[str, Cylinder]]
+"""Cylinders by name with a size of theirs times a factor."""
 STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 
 
@@ -257,28 +259,53 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
 
 
 def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[tuple[Suspect, float]]:
-    """Hypotheses about single cylinders, and the surprise that each leaves; sizes only where ``least`` of what is left beyond noise is
-    foretold to go."""
+    """Hypotheses about single cylinders and those of one circuit, and the surprise that each leaves; sizes only where ``least`` of what is
+    left beyond noise is foretold to go."""
     hydraulics = problem.vehicle.hydraulics
-    for name, cylinder in hydraulics.cylinders.items() if hydraulics is not None else ():
+    if hydraulics is None:
+        return
+    sizes: list[tuple[str, Resized]] = []
+    for name, cylinder in hydraulics.cylinders.items():
         key = f"hydraulics.cylinders.{name}"
         for entry, scale in (("bore_m", _bore), ("knuckle_m", _knuckle)):
-            change = partial(scale, cylinder)
-            factor, share = _better(problem, problem, baseline, name, change, 1.0)
-            if share < least:
-                continue
-            trial, result = _refitted(problem, baseline, name, change(factor))
-            factor, _ = _better(problem, trial, result, name, change, factor)
-            trial, result = _refitted(problem, baseline, name, change(factor))
-            yield _suspect(problem, trial, result, f"{key}.{entry}", factor), _surprise(trial, result)
-        trial, result = _refitted(problem, baseline, name, replace(cylinder, cap=cylinder.rod, rod=cylinder.cap))
-        yield _suspect(problem, trial, result, f"{key}.cap and .rod exchanged", None), _surprise(trial, result)
+            sizes.append((f"{key}.{entry}", partial(_resized, {name: cylinder}, scale)))
+    for names in circuits(hydraulics):
+        key = "hydraulics.cylinders." + " and ".join(f"{name}.bore_m" for name in names)
+        sizes.append((key, partial(_resized, {name: hydraulics.cylinders[name] for name in names}, _bore)))
+    for key, change in sizes:
+        factor, share = _better(problem, problem, baseline, change, 1.0)
+        if share < least:
+            continue
+        trial, result = _refitted(problem, baseline, change(factor))
+        factor, _ = _better(problem, trial, result, change, factor)
+        trial, result = _refitted(problem, baseline, change(factor))
+        yield _suspect(problem, trial, result, key, factor), _surprise(trial, result)
+    for name, cylinder in hydraulics.cylinders.items():
+        trial, result = _refitted(problem, baseline, {name: replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)})
+        yield _suspect(problem, trial, result, f"hydraulics.cylinders.{name}.cap and .rod exchanged", None), _surprise(trial, result)
 
 
-def _refitted(problem: Problem, baseline: Fit, name: str, cylinder: Cylinder) -> tuple[Problem, Fit]:
-    """The problem of a vehicle with another cylinder, and its fit."""
-    trial = _changed(problem, name, cylinder)
+def circuits(hydraulics: Hydraulics) -> list[tuple[str, ...]]:
+    """Several cylinders, but not all, that lines connect: their bores are read off one drawing."""
+    groups: list[tuple[set[str], set[str]]] = []
+    for name, cylinder in hydraulics.cylinders.items():
+        names, lines = {name}, {line for line in (cylinder.cap, cylinder.rod) if line}
+        for group in [group for group in groups if group[1] & lines]:
+            groups.remove(group)
+            names, lines = names | group[0], lines | group[1]
+        groups.append((names, lines))
+    ordered = [tuple(name for name in hydraulics.cylinders if name in names) for names, _ in groups]
+    return [names for names in ordered if 1 < len(names) < len(hydraulics.cylinders)]
+
+
+def _refitted(problem: Problem, baseline: Fit, cylinders: Mapping[str, Cylinder]) -> tuple[Problem, Fit]:
+    """The problem of a vehicle with other cylinders, and its fit."""
+    trial = _changed(problem, cylinders)
     return trial, _fitted(trial, start=baseline.x)
+
+
+def _resized(cylinders: Mapping[str, Cylinder], scale: Callable[[Cylinder, float], Cylinder], factor: float) -> dict[str, Cylinder]:
+    return {name: scale(cylinder, factor) for name, cylinder in cylinders.items()}
 
 
 def _bore(cylinder: Cylinder, factor: float) -> Cylinder:
@@ -291,12 +318,12 @@ def _knuckle(cylinder: Cylinder, factor: float) -> Cylinder:
 
 
 def _better(
-    problem: Problem, trial: Problem, result: Fit, name: str, change: Callable[[float], Cylinder], factor: float
+    problem: Problem, trial: Problem, result: Fit, change: Resized, factor: float
 ) -> tuple[float, float]:
     """The factor on one entry that explains most of what is left, by how it changes the measured torque, and which share of what is
     left beyond noise it would explain."""
     weight = _weight(trial)
-    turned = (_changed(problem, name, change(factor * 1.02)).measured - trial.measured) * weight / 0.02
+    turned = (_changed(problem, change(factor * 1.02)).measured - trial.measured) * weight / 0.02
     basis = result.basis()
     own = turned - basis @ (basis.T @ turned)
     left = (trial.measured - result.prediction) * weight
@@ -307,12 +334,12 @@ def _better(
     return float(np.clip(factor * np.exp(np.clip(-along / power, -0.5, 0.5)), *SCALES)), along**2 / power / beyond
 
 
-def _changed(problem: Problem, name: str, cylinder: Cylinder) -> Problem:
-    """The problem of a vehicle with another cylinder."""
+def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:
+    """The problem of a vehicle with other cylinders."""
     hydraulics = problem.vehicle.hydraulics
     assert hydraulics is not None
     vehicle: Vehicle = problem.vehicle.replace(
-        hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, name: cylinder})
+        hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, **cylinders})
     )
     return Problem(vehicle, [with_hydraulics(run, vehicle) for run in problem.runs], problem.calibrations)
 
