@@ -15,13 +15,14 @@ from typer.testing import CliRunner
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration import calibrate_recordings, coverage
-from lugre_steering.calibration.calibrate import KEYS, chosen
+from lugre_steering.calibration.calibrate import chosen
 from lugre_steering.calibration.estimate import _larger
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import prepare
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.keys import KEYS
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Signal
 from lugre_steering.replay.run import replay

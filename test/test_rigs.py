@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
+from lugre_steering.calibration.calibrate import calibrate_recordings
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import inspect
@@ -36,7 +37,7 @@ from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep,
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
 from lugre_steering.units import label, law, title, words
-from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle import EffectEntry, Vehicle
 from lugre_steering.vehicle.sections import Gravity
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -363,3 +364,30 @@ def test_a_pendulum_whose_sheet_lacks_its_gravity_is_no_wiring_fault(tmp_path: P
     assert torque is not None
     seen = dataclasses.replace(recording, measured_torque=Signal(torque.time_s, sign * torque.value))
     assert bool(inspect(seen, heavy.replace(gravity=None)).blocking) == refused
+
+
+def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path) -> None:
+    """Viscous friction and gravity that the sheet lacks, and friction of the sheet a fifth too high: each comes out as put in."""
+    true = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)
+    assert true.contact is not None
+    real = true.replace(effects=(EffectEntry("viscous_friction", {"sigma_2": 60.0}), EffectEntry("slope_bias", {"torque": 9.0})))
+    write_bag(tmp_path / "bag", simulate(real, motion_of(BUILT_IN["varied-rates"], real), sensing_of(real)), "test")
+    contact = dataclasses.replace(
+        true.contact, coulomb_torque_Nm=1.2 * true.contact.coulomb_torque_Nm, static_torque_Nm=1.2 * true.contact.static_torque_Nm
+    )
+    done = calibrate_recordings([read_recording(tmp_path / "bag", true.channels)], true.replace(contact=contact))
+    found = {entry.id: entry.parameters for entry in done.vehicle.effects}
+    assert set(found) == {"viscous_friction", "slope_bias"}
+    assert found["viscous_friction"]["sigma_2"] == pytest.approx(60.0, rel=0.05)
+    assert found["slope_bias"]["torque"] == pytest.approx(9.0, rel=0.05)
+    assert done.vehicle.contact is not None
+    assert done.vehicle.contact.coulomb_torque_Nm == pytest.approx(true.contact.coulomb_torque_Nm, rel=0.03)
+    rows = {row["name"]: row for row in done.result["parameters"]}
+    for name, value in (("viscous_friction.sigma_2", 60.0), ("slope_bias.torque", 9.0)):
+        low, high = rows[name]["ci95"]
+        assert low < value < high
+        assert high - low < 0.3 * value
+    held = done.result["heldout_rmse_Nm"]
+    assert held["calibrated"] < 0.1 * held["sheet"]
+    clean = calibrate_recordings([read_recording(tmp_path / "bag", true.channels)], done.vehicle)
+    assert clean.vehicle.effects == done.vehicle.effects  # what the file has is not looked for again

@@ -8,7 +8,8 @@
 key                 content
 ==================  ===============================================================================================
 bags, vehicle       what was used; ``tool_version``, ``date`` (UTC), ``duration_s``, ``priors`` (true or false)
-parameters          list: ``name``, ``key`` in the vehicle file, ``unit``, ``sheet``, ``value``, ``ci95``, relative
+parameters          list: ``name``, ``key`` in the vehicle file, ``unit``, ``sheet``, ``value``, ``ci95`` (of a joint or
+                    axis also what it has beside friction, which become ``effects`` of the file), relative
                     standard deviations ``relative_sd`` and (sheet) ``prior_relative_sd``, ``at_bound`` (null, low,
                     high), ``prior_dominated`` (the data add little to the sheet), ``advice`` (helpful manoeuvre)
 covariance          ``names`` and ``matrix`` of the fitted values (logarithms of factors on the sheet; static_ratio:
@@ -38,17 +39,20 @@ from lugre_steering import units
 from lugre_steering.calibration import result
 from lugre_steering.calibration.estimate import LINEARISATIONS, Estimate, estimate
 from lugre_steering.calibration.identify import Assumed, Combination, identifiability
+from lugre_steering.calibration.terms import term_rows, terms_of, with_terms
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.apply import apply_calibration, seen_range
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.keys import KEYS, Key
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Problem, SheetValue, calibrations_for
 from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Array, BagFinding, Recording
+from lugre_steering.report.words import number
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.version import __version__
 
@@ -64,38 +68,6 @@ WORTH_SAYING = 0.1
 
 Progress = Callable[[str], None]
 
-
-@dataclass(frozen=True)
-class Key:
-    """One key of the vehicle file: how to read it and which calibration value decides about it."""
-
-    calibration: str
-    key: str
-    unit: str
-    read: Callable[[Vehicle], float | None]
-
-
-def _of(section: str, name: str) -> Callable[[Vehicle], float | None]:
-    return lambda vehicle: getattr(getattr(vehicle, section), name, None)
-
-
-KEYS = tuple(
-    Key(calibration, f"{section}.{name}", unit, _of(section, name))
-    for calibration, section, name, unit in (
-        ("friction_level", "friction", "coulomb", "1"),
-        ("static_ratio", "friction", "static", "1"),
-        ("stiffness", "friction", "stiffness_Nm_per_deg", "N m/deg"),
-        ("stribeck_speed", "friction", "stribeck_speed_deg_s", "deg/s"),
-        ("friction_level", "contact", "coulomb_torque_Nm", "N m"),
-        ("static_ratio", "contact", "static_torque_Nm", "N m"),
-        ("stiffness", "contact", "stiffness_Nm_per_deg", "N m/deg"),
-        ("stribeck_speed", "contact", "stribeck_speed_deg_s", "deg/s"),
-        ("heat_capacity", "rubber", "specific_heat_J_kgK", "J/(kg K)"),
-        ("cooling", "rubber", "heat_transfer_W_m2K", "W/(m2 K)"),
-        ("kingpin_arm", "axle", "kingpin_lever_arm_m", "m"),
-        ("pressure_gain", "sensors", "pressure_gain", "1"),
-    )
-)
 
 ADVICE = {
     "friction_level": "varied-rates",
@@ -189,7 +161,7 @@ def calibrate_recordings(
     progress("comparing with the vehicle file")
     wrong = wrong_sheet(problem)
     progress("fitting")
-    fitted = estimate(problem, priors=priors)
+    fitted = estimate(problem, terms_of(problem), priors=priors)
     found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
     further = [*cut.items(), *clocks.findings.items(), *weather_findings(problem, fitted.fit).items()]
     found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])
@@ -212,8 +184,8 @@ def _summed_up(
     held = heldout_rmse(problem, fitted, priors)
     progress("what the data cannot tell")
     weak, assumed = identifiability(problem, fitted)
-    calibrated = _rounded(apply_calibration(problem.vehicle, problem, fitted.x))
-    rows = parameter_rows(problem, fitted, calibrated, priors)
+    calibrated = with_terms(_rounded(apply_calibration(problem.vehicle, problem, fitted.x)), fitted)
+    rows = [*parameter_rows(problem, fitted, calibrated, priors), *term_rows(problem, fitted)]
     rmse = _fitted_errors(problem, fitted)
     names = [calibration.name for calibration in problem.calibrations]
     matrix = tuple(tuple(row) for row in fitted.covariance[: len(names), : len(names)].tolist())
@@ -283,7 +255,7 @@ def heldout_rmse(problem: Problem, fitted: Estimate, priors: bool) -> result.Hel
     if not parts.held.any() or not parts.fit.any():
         return result.HeldOutErrors(None, None)
     weight = np.where(parts.fit, fitted.weight, 0.0)
-    other = fit(problem, weight, start=fitted.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    other = fit(problem, weight, fitted.fit.effects, fitted.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     sheet = problem.predict_all(problem.start())
     return result.HeldOutErrors(
         _rms((problem.measured - sheet)[parts.held]), _rms((problem.measured - other.prediction)[parts.held])
@@ -303,7 +275,7 @@ def parameter_rows(problem: Problem, fitted: Estimate, calibrated: Vehicle, prio
             continue
         i = names.index(key.calibration)
         gradient = _log_gradient(problem, fitted.x, key)
-        deviation = float(np.sqrt(gradient @ fitted.covariance @ gradient))
+        deviation = float(np.sqrt(gradient @ fitted.covariance[: gradient.size, : gradient.size] @ gradient))
         reach = math.exp(min(fitted.quantile * deviation, 20.0))
         edge = 0.01 * (high[i] - low[i])
         at_bound: Literal["low", "high"] | None = (
@@ -351,10 +323,11 @@ def statement(
     before, after = held.sheet, held.calibrated
     text = []
     if before is not None and after is not None:
-        text.append(f"Torque error on held-out stretches: {after:.0f} N m; with the sheet it was {before:.0f} N m.")
+        now, then = (number(value, 3) for value in (after, before))
+        text.append(f"Torque error on held-out stretches: {now} N m; with the sheet it was {then} N m.")
     if rmse.calibrated > MISFIT * rmse.noise_floor:
         text.append(
-            f"The residual ({rmse.calibrated:.0f} N m) is above the noise ({rmse.noise_floor:.0f} N m): physics "
+            f"The residual ({number(rmse.calibrated, 3)} N m) is above the noise ({number(rmse.noise_floor, 3)} N m): physics "
             "beyond the baseline; run diagnose before trusting these values."
         )
     for row in rows:

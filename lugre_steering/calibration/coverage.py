@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.calibration.calibrate import KEYS, chosen, parameter_rows
+from lugre_steering.calibration.calibrate import chosen, parameter_rows
 from lugre_steering.calibration.estimate import estimate
 from lugre_steering.data.dataset import prepare
 from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.keys import KEYS
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Kind, Recording, Signal
 from lugre_steering.simulate.command import load_vehicle

@@ -21,7 +21,7 @@ from scipy.signal import correlate
 from lugre_steering.data.dataset import Run, motion
 from lugre_steering.fitting.fit import ROBUST, Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.recording import Array
 
 DRAWS = 16
@@ -38,7 +38,8 @@ STEP_REMAINDER = 0.25
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles and weather).
+    """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles and weather), then
+    those of effects fitted beside them.
 
     ``weight`` (n,) [1/(N m)] zero where not used, ``noise_floor`` [N m], ``residual`` (n,) [N m], ``draws`` (draws,
     n) and ``step_error`` (n,) [N m] what noise and the finite time step may put into it, ``cluster`` (n,) the block of
@@ -80,26 +81,26 @@ def influence(z: Array) -> Array:
     return np.asarray(z / np.sqrt(1.0 + (z / ROBUST) ** 2))
 
 
-def estimate(problem: Problem, *, priors: bool = True, seed: int = 0, draws: int = DRAWS) -> Estimate:
-    """Fit all valid samples, learn the noise, fit again with it, and work out the covariance."""
+def estimate(
+    problem: Problem, effects: Effects = (), *, priors: bool = True, seed: int = 0, draws: int = DRAWS
+) -> Estimate:
+    """Fit all valid samples, learn the noise, fit again with it, and work out the covariance; ``effects`` are fitted as well."""
     valid = problem.valid.astype(float)
     weight = valid / np.concatenate([run.sigma for run in problem.runs])
-    first = fit(problem, weight, linearisations=LINEARISATIONS, robust=True, priors=priors)
-    noise = noise_model(problem, first.x, (), repeated_motion(problem, draws, seed), seed=seed)
+    first = fit(problem, weight, effects, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    noise = noise_model(problem, first.x, first.effects, repeated_motion(problem, draws, seed), seed=seed)
     weight = valid / noise.sigma
-    step = step_error(problem, first.x)
+    step = step_error(problem, first.x, first.effects)
     refined = copy.copy(problem)
     refined.measured = problem.measured - step  # the same as adding the error to every prediction
-    final = fit(refined, weight, start=first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    final = fit(refined, weight, first.effects, first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     residual = refined.measured - final.prediction
     cluster = _clusters(problem, residual * weight)
-    scales = problem.scales()
-    # Same information as the prior rows of the fit; initial bristles have a wide one of their own.
-    information = problem.prior_weights(priors) ** 2 / scales**2
+    information = final.pull**2  # as the prior rows of the fit have it
     blocks = np.unique(cluster[weight > 0.0]).size
     result = Estimate(
         final, weight, noise.floor, residual, noise.draws, step, cluster, information,
-        np.empty(0), float(stats.t.ppf(0.975, max(blocks - scales.size, 3))),
+        np.empty(0), float(stats.t.ppf(0.975, max(blocks - information.size, 3))),
     )  # fmt: skip
     curvature, score = result.information(physical_jacobian(result))
     bread = np.linalg.pinv(curvature + np.diag(information), hermitian=True)
@@ -112,12 +113,12 @@ def physical_jacobian(result: Estimate) -> Array:
     return np.asarray(result.fit.jacobian / weight[:, None])
 
 
-def step_error(problem: Problem, x: Array) -> Array:
+def step_error(problem: Problem, x: Array, effects: Effects = ()) -> Array:
     """Error of the chain's finite time step (n,) [N m]: the change when it is doubled (Richardson, first order)."""
     errors = []
     for bag, run in enumerate(problem.runs):
-        whole = problem.torque(bag, x)
-        doubled = problem.torque(bag, x, run=_every_second(run))
+        whole = problem.torque(bag, x, effects)
+        doubled = problem.torque(bag, x, effects, run=_every_second(run))
         errors.append(np.interp(run.time, run.time[::2], whole[::2] - doubled))
     return np.concatenate(errors)
 

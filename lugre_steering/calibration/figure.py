@@ -51,7 +51,8 @@ def draw_calibration(done: Calibrated, file: Path) -> None:
 
 
 def _parameters(ax: Any, rows: list[dict[str, Any]]) -> None:
-    """Value over sheet with 95 % interval; grey: the sheet's own 95 %."""
+    """Value over sheet with 95 % interval, where the sheet has one; grey: the sheet's own 95 %."""
+    rows = [row for row in rows if row["sheet"]]
     for i, row in enumerate(rows):
         value, (low, high) = row["value"] / row["sheet"], sorted(end / row["sheet"] for end in row["ci95"])
         if row["prior_relative_sd"]:

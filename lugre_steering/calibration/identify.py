@@ -133,7 +133,7 @@ def _column(problem: Problem, result: Estimate, calibration: SheetValue) -> Arra
     else:
         moved.calibrations = (*problem.calibrations, calibration)
         x = np.insert(result.x, len(problem.calibrations), STEP)
-    return np.asarray((moved.predict_all(x) - result.fit.prediction) / STEP)
+    return np.asarray((moved.predict_all(x, result.fit.effects) - result.fit.prediction) / STEP)
 
 
 def _fitted(names: Sequence[str], direction: Array, data_over_sheet: float) -> Combination:

@@ -58,7 +58,7 @@ def _per_bag(result: Mapping[str, Any], unit: str) -> Table:
     for column in ("seconds", "samples", "sheet", "calibrated"):
         table.add_column(column, justify="right", no_wrap=True)
     for row in result["per_bag"]:
-        errors = ("-" if row[key] is None else f"{row[key]:.1f}" for key in ("sheet", "calibrated"))
+        errors = ("-" if row[key] is None else words.tenths(row[key]) for key in ("sheet", "calibrated"))
         table.add_row(row["bag"], f"{row['duration_s']:.1f}", str(row["samples"]), *errors)
     return table
 

@@ -19,7 +19,7 @@ from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Candidate, Problem, SheetValue, Values, is_rig
+from lugre_steering.fitting.problem import Candidate, Effects, Problem, SheetValue, is_rig
 from lugre_steering.fitting.split import CLUSTER_S
 from lugre_steering.recording import Array, Finding, Kind, Recording
 from lugre_steering.vehicle import Vehicle
@@ -32,7 +32,6 @@ ALIKE_S = 1e-3
 """Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
 WORTH_SAYING_S = 2e-3
 ROUNDS = 6
-Effects = Sequence[tuple[Candidate, Values]]
 SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
 

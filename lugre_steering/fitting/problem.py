@@ -140,6 +140,7 @@ class Candidate:
 
 
 Values = Mapping[str, float]
+Effects = Sequence[tuple[Candidate, Values]]
 
 
 def standing_effects(vehicle: Vehicle) -> tuple[tuple[Candidate, Values], ...]:

@@ -14,6 +14,7 @@ from lugre_steering import units
 from lugre_steering.online import Agreement, Curves, r2_words
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array
+from lugre_steering.report import words
 from lugre_steering.report.style import IMPROVED, MEASURED, SERIES, SHOWN, figure
 from lugre_steering.vehicle import Vehicle
 
@@ -82,6 +83,6 @@ def _caption(name: str, vehicle: Vehicle, fit: Agreement | None) -> str:
         return text + "No residual: the torque was not measured."
     unit = vehicle.coordinate.force_unit
     return text + (
-        f"Residual over {fit.samples} samples: RMSE {fit.rmse_Nm:.1f} {unit}{r2_words(fit.r2, 'R²')}, bias {fit.bias_Nm:+.1f} "
-        f"{unit}."
+        f"Residual over {fit.samples} samples: RMSE {words.tenths(fit.rmse_Nm)} {unit}{r2_words(fit.r2, 'R²')}, "
+        f"bias {words.tenths(fit.bias_Nm, '+')} {unit}."
     )

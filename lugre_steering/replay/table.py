@@ -10,6 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from lugre_steering.report import words
+
 
 def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     """The summary as a table, and remarks below it."""
@@ -33,7 +35,7 @@ def _fit(fit: Mapping[str, Any] | None) -> tuple[str, str, str]:
     if fit is None:
         return "-", "-", "-"
     r2 = "-" if fit["r2"] is None else f"{fit['r2']:.4f}"
-    return f"{fit['rmse_Nm']:.1f}", r2, f"{fit['bias_Nm']:+.1f}"
+    return words.tenths(fit["rmse_Nm"]), r2, words.tenths(fit["bias_Nm"], "+")
 
 
 def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:

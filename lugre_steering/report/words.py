@@ -82,6 +82,13 @@ def number(value: float | None, digits: int = 4) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def tenths(value: float, sign: str = "") -> str:
+    """One decimal, as columns of errors have it, or three digits of what is below ten; ``sign`` "+": always with its sign."""
+    if abs(value) >= 10.0 or value == 0.0:
+        return f"{value:{sign}.1f}"
+    return f"{'+' if sign and value > 0.0 else ''}{number(value, 3)}"
+
+
 def quantity(value: float | None, unit: str) -> str:
     """A number with its unit; what is counted in ones has none."""
     return number(value, 3) if unit in ("", "1") else f"{number(value, 3)} {unit}"

@@ -12,9 +12,9 @@ from lugre_steering.data.dataset import prepare
 from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.errors import DataError
-from lugre_steering.fitting.clocks import Effects, earlier
+from lugre_steering.fitting.clocks import earlier
 from lugre_steering.fitting.fit import fit
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import Mask
 from lugre_steering.recording import Array, Finding, Recording
 

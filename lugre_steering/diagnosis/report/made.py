@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lugre_steering import units
-from lugre_steering.calibration.calibrate import KEYS
 from lugre_steering.diagnosis.result import Diagnosis
+from lugre_steering.fitting.keys import KEYS
 from lugre_steering.fitting.problem import calibrations_for
 from lugre_steering.report import words
 from lugre_steering.report.markup import code, pairs, table, text

@@ -1,0 +1,43 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Keys of the vehicle file that calibration values decide about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from lugre_steering.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of the vehicle file: how to read it and which calibration value decides about it."""
+
+    calibration: str
+    key: str
+    unit: str
+    read: Callable[[Vehicle], float | None]
+
+
+def _of(section: str, name: str) -> Callable[[Vehicle], float | None]:
+    return lambda vehicle: getattr(getattr(vehicle, section), name, None)
+
+
+KEYS = tuple(
+    Key(calibration, f"{section}.{name}", unit, _of(section, name))
+    for calibration, section, name, unit in (
+        ("friction_level", "friction", "coulomb", "1"),
+        ("static_ratio", "friction", "static", "1"),
+        ("stiffness", "friction", "stiffness_Nm_per_deg", "N m/deg"),
+        ("stribeck_speed", "friction", "stribeck_speed_deg_s", "deg/s"),
+        ("friction_level", "contact", "coulomb_torque_Nm", "N m"),
+        ("static_ratio", "contact", "static_torque_Nm", "N m"),
+        ("stiffness", "contact", "stiffness_Nm_per_deg", "N m/deg"),
+        ("stribeck_speed", "contact", "stribeck_speed_deg_s", "deg/s"),
+        ("heat_capacity", "rubber", "specific_heat_J_kgK", "J/(kg K)"),
+        ("cooling", "rubber", "heat_transfer_W_m2K", "W/(m2 K)"),
+        ("kingpin_arm", "axle", "kingpin_lever_arm_m", "m"),
+        ("pressure_gain", "sensors", "pressure_gain", "1"),
+    )
+)
