@@ -84,5 +84,5 @@ def _caption(name: str, vehicle: Vehicle, fit: Agreement | None) -> str:
     unit = vehicle.coordinate.force_unit
     return text + (
         f"Residual over {fit.samples} samples: RMSE {words.tenths(fit.rmse_Nm)} {unit}{r2_words(fit.r2, 'R²')}, "
-        f"bias {words.tenths(fit.bias_Nm, '+')} {unit}."
+        f"bias {words.tenths(fit.bias_Nm, '+', fit.rmse_Nm)} {unit}."
     )

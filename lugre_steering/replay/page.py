@@ -54,7 +54,7 @@ def _head(bag: ReplayedBag, vehicle: Vehicle) -> str:
             said += " What the model leaves out, or what is wrong with the data, lugre-steering diagnose tells."
         numbers += [
             ("root mean square error", words.torque(vehicle, fit.rmse_Nm), r2_words(fit.r2, "R²").removeprefix(", ")),
-            ("mean error", f"{words.tenths(fit.bias_Nm, '+')} {vehicle.coordinate.force_unit}", "measured minus estimate"),
+            ("mean error", f"{words.tenths(fit.bias_Nm, '+', fit.rmse_Nm)} {vehicle.coordinate.force_unit}", "measured minus estimate"),
             ("largest torque measured", words.torque(vehicle, peak), ""),
         ]
     more = f'<p class="more">{len(bag.findings)} {"finding" if len(bag.findings) == 1 else "findings"} below.</p>' if bag.findings else ""

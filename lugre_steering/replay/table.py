@@ -35,7 +35,7 @@ def _fit(fit: Mapping[str, Any] | None) -> tuple[str, str, str]:
     if fit is None:
         return "-", "-", "-"
     r2 = "-" if fit["r2"] is None else f"{fit['r2']:.4f}"
-    return words.tenths(fit["rmse_Nm"]), r2, words.tenths(fit["bias_Nm"], "+")
+    return words.tenths(fit["rmse_Nm"]), r2, words.tenths(fit["bias_Nm"], "+", fit["rmse_Nm"])
 
 
 def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:

@@ -82,11 +82,12 @@ def number(value: float | None, digits: int = 4) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def tenths(value: float, sign: str = "") -> str:
-    """One decimal, as columns of errors have it, or three digits of what is below ten; ``sign`` "+": always with its sign."""
-    if abs(value) >= 10.0 or value == 0.0:
-        return f"{value:{sign}.1f}"
-    return f"{'+' if sign and value > 0.0 else ''}{number(value, 3)}"
+def tenths(value: float, sign: str = "", beside: float = 0.0) -> str:
+    """One decimal, as columns of errors have it, or three digits of what is below ten, or of the larger one ``beside`` it; ``sign``
+    "+": always with its sign."""
+    size = max(abs(value), beside)
+    decimals = 1 if size >= 10.0 or size == 0.0 else min(2 - math.floor(math.log10(size)), 12)
+    return f"{value:{sign}.{decimals}f}"
 
 
 def quantity(value: float | None, unit: str) -> str:
