@@ -398,7 +398,8 @@ def test_thinned_curves_keep_their_peaks(values: np.ndarray, limit: int) -> None
 
 
 @pytest.mark.parametrize(("value", "beside", "text"), [
-    (137.284, 0.0, "137.3"), (0.01634, 0.0, "0.0163"), (0.0, 0.0, "0.0"), (0.00642, 4740.3, "0.0"), (-0.0017, 0.105, "-0.002"), (9.876, 0.0, "9.88"),
+    (137.284, 0.0, "137.3"), (0.01634, 0.0, "0.0163"), (0.0, 0.0, "0.0"), (0.00642, 4740.3, "0.0"), (-0.0017, 0.105, "-0.002"),
+    (9.876, 0.0, "9.88"),
 ])  # fmt: skip
 def test_errors_have_the_digits_of_their_machine(value: float, beside: float, text: str) -> None:
     assert words.tenths(value, "", beside) == text
