@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,14 +13,14 @@ import numpy as np
 from lugre_steering.bag import read_recordings
 from lugre_steering.data.bursts import set_aside
 from lugre_steering.data.pieces import in_pieces
-from lugre_steering.data.quality import Quality, inspect
-from lugre_steering.diagnosis.conclude import experiment
+from lugre_steering.data.quality import inspect
+from lugre_steering.diagnosis.case import Case, by_bag
 from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import excess
-from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
+from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
 from lugre_steering.fitting.fit import Fit
@@ -28,7 +28,7 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_instead, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
-from lugre_steering.recording import BagFinding, Finding, Recording
+from lugre_steering.recording import Recording
 from lugre_steering.vehicle import Vehicle
 
 MIN_SLIDING, MIN_SAMPLES = 2.0, 300
@@ -69,51 +69,57 @@ def diagnose_recordings(
     if not recordings:
         raise DataError("no recording is given, expected at least one")
     progress("checking the data")
-    qualities = [inspect(recording, vehicle) for recording in recordings]
-    findings = _findings(qualities)
-    blocking = [f"{q.recording.name}: {f.statement}" for q in qualities for f in q.blocking]
-    if blocking:
-        return _insufficient(
-            qualities, vehicle, findings, "The data must be put right first. " + " ".join(blocking), None
-        )
+    case = Case(vehicle, [inspect(recording, vehicle) for recording in recordings])
+    if case.blocking:
+        return case.insufficient("The data must be put right first. " + " ".join(case.blocking))
     progress("estimating the motion")
     try:
-        pieces, cut = in_pieces([quality.recording for quality in qualities])
-        findings += _by_bag(cut)
+        pieces, cut = in_pieces(case.usable)
+        case.found(cut)
         clocks = synchronised(pieces, vehicle)
     except DataError as error:
-        return _insufficient(qualities, vehicle, findings, f"The data do not allow a diagnosis: {error}.", None)
-    problem, roles = clocks.problem, split(clocks.problem)
+        return case.insufficient(f"The data do not allow a diagnosis: {error}.")
+    searched = _searched(case, pieces, clocks, seed, progress)
+    if isinstance(searched, Diagnosis):
+        return searched
+    done, clocks = searched
+    case.found(weather_findings(done.problem, done.found.final))
+    progress("verifying on held-out data")
+    result = conclude(done, case.findings, pieces, seed=seed, material=material, progress=progress)
+    unused = {} if cut else left_out(done, done.found.final.effects if result.effects else (), recordings, pieces, clocks.late)
+    return replace(result, data_quality=(*result.data_quality, *by_bag(unused)))
+
+
+def _searched(
+    case: Case, pieces: Sequence[Recording], clocks: Synchronised, seed: int, progress: Progress
+) -> tuple[Finished, Synchronised] | Diagnosis:
+    """The finished search and the clocks that it was made with; or the answer where the sheet or the recordings do not allow one."""
+    problem, samples = clocks.problem, int(split(clocks.problem).fit.sum())
     progress("comparing with the vehicle file")
-    suspected = wrong_sheet(problem) if roles.fit.sum() >= MIN_SAMPLES else None
+    suspected = wrong_sheet(problem) if samples >= MIN_SAMPLES else None
     if suspected is not None and suspected.certain:
-        return _wrong_sheet(qualities, vehicle, [*findings, *_by_bag(clocks.findings)], suspected)
-    if lacking := _lacking(problem, int(roles.fit.sum())):
-        return _undetermined(qualities, vehicle, findings, problem, lacking)
+        case.found(clocks.findings)
+        return case.wrong_sheet(suspected)
+    if lacking := _lacking(problem, samples):
+        return case.undetermined(problem, lacking)
     progress("recalibrating the baseline")
     done = investigate(problem, seed, progress)
     if suspected is not None and not physics_instead(problem, done.found.final.effects, suspected):
-        return _wrong_sheet(qualities, vehicle, [*findings, *_by_bag(clocks.findings)], suspected)
+        case.found(clocks.findings)
+        return case.wrong_sheet(suspected)
     if (again := _other_clocks(pieces, clocks, done.found.final)) is not None:
         clocks = again
         done = investigate(clocks.problem, seed, progress)
-    findings += _by_bag(clocks.findings)
+    case.found(clocks.findings)
     problem = done.problem
     left = problem.measured - done.found.final.prediction
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
-        findings += _by_bag(disturbed)
-        done = investigate(Problem(vehicle, runs), seed, progress)
-    if (wrong := _misplaced(done) or _wrong_entry(done)) is not None:
-        return _wrong_sheet(qualities, vehicle, findings, wrong)
-    findings += _by_bag(weather_findings(done.problem, done.found.final))
-    progress("verifying on held-out data")
-    result = conclude(done, findings, pieces, seed=seed, material=material, progress=progress)
-    if cut:
-        return result
-    unused = left_out(done, done.found.final.effects if result.effects else (), recordings, pieces, clocks.late)
-    return replace(result, data_quality=(*result.data_quality, *_by_bag(unused)))
+        case.found(disturbed)
+        done = investigate(Problem(case.vehicle, runs), seed, progress)
+    wrong = _misplaced(done) or _wrong_entry(done)
+    return (done, clocks) if wrong is None else case.wrong_sheet(wrong)
 
 
 def _misplaced(done: Finished) -> WrongSheet | None:
@@ -148,14 +154,6 @@ def _other_clocks(pieces: Sequence[Recording], clocks: Synchronised, final: Fit)
     return again if np.abs(again.late - clocks.late).max() > WORTH_SAYING_S else None
 
 
-def _findings(qualities: Sequence[Quality]) -> list[BagFinding]:
-    return [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
-
-
-def _by_bag(findings: Mapping[str, Finding]) -> list[BagFinding]:
-    return [finding.in_bag(bag) for bag, finding in findings.items()]
-
-
 def _lacking(problem: Problem, samples: int) -> str:
     """What the recordings lack to determine the baseline, if anything; ``samples`` are left to fit."""
     travel = max(float(np.ptp(run.theta, axis=1).max()) for run in problem.runs) / problem.presliding
@@ -164,45 +162,3 @@ def _lacking(problem: Problem, samples: int) -> str:
     if samples < MIN_SAMPLES:
         return f"only {samples} usable samples are left to fit; at least {MIN_SAMPLES} are needed (see data_quality)"
     return ""
-
-
-def _undetermined(
-    qualities: Sequence[Quality], vehicle: Vehicle, findings: Sequence[BagFinding], problem: Problem, lacking: str
-) -> Diagnosis:
-    drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description
-    advice = Experiment(drive, ("friction level", "stiffness"), lacking)
-    statement = (
-        f"The recording of {sum(float(run.time[-1] - run.time[0]) for run in problem.runs):.0f} s does not determine the "
-        f"baseline: {lacking}. Nothing can be said about missing physics."
-    )
-    return _insufficient(qualities, vehicle, findings, statement, advice)
-
-
-def _wrong_sheet(
-    qualities: Sequence[Quality], vehicle: Vehicle, findings: Sequence[BagFinding], wrong: WrongSheet
-) -> Diagnosis:
-    statement = (
-        f"The vehicle file is not that of this vehicle, or not of these sensors: {wrong.statement}. "
-        "No physics is named before that is put right."
-    )
-    return _insufficient(qualities, vehicle, [*findings, wrong.finding()], statement, None)
-
-
-def _insufficient(
-    qualities: Sequence[Quality],
-    vehicle: Vehicle,
-    findings: Sequence[BagFinding],
-    statement: str,
-    advice: Experiment | None,
-) -> Diagnosis:
-    """The verdict when nothing can be concluded: the vehicle stays as it was."""
-    floor = 1.0
-    if vehicle.hydraulics is not None:
-        floor = max(1.0, vehicle.sensors.pressure_noise_Pa * 5e-3)
-    return Diagnosis(
-        schema=SCHEMA, bags=tuple(quality.recording.name for quality in qualities), verdict="insufficient_data",
-        statement=statement, noise_floor_Nm=floor, baseline=Errors(0.0, None),
-        augmented=Augmented(0.0, None, None, None, vehicle), effects=(), unexplained=Unexplained(False, "not examined"),
-        detection_limits={}, data_quality=tuple(findings), next_experiment=advice,
-    ).in_words()  # fmt: skip
-
