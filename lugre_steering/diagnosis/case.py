@@ -45,8 +45,8 @@ class Case:
         drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description
         advice = Experiment(drive, ("friction level", "stiffness"), lacking)
         seconds = sum(float(run.time[-1] - run.time[0]) for run in problem.runs)
-        statement = f"The recording of {seconds:.0f} s does not determine the baseline: {lacking}. Nothing can be said about missing physics."
-        return self.insufficient(statement, advice)
+        statement = f"The recording of {seconds:.0f} s does not determine the baseline: {lacking}. "
+        return self.insufficient(statement + "Nothing can be said about missing physics.", advice)
 
     def wrong_sheet(self, wrong: WrongSheet) -> Diagnosis:
         """The vehicle file is another one's."""

@@ -1,0 +1,122 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What stands of what a search found: names verified on held-out data, laws beside or in place of them, or only a clock that is apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from lugre_steering.diagnosis.conclude import verify
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.late import begun_late
+from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
+from lugre_steering.diagnosis.laws.find import FoundLaws, find
+from lugre_steering.diagnosis.laws.rival import in_place, leaves_names
+from lugre_steering.diagnosis.result import Verdict
+from lugre_steering.fitting.clocks import LONGEST_S
+from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.problem import is_rig
+from lugre_steering.fitting.sheet import LEVELS, at_bounds
+
+CONTRADICTED = 0.02
+"""Growth of the held-out error that overrules a name."""
+
+
+class _Tested(NamedTuple):
+    """Whether names stand, whether they are only a clock that is apart, and how they do on held-out data."""
+
+    named: bool
+    clock: bool
+    judged: verify.Judged
+
+
+@dataclass(frozen=True)
+class Stands:
+    """What stands: names, laws beside or without them, or only a clock that is apart; ``judged`` on held-out data, ``left`` beside
+    the names alone."""
+
+    named: bool
+    clock: bool
+    lawful: FoundLaws | None
+    judged: verify.Judged
+    left: LeftOver
+    nearest: tuple[str, ...] = ()
+    """Names in whose place laws stand."""
+
+    @property
+    def better(self) -> bool:
+        return self.named or self.lawful is not None
+
+    @property
+    def after(self) -> float:
+        """Error on held-out data [N m] with what stands."""
+        return self.judged.after if self.better else self.judged.before
+
+    @property
+    def verdict(self) -> Verdict:
+        if self.named:
+            return "missing_physics"
+        return "unlisted_physics" if self.lawful is not None or self.left.structured else "consistent"
+
+
+def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tuple[Finished, Stands]:
+    """What stands, and the search as it was judged: where only held-out data tell that a name began late, with that name timed by all."""
+    tested = _tested(done, seed)
+    if not tested.named and done.found.found and (late := begun_late(done)) is not done:
+        done, tested = late, _tested(late, seed)
+    return done, _beside_laws(done, tested, seed, progress)
+
+
+def _tested(done: Finished, seed: int) -> _Tested:
+    """The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
+    and an improvement that may be none is none: beside the freedoms with which names are compared, as without them the form of the
+    friction law may be most of the error. In a vehicle file, which cannot hold freedoms, a name must do no harm."""
+    problem, found, there = done.problem, done.found, done.compared
+    judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
+    beside = judged
+    if found.found and done.needs_form and judged.gain > -CONTRADICTED:
+        beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
+    clock = _clocks_alone(found.final, len(problem.runs))
+    # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
+    stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
+    better = judged.gain > -CONTRADICTED and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
+    named = bool(found.found) and better and not clock and not stuck
+    return _Tested(named, clock, judged)
+
+
+def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:
+    """What remains of the names beside laws for what they leave over."""
+    problem, found, (named, clock, judged) = done.problem, done.found, tested
+    left = _left(done, named or clock)
+    if not left.structured and not (named and done.needs_form):
+        return Stands(named, clock, None, judged, left)
+    alone = find(problem, done.noise, done.roles, found.baseline, seed, progress)
+    if not named:
+        return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
+    beside = find(problem, done.noise, done.roles, found.final, seed, progress) if left.structured else None
+    if alone is not None and in_place(done, alone, beside):
+        nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
+        return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
+    if beside is not None and not leaves_names(done, beside):
+        beside = None
+    if beside is not None:
+        judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)
+    return Stands(True, clock, beside, judged, left)
+
+
+def _left(done: Finished, named: bool) -> LeftOver:
+    """What is left beside the freedoms of the friction law and of the names."""
+    there = done.compared.found
+    return left_over(done.compared, there.final if named else there.baseline, done.needs_form)
+
+
+def _clocks_alone(final: Fit, bags: int) -> bool:
+    """Whether all that was found is what two clocks may be apart in one recording; what all of several show is the machine's."""
+    return bool(final.effects) and all(
+        "delay" in candidate.effect.hooks
+        and abs(candidate.effect.law("delay", values)) < LONGEST_S
+        and (bags == 1 or candidate.bags is not None)
+        for candidate, values in final.effects
+    )

@@ -1,0 +1,42 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What stands of the names that a search found is judged on held-out data beside the friction law's freedoms. All data are synthetic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_problem import SIGMA, effect, small_problem, weight, with_torque
+
+from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.conclude.stands import _tested
+from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.diagnosis.search.search import Found, Search
+from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.split import split
+
+NOTHING = small_problem(33.0)
+SLOPE = effect("slope_bias", torque=60.0)
+
+
+@pytest.mark.parametrize(("there", "freed", "period_s", "named"), [
+    (60.0, True, 11.0, True), (0.0, True, 11.0, False), (60.0, False, 11.0, False), (60.0, True, 16.0, False),
+])  # fmt: skip
+def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(there: float, freed: bool, period_s: float, named: bool) -> None:
+    """A friction level that waves by 60 sigma hides a slope of less than one on held-out data, but not beside that freedom; where no
+    slope is, none is named; nor where the waves lead its size so far astray that a vehicle file would get worse by it."""
+    waves = 60.0 * SIGMA * np.concatenate([np.sin(2.0 * np.pi * run.time / period_s) for run in NOTHING.runs])
+    slope = [(SLOPE[0], {"torque": there})]
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start(), slope) + waves)
+    roles, noise = split(problem), Noise(np.full(problem.valid.size, SIGMA), np.zeros((1, problem.valid.size)), 0.0)
+    fitted = np.where(roles.fit, weight(problem), 0.0)
+
+    def finished(own, **more):  # type: ignore[no-untyped-def]
+        names = (Found(Score(SLOPE[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.zeros(1)), (), (), 100.0),)
+        return Finished(own, noise, roles, Search(fit(own, fitted), fit(own, fitted, [SLOPE]), names, (), (), None), **more)
+
+    beside = finished(problem.bent([(120.0 * SIGMA * waves / np.abs(waves).max())[:, None]]), form=("its level along the ground",))
+    done = finished(problem, **({"beside_form": beside} if freed else {}))
+    assert done.needs_form
+    assert _tested(done, 1).named == named
