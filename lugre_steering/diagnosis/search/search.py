@@ -66,12 +66,7 @@ def search(
 ) -> tuple[Problem, Search]:
     """Add names one at a time while the best of those proposed takes more than the doubts; with the problem that this led to."""
     weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
-    current, found = baseline, list[Found]()
-    if is_rig(problem.vehicle):
-        progress("inertia, viscous friction, offset and gravity")
-        for result, score in rig.carried(problem, noise, weight, baseline):
-            found.append(Found(score, (), (), current.cost - result.cost, given=True))
-            current = result
+    found, current = _given(problem, noise, weight, baseline, progress)
     now, current = settled(problem, weight, current)
     found = [_told(item, _rivals(now, noise, weight, split, current, item, i)) for i, item in enumerate(found)]
     problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
@@ -88,17 +83,12 @@ def search(
         if nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands):
             break
         progress(f"a closer look at {best.effects[-1][0].label}")
-        seen = [closer(world, weight, seen) for world in ([there] if further else worlds(there))]
-        own = closer(clearest(weight, seen)[0], weight, seen)
-        rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
-        chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
-        there, best = settled(own.problem, weight, chosen.fit)
-        taken = _taken(there, weight, current, best)
-        short = taken < needed(there, best, weight, stands)
+        there, best, one = _closest([there] if further else worlds(there), weight, split, seen)
+        one = replace(one, gain=_taken(there, weight, current, best))
+        short = one.gain < needed(there, best, weight, stands)
         if short and (waiting or len(found) + 1 == given + MAX_EFFECTS):
             break
-        names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
-        both = [*found, Found(chosen.score, names, tuple(own.trials), taken)]
+        both = [*found, one]
         found, current = (both, best) if short else _pruned(there, weight, both, best)
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
         if waiting and len(found) < len(both):
@@ -118,6 +108,30 @@ def search(
         found = found[:given]
     more = np.zeros(now.nuisances - baseline.x.size)
     return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), pattern)
+
+
+def _given(
+    problem: Problem, noise: Noise, weight: Array, baseline: Fit, progress: Callable[[str], None]
+) -> tuple[list[Found], Fit]:
+    """What every joint or axis has and its recordings carry, with its fit; nothing of a vehicle."""
+    found, current = list[Found](), baseline
+    if is_rig(problem.vehicle):
+        progress("inertia, viscous friction, offset and gravity")
+        for result, score in rig.carried(problem, noise, weight, baseline):
+            found.append(Found(score, (), (), current.cost - result.cost, given=True))
+            current = result
+    return found, current
+
+
+def _closest(those: Sequence[Problem], weight: Array, split: Split, seen: Sequence[Proposal]) -> tuple[Problem, Fit, Found]:
+    """The best of all that was proposed, after a closer look in ``those`` worlds: the simplest that ties, its settled fit, its rivals."""
+    seen = [closer(world, weight, seen) for world in those]
+    own = closer(clearest(weight, seen)[0], weight, seen)
+    rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
+    chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
+    there, best = settled(own.problem, weight, chosen.fit)
+    names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
+    return there, best, Found(chosen.score, names, tuple(own.trials), 0.0)
 
 
 def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
