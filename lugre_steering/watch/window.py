@@ -28,7 +28,7 @@ class Samples:
     """The latest ``CAPACITY`` samples of all channels, in a ring."""
 
     def __init__(self) -> None:
-        self._ring: Records = np.zeros(CAPACITY, SAMPLE)
+        self._ring: Records = np.full(CAPACITY, np.zeros(1, SAMPLE)[0])  # written once now, so that memory does not grow as it fills
         self._count = 0
 
     def add(self, channel: int, stamp_ns: int, value: float, rate: float) -> None:
