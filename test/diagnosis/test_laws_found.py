@@ -20,12 +20,13 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
 from lugre_steering.diagnosis.laws.refine import free_law, with_law
-from lugre_steering.diagnosis.laws.rival import in_place
+from lugre_steering.diagnosis.laws.rival import in_place, keeps_names
 from lugre_steering.diagnosis.laws.screen import Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.effects.own import read_effects
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import EffectError
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
@@ -141,7 +142,19 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert [law["title"] for law in described(beside)] == [entry.title]
     assert not in_place(named(problem, viscous), alone, beside)
+    assert keeps_names(named(problem, viscous), beside, alone)
     assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
+
+
+def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> None:
+    """A loss beyond an angle, and an offset of one pressure sensor that is not there: fitted beside the law, it is not needed."""
+    problem, alone = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
+    assert alone is not None
+    line = fitted(problem, (Candidate(CATALOGUE["pressure_offset"], line="main_a", free=("offset",)), {"offset": 2e4}))
+    beside = in_what_is_left(problem, line)
+    assert beside is not None
+    assert beside.fit.effects[0][0].line == "main_a"
+    assert not keeps_names(named(problem, line), beside, alone)
 
 
 def test_nothing_hidden_gives_no_law() -> None:

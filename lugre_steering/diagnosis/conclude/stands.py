@@ -13,7 +13,7 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
-from lugre_steering.diagnosis.laws.rival import in_place, leaves_names
+from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit
@@ -97,9 +97,11 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
         return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
     beside = find(problem, done.noise, done.roles, found.final, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):
-        nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
-        return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
-    if beside is not None and not leaves_names(done, beside):
+        beside = beside or find(problem, done.noise, done.roles, found.final, seed, progress)
+        if beside is None or not keeps_names(done, beside, alone):
+            nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
+            return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
+    elif beside is not None and not leaves_names(done, beside):
         beside = None
     if beside is not None:
         judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)

@@ -137,7 +137,8 @@ def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Tr
         for field, value in problem.fields(fitted.x).items():
             p[field] = value
         p["initial_bristle"] = fitted.x[len(problem.calibrations) + bag] * problem.presliding
-        standing = {field: number for known, own in fitted.effects for field, number in known.effect.fields(own).items()}
+        acting = [(known.effect, own) for known, own in fitted.effects if known.active_in(bag) and not known.effect.per_line]
+        standing = {field: number for effect, own in acting for field, number in effect.fields(own).items()}
         for field, number in {**standing, **slot.fields(values)}.items():
             p[field] = number
         return p

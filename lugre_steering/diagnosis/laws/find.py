@@ -134,9 +134,7 @@ def _tried(
         traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
         best = screen.search(traces, one.cell)[0]
         start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
-        least = min((each.fit.cost for each in tried), default=np.inf)
-        tie = least + TIED * (current.cost - least) if tried else np.inf
-        tried.append(Tried(best, with_law(problem, weight, current, start, tie)))
+        tried.append(Tried(best, with_law(problem, weight, current, start)))
     tried.sort(key=lambda each: each.fit.cost)
     tried = [
         replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)

@@ -176,9 +176,9 @@ def closed_law(
     return Candidate(effect, free=tuple(values)), values
 
 
-def with_law(problem: Problem, weight: Array, before: Fit, law: tuple[Candidate, dict[str, float]], worth: float = np.inf) -> Fit:
-    """A fit with one law more, everything set free; given up where the cost ``worth`` while is out of reach."""
-    return fit(problem, weight, [*before.effects, law], before, linearisations=5, tolerance=1e-4, worth=worth)
+def with_law(problem: Problem, weight: Array, before: Fit, law: tuple[Candidate, dict[str, float]]) -> Fit:
+    """A fit with one law more, everything set free."""
+    return fit(problem, weight, [*before.effects, law], before, linearisations=5, tolerance=1e-4)
 
 
 def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: int) -> Fit:
@@ -194,7 +194,7 @@ def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: i
     promising = [trial for trial in trials if trial[0] < (1.0 - KEPT) * gain * 2.0]
     for _, form, fixed, start in sorted(promising, key=lambda trial: (len(trial[3]), trial[0]))[:TRIED_FORMS]:
         law_here = closed_law(problem, cell, place, form, fixed, start)
-        closed = with_law(problem, weight, dataclasses.replace(before, x=free.x), law_here, before.cost - KEPT * gain)
+        closed = with_law(problem, weight, dataclasses.replace(before, x=free.x), law_here)
         if before.cost - closed.cost >= KEPT * gain:
             return closed
     return free

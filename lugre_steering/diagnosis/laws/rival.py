@@ -32,9 +32,15 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     least = SURE * doubt(problem, fitted, done.fitted)
     for index in range(beside.names):
         rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
-        if fit(problem, done.fitted, rest, fitted, linearisations=6, worth=fitted.cost + least).cost - fitted.cost < least:
+        if fit(problem, done.fitted, rest, fitted, linearisations=6).cost - fitted.cost < least:
             return False
     return True
+
+
+def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
+    """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them each is needed, and held-out data
+    are explained no worse."""
+    return beside.beyond(done.held) <= alone.beyond(done.held) and leaves_names(done, beside)
 
 
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:
