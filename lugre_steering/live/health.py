@@ -25,6 +25,8 @@ PERIOD_S = 0.5
 """Rates and levels are taken over at least so long, however soon after the last one a report comes."""
 FAR_NS = 10_000_000_000
 """A clock that is wrong by more than that is another clock."""
+RECENT = 5000
+"""Latencies that percentiles are taken of, so that they cost the same however many are kept."""
 
 
 class Window:
@@ -42,10 +44,11 @@ class Window:
             self.max_ns = value_ns
 
     def percentiles_ms(self, *percent: float) -> list[float]:
-        """Percentiles [ms] of the values in the ring; NaN without any."""
+        """Percentiles [ms] of the latest values in the ring, RECENT at most; NaN without any."""
         if not self.count:
             return [math.nan] * len(percent)
-        latest = self.values[: self.count]
+        kept = min(self.count, self.values.size, RECENT)
+        latest = self.values[np.arange(self.count - kept, self.count) % self.values.size]
         return [float(value) * 1e-6 for value in np.percentile(latest, percent)]
 
 
