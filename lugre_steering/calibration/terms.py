@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.calibration.estimate import Estimate
+from lugre_steering.calibration.estimate import DRAWS, Estimate
 from lugre_steering.calibration.result import FittedKey
 from lugre_steering.diagnosis.search.rig import carried
 from lugre_steering.fitting.fit import fit
@@ -17,7 +17,6 @@ from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.problem import Effects, Problem, is_rig
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
-DRAWS = 16
 EDGE = 0.01
 """Share of the half of its interval within which a value stands at a bound."""
 

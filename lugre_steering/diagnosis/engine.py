@@ -86,7 +86,8 @@ def diagnose_recordings(
     case.found(weather_findings(done.problem, done.found.final))
     progress("verifying on held-out data")
     result = conclude(done, case.findings, pieces, seed=seed, material=material, progress=progress)
-    unused = {} if cut else left_out(done, done.found.final.effects if result.effects else (), recordings, pieces, clocks.late)
+    named, late = done.found.final.effects if result.effects else (), None if cut else clocks.late
+    unused = left_out(done, named, recordings, case.usable, late, seed)
     return replace(result, data_quality=(*result.data_quality, *by_bag(unused)))
 
 

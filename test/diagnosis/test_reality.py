@@ -28,7 +28,7 @@ from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.sheet import Suspect, WrongSheet, circuits, physics_instead, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
@@ -122,28 +122,52 @@ def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
     np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
 
 
-@pytest.mark.parametrize(("lasts_s", "told"), [(0.5, False), (6.0, True)])
-def test_what_is_left_out_is_weighed_where_it_is_much(lasts_s: float, told: bool) -> None:
-    """A cable that is off for a while: those samples are not used, and with them the model would err by much more."""
-
-    def unplugged(signal: Signal) -> Signal:
-        off = np.abs(signal.time_s - 0.5 * signal.time_s[-1]) < 0.5 * lasts_s
-        return Signal(signal.time_s, np.where(off, 0.0, signal.value))
-
-    raw = [replace(r, pressure={line: unplugged(s) if line == "main_a" else s for line, s in r.pressure.items()}) for r in sound()]
-    used = [inspect(r, VEHICLE).recording for r in raw]
+def searched(used: list[Recording], named: Effects = ()) -> Finished:
+    """A search of recordings of VEHICLE that came to ``named``."""
     problem = Problem(VEHICLE, [prepare(r, VEHICLE) for r in used])
     sigma = np.concatenate([run.sigma for run in problem.runs])
     roles, noise = split(problem), Noise(sigma, np.zeros((1, sigma.size)), 0.0)
-    baseline = fit(problem, np.where(roles.fit, 1.0 / sigma, 0.0))
-    done = Finished(problem, noise, roles, Search(baseline, baseline, (), (), (), None))
-    found = left_out(done, (), raw, used, np.zeros(len(raw)))
+    models = [fit(problem, np.where(roles.fit, 1.0 / sigma, 0.0), effects) for effects in ((), named)]
+    return Finished(problem, noise, roles, Search(*models, (), (), (), None))
+
+
+def unplugged(recording: Recording, lasts_s: float) -> Recording:
+    """A cable that is off for a while in the middle."""
+
+    def off(signal: Signal) -> Signal:
+        return Signal(signal.time_s, np.where(np.abs(signal.time_s - 0.5 * signal.time_s[-1]) < 0.5 * lasts_s, 0.0, signal.value))
+
+    return replace(recording, pressure={line: off(s) if line == "main_a" else s for line, s in recording.pressure.items()})
+
+
+@pytest.mark.parametrize(("lasts_s", "told"), [(0.5, False), (6.0, True)])
+def test_what_is_left_out_is_weighed_where_it_is_much(lasts_s: float, told: bool) -> None:
+    """Those samples are not used, and with them the model would err by much more."""
+    raw = [unplugged(r, lasts_s) for r in sound()]
+    used = [inspect(r, VEHICLE).recording for r in raw]
+    found = left_out(searched(used), (), raw, used, np.zeros(len(raw)), 1)
     assert bool(found) == told
     for recording, finding in zip(raw, found.values(), strict=False):
         share = lasts_s / float(recording.angle["left"].time_s[-1])
         said, worse, better = (float(n) for n in re.findall(r"([\d.]+)(?: %| N m)", finding.statement))
         assert said / 100.0 == pytest.approx(share, abs=0.02)
         assert worse > 10.0 * better
+    of_pieces = left_out(searched(used), (), raw, used, None, 1)
+    assert all("was not examined" in finding.statement for finding in of_pieces.values())
+    assert of_pieces.keys() == found.keys()
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_a_name_stands_or_falls_with_what_is_left_out(spoiled: bool) -> None:
+    """Viscous friction that is there: sound samples that were left out speak for it, those of a cable that was off hide it."""
+    viscous = EffectEntry("viscous_friction", {"sigma_2": 8000.0})
+    real = record(VEHICLE.replace(effects=(viscous,)), QUICK, 5)
+    raw = [unplugged(r, 6.0) if spoiled else r for r in real]
+    used = [inspect(unplugged(r, 6.0), VEHICLE).recording for r in real]
+    named = [effect("viscous_friction", sigma_2=4000.0)]
+    found = left_out(searched(used, named), named, raw, used, np.zeros(len(raw)), 1)
+    assert found
+    assert all(("would not stand" in finding.statement) == spoiled for finding in found.values())
 
 
 def test_a_hot_start_is_weather() -> None:

@@ -10,12 +10,13 @@ import numpy as np
 
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.stamps import with_even_stamps
+from lugre_steering.diagnosis.conclude import verify
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import earlier
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Effects, Problem
-from lugre_steering.fitting.split import Mask
+from lugre_steering.fitting.split import split
 from lugre_steering.recording import Array, Finding, Recording
 
 MANY = 0.05
@@ -28,43 +29,48 @@ def share_left_out(raw: Recording, used: Recording) -> float:
     pairs += [(raw.pressure[line], used.pressure[line]) for line in used.pressure]
     if raw.measured_torque is not None and used.measured_torque is not None:
         pairs.append((raw.measured_torque, used.measured_torque))
-    return max((1.0 - kept.time_s.size / all_of_it.time_s.size for all_of_it, kept in pairs), default=0.0)
+    return max((1.0 - kept.time_s.size / every.time_s.size for every, kept in pairs), default=0.0)
 
 
-def left_out(done: Finished, effects: Effects, raw: Sequence[Recording], used: Sequence[Recording], late: Array) -> dict[str, Finding]:
-    """By recording, where more than MANY of it was not used: what baseline and named ``effects`` leave of all samples.
+def left_out(
+    done: Finished, effects: Effects, raw: Sequence[Recording], used: Sequence[Recording], late: Array | None, seed: int
+) -> dict[str, Finding]:
+    """By recording, where more than MANY of it was not used: what baseline and named ``effects`` leave of held-out data with all of it.
 
-    ``late`` [s]: by how much the clock of each torque was put right.
+    ``late`` [s]: by how much the clock of each torque was put right; None where only pieces of the recordings were examined.
     """
-    shares = [share_left_out(*pair) for pair in zip(raw, used, strict=True)]
-    if max(shares, default=0.0) <= MANY:
+    shares = {one.name: share_left_out(one, kept) for one, kept in zip(raw, used, strict=True)}
+    if max(shares.values(), default=0.0) <= MANY:
         return {}
-    problem = done.problem
-    try:
-        runs = [prepare(earlier(with_even_stamps(one), float(shift)), problem.vehicle) for one, shift in zip(raw, late, strict=True)]
-    except DataError:
-        return {}
-    whole = Problem(problem.vehicle, runs, problem.calibrations)
-    told = _told(done, whole, effects)
+    told = "what it would have changed was not examined"
+    if late is not None:
+        try:
+            even = [with_even_stamps(earlier(one, float(shift))) for one, shift in zip(raw, late, strict=True)]
+            told = _told(done, effects, even, seed)
+        except DataError as error:
+            told = f"with it nothing could be examined ({error})"
     return {
-        one.name: Finding("left_out", "", f"{100 * share:.0f} % of a channel was not used (see the other findings); {told}")
-        for one, share in zip(raw, shares, strict=True) if share > MANY
+        name: Finding("left_out", "", f"{100 * share:.0f} % of a channel was not used (see the other findings); {told}")
+        for name, share in shares.items() if share > MANY
     }  # fmt: skip
 
 
-def _told(done: Finished, whole: Problem, effects: Effects) -> str:
-    """Errors with and without the samples that were set aside, in words."""
-    fewer = (done.problem, done.problem.valid)
-    before = [_error(done, *part, ()) for part in ((whole, whole.valid), fewer)]
-    told = f"with all of it the recalibrated model errs by {done.torque(before[0])} instead of {done.torque(before[1])}"
+def _told(done: Finished, effects: Effects, recordings: Sequence[Recording], seed: int) -> str:
+    """Held-out errors with and without the samples that were set aside, in words."""
+    vehicle = done.problem.vehicle
+    whole = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], done.problem.calibrations)
+    with_all, without = (_judged(done, problem, effects, seed) for problem in (whole, done.problem))
+    errors = f"{done.torque(with_all.before)} instead of {done.torque(without.before)}"
+    told = f"with all of it the recalibrated model errs on held-out data by {errors}"
     if not effects:
         return told
-    gains = [1.0 - _error(done, *part, effects) / error for part, error in zip(((whole, whole.valid), fewer), before, strict=True)]
-    same = "the names stand" if gains[0] > 0.0 else "the names would not stand"
-    return f"{told}, and what is named takes {100 * gains[0]:.0f} % of that instead of {100 * gains[1]:.0f} %: {same}"
+    verdict = "would stand" if with_all.interval[0] > 0.0 else "would not stand"
+    return f"{told}, what is named takes {100 * with_all.gain:.0f} % of that instead of {100 * without.gain:.0f} %, and {verdict}"
 
 
-def _error(done: Finished, problem: Problem, valid: Mask, effects: Effects) -> float:
-    """Root mean square error [N m] of a fit to all valid samples."""
-    result = fit(problem, valid / done.noise.floor, effects, done.found.final.x[: problem.nuisances], linearisations=8)
-    return float(np.sqrt(np.mean((problem.measured - result.prediction)[valid] ** 2)))
+def _judged(done: Finished, problem: Problem, effects: Effects, seed: int) -> verify.Judged:
+    """Baseline against named effects, both fitted anew."""
+    roles, weight = split(problem), problem.valid / done.noise.floor
+    fitted, x = np.where(roles.fit, weight, 0.0), done.found.final.x[: problem.nuisances]
+    baseline = fit(problem, fitted, (), x, linearisations=8)
+    return verify.verify(problem, weight, baseline, fit(problem, fitted, effects, x, linearisations=8), roles, seed)

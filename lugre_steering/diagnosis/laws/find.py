@@ -128,7 +128,7 @@ def _tried(
     progress: Callable[[str], None],
 ) -> list[Tried]:
     """The leading cells fitted in the chain, the best of them simplified; best first, a value more must pay."""
-    tried: list[Tried] = []
+    tried = []
     for one in shortlist(screened):
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
         traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])

@@ -83,8 +83,7 @@ def search(
         if nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands):
             break
         progress(f"a closer look at {best.effects[-1][0].label}")
-        there, best, one = _closest([there] if further else worlds(there), weight, split, seen)
-        one = replace(one, gain=_taken(there, weight, current, best))
+        there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
         short = one.gain < needed(there, best, weight, stands)
         if short and (waiting or len(found) + 1 == given + MAX_EFFECTS):
             break
@@ -123,15 +122,17 @@ def _given(
     return found, current
 
 
-def _closest(those: Sequence[Problem], weight: Array, split: Split, seen: Sequence[Proposal]) -> tuple[Problem, Fit, Found]:
-    """The best of all that was proposed, after a closer look in ``those`` worlds: the simplest that ties, its settled fit, its rivals."""
+def _closest(
+    those: Sequence[Problem], weight: Array, split: Split, seen: Sequence[Proposal], current: Fit
+) -> tuple[Problem, Fit, Found]:
+    """The best of all proposed beside ``current``, after a closer look in ``those`` worlds: the simplest that ties, with its rivals."""
     seen = [closer(world, weight, seen) for world in those]
     own = closer(clearest(weight, seen)[0], weight, seen)
     rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
     chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
     there, best = settled(own.problem, weight, chosen.fit)
     names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
-    return there, best, Found(chosen.score, names, tuple(own.trials), 0.0)
+    return there, best, Found(chosen.score, names, tuple(own.trials), _taken(there, weight, current, best))
 
 
 def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
