@@ -40,6 +40,10 @@ class Case:
         """Keep findings by the name of their recording."""
         self.findings += by_bag(findings)
 
+    def doubted(self, wrong: WrongSheet) -> None:
+        """Physics is there whatever of the vehicle file is put right; something of it should be."""
+        self.findings.append(wrong.finding())
+
     def undetermined(self, problem: Problem, lacking: str) -> Diagnosis:
         """The recordings lack what determines the baseline; with what to drive."""
         drive = "double-cycle: " + experiment.manoeuvres(problem)["double-cycle"].description

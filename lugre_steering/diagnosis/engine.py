@@ -25,7 +25,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_instead, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_beside, physics_instead, wrong_entry, wrong_sheet
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Recording
@@ -106,8 +106,10 @@ def _searched(
     progress("recalibrating the baseline")
     done = investigate(problem, seed, progress)
     if suspected is not None and not physics_instead(problem, done.found.final.effects, suspected):
-        case.found(clocks.findings)
-        return case.wrong_sheet(suspected)
+        if not physics_beside(problem, done.found.final.effects, suspected):
+            case.found(clocks.findings)
+            return case.wrong_sheet(suspected)
+        case.doubted(suspected)
     if (again := _other_clocks(pieces, clocks, done.found.final)) is not None:
         clocks = again
         done = investigate(clocks.problem, seed, progress)

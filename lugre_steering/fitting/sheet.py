@@ -39,6 +39,8 @@ SCALES = (0.5, 2.0)
 """Range of the factor on a bore or an arm."""
 EXPLAINED, BETTER = 0.8, 0.9
 """Share of what the baseline leaves that a wrong entry must explain, and share of what named physics leaves that it may leave."""
+KEPT = 0.5
+"""Share of what named physics takes that it must still take with a suspected entry put right, to be no part of that entry's error."""
 PUT_RIGHT = 0.03
 """Error that is left, as share of the torque, with which a sheet counts as put right."""
 FORETOLD = 0.5
@@ -60,12 +62,13 @@ STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 @dataclass(frozen=True)
 class Suspect:
     """An entry of the vehicle file: its key, by which factor it seems wrong (None: exchanged), and the error that is left with it
-    put right, as share of the measured torque."""
+    put right, as share of the measured torque; ``right``: the problem with it put right."""
 
     key: str
     factor: float | None
     relative_error: float
     cost: float = field(metadata=IN_MEMORY)
+    right: Problem | None = field(default=None, metadata=IN_MEMORY, repr=False)
 
     @property
     def words(self) -> str:
@@ -99,7 +102,7 @@ class WrongSheet:
 
     def finding(self) -> SheetFinding:
         """As an entry of ``data_quality``."""
-        return SheetFinding("wrong_sheet", "", "", (), self.statement, self.suspects)
+        return SheetFinding("wrong_sheet", "", "", (), self.statement, tuple(replace(one, right=None) for one in self.suspects))
 
 
 def torque_ratio(product: float, square: float) -> float:
@@ -131,8 +134,24 @@ def physics_instead(problem: Problem, effects: Sequence[tuple[Candidate, Values]
     if wrong.certain or not effects:
         return False
     thin, _ = _doubted(thinned(problem)[0])
-    named = fit(thin, _weight(thin), effects, robust=True, linearisations=25)
+    named = _fitted(thin, effects=effects)
     return named.cost < BETTER * wrong.suspects[0].cost and _surprise(thin, named) < SURPRISE
+
+
+def physics_beside(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
+    """Whether ``effects`` are there whatever of the sheet is put right: each leading suspect leaves more than they do, and beside each
+    they take most of what they take without.
+
+    Both are then to be told; only where recalibration stops at its bounds, nothing can be told from what makes up for it.
+    """
+    if wrong.certain or not effects:
+        return False
+    thin, _ = _doubted(thinned(problem)[0])
+    named, worst = _fitted(thin, effects=effects).cost, wrong.suspects[0].cost
+    taken = 1.0 - named / _fitted(thin).cost
+    leading = [suspect.right for suspect in wrong.suspects if suspect.cost < TIED * worst and suspect.right is not None]
+    beside = (1.0 - _fitted(right, effects=effects).cost / _fitted(right).cost for right in leading)
+    return named < BETTER * worst and all(share > KEPT * taken for share in beside)
 
 
 def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = (), rival: float = 1.0) -> WrongSheet | None:
@@ -207,9 +226,8 @@ def _weight(problem: Problem) -> Array:
     return np.asarray(problem.valid / np.concatenate([run.sigma for run in problem.runs]))
 
 
-def _fitted(problem: Problem, weight: Array | None = None, start: Array | None = None) -> Fit:
-    weight = _weight(problem) if weight is None else weight
-    return fit(problem, weight, start=start, robust=True, linearisations=15, tolerance=1e-4)
+def _fitted(problem: Problem, start: Array | None = None, effects: Sequence[tuple[Candidate, Values]] = ()) -> Fit:
+    return fit(problem, _weight(problem), effects, start, robust=True, linearisations=25 if effects else 15, tolerance=1e-4)
 
 
 def _surprise(problem: Problem, result: Fit, freed: Sequence[str] = ()) -> float:
@@ -349,4 +367,4 @@ def _suspect(problem: Problem, trial: Problem, result: Fit, key: str, factor: fl
     shown = float(np.sum(trial.measured[trial.valid] ** 2))
     seen = float(np.sum(problem.measured[problem.valid] ** 2))
     left = float(np.sum((trial.measured - result.prediction)[trial.valid] ** 2))
-    return Suspect(key, factor, float(np.sqrt(left / max(shown, 1e-30))), result.cost * seen / max(shown, 1e-30))
+    return Suspect(key, factor, float(np.sqrt(left / max(shown, 1e-30))), result.cost * seen / max(shown, 1e-30), trial)

@@ -29,7 +29,15 @@ from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Effects, Problem
-from lugre_steering.fitting.sheet import Suspect, WrongSheet, circuits, physics_instead, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import (
+    Suspect,
+    WrongSheet,
+    circuits,
+    physics_beside,
+    physics_instead,
+    wrong_entry,
+    wrong_sheet,
+)
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.online import sheet_words
@@ -206,6 +214,22 @@ def test_physics_that_leaves_less_than_a_suspected_entry_is_named_instead() -> N
     assert not physics_instead(problem, named, suspected(1e9, certain=True))
     assert not physics_instead(problem, [], suspected(1e9))
     assert not physics_instead(mistyped, named, suspected(1e9))
+
+
+@pytest.mark.parametrize("load", [0.5, 2.0])
+def test_physics_is_told_beside_a_mistyped_load(load: float) -> None:
+    """Viscous friction that is there is there with any load; nothing is named where the load is all that is wrong."""
+    viscous, standin = effect("viscous_friction", sigma_2=4000.0), effect("heat_partition", ground_share=0.5)
+    for hidden in (False, True):
+        real = VEHICLE.replace(effects=(EffectEntry("viscous_friction", {"sigma_2": 8000.0}),) if hidden else ())
+        problem = synchronised(record(real, QUICK, 6), with_load(load)).problem
+        wrong = wrong_sheet(problem)
+        assert wrong is not None
+        assert not wrong.certain
+        assert physics_beside(problem, [viscous], wrong) == hidden
+        assert not physics_beside(problem, [standin], wrong)
+        assert not physics_beside(problem, [], wrong)
+        assert not physics_beside(problem, [viscous], replace(wrong, certain=True))
 
 
 def mistyped(*names: str) -> Vehicle:
