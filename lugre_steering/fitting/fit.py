@@ -24,8 +24,8 @@ ROBUST = 3.0
 STEPS, FORETOLD, FAR = 6, 0.5, 0.03
 """Most steps per linearisation, the share of the foretold fall that a step must bring for another one, and the relative fall of the
 cost per linearisation from which the next one is of effects alone."""
-MOST_SETS = 5
-"""Sets of bounds tried per value."""
+MOST_SETS, PATIENCE, ROUNDING = 5, 3, 1e-12
+"""Sets of bounds tried per value, exchanges of many that may be in vain, and the share of its terms below which a slope is none."""
 
 
 @dataclass(frozen=True)
@@ -279,33 +279,32 @@ def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, hi
 
 
 def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> Array:
-    """Where 1/2 d'A d + g'd is least within low <= d <= high, for positive definite A (q, q), by active sets.
+    """Where 1/2 d'A d + g'd is least within low <= d <= high, for positive definite A (q, q), by block principal pivoting.
 
-    As bounded-variable least squares (Stark and Parker, Comput. Stat. 10 (1995) 129), but on normal equations, whose cost is independent
-    of the number of samples. After MOST_SETS sets of bounds the best one yet is returned.
+    All values on the wrong side of their bound, or held at one that they would leave, are exchanged at once; where that does not make them
+    fewer, one by one, which always ends (Judice and Pires, Computers Oper. Res. 21 (1994) 587). On normal equations its
+    cost is independent of the number of samples. After MOST_SETS sets of bounds the last one is returned.
     """
     step = _solved(normal, -gradient)
-    held = (step < low) | (step > high)
-    step = np.clip(step, low, high)
-    for _ in range(MOST_SETS * step.size if held.any() else 0):
-        free = ~held
-        wanted = step.copy()
-        if free.any():
-            wanted[free] = _solved(normal[np.ix_(free, free)], -(gradient + normal[:, held] @ step[held])[free])
-        change = wanted - step
-        beyond = (wanted < low) | (wanted > high)
-        if beyond.any():  # as far as the first bound, which then holds
-            room = np.where(change > 0.0, high - step, low - step)[beyond] / change[beyond]
-            first = np.flatnonzero(beyond)[room == room.min()]
-            step += room.min() * change
-            step[first] = np.where(change > 0.0, high, low)[first]
-            held[first] = True
-            continue
-        step = wanted
-        inward = (normal @ step + gradient) * np.where(step <= low, -1.0, 1.0) * held / np.sqrt(np.diag(normal))
-        if not np.any(inward > 0.0):
+    at_low, at_high = np.zeros(step.size, bool), np.zeros(step.size, bool)
+    fewest, patience = step.size + 1, PATIENCE
+    for _ in range(MOST_SETS * step.size):
+        slope = normal @ step + gradient
+        certain = ROUNDING * (np.abs(normal) @ np.abs(step) + np.abs(gradient))
+        free = ~(at_low | at_high)
+        below, above = free & (step < low), free & (step > high)
+        leaving = (at_low & (slope < -certain)) | (at_high & (slope > certain))
+        wrong = np.flatnonzero(below | above | leaving)
+        if wrong.size == 0:
             break
-        held[np.argmax(inward)] = False
+        patience = PATIENCE if wrong.size < fewest else patience - 1
+        fewest = min(fewest, wrong.size)
+        if patience < 0:
+            wrong = wrong[-1:]
+        at_low[wrong], at_high[wrong] = below[wrong], above[wrong]
+        step = np.where(at_low, low, np.where(at_high, high, 0.0))
+        free = ~(at_low | at_high)
+        step[free] = _solved(normal[np.ix_(free, free)], -(gradient + normal @ step)[free]) if free.any() else step[free]
     return np.asarray(np.clip(step, low, high))
 
 

@@ -211,6 +211,7 @@ class Problem:
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
         self.size = size_of(vehicle, self.runs)
         self.standing = standing_effects(vehicle)
+        self._bent: tuple[bytes | None, Array] = None, np.zeros(self.measured.size)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
     @property
@@ -218,7 +219,7 @@ class Problem:
         """Calibration values, one initial bristle deflection per bag, its weather, and bends."""
         return self.first_bend + int(self.bends.shape[1])
 
-    @property
+    @cached_property
     def first_bend(self) -> int:
         """Where the sizes of the bends stand in x."""
         return int(len(self.calibrations) + len(self.runs) + self._weather[0].size)
@@ -339,11 +340,7 @@ class Problem:
                     for field, number in candidate.effect.fields(values).items():
                         acting[field] = number
             phases.append((start, acting))
-        total = np.zeros(run.time.size)
-        for side in range(run.theta.shape[0]):
-            motion = run.theta[side], run.omega[side], run.alpha[side]
-            total += torque_in_phases(phases, self.model.rubber, run.time, *motion)
-        return total
+        return torque_in_phases(phases, self.model.rubber, run.time, run.theta, run.omega, run.alpha)
 
     def predict(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
@@ -361,7 +358,15 @@ class Problem:
             if candidate.effect.hooks.keys() & SENSOR_HOOKS:
                 changed = self._through_sensor(run, candidate, values, torque, start)
                 torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
-        return torque / self.gain(x) + self.bends[own] @ x[self.first_bend : self.nuisances]
+        return torque / self.gain(x) + self._bending(x)[own]
+
+    def _bending(self, x: Array) -> Array:
+        """Torque (n,) of the bends; kept, as it is the same for all bags and while a fit moves anything else."""
+        sizes = x[self.first_bend : self.nuisances]
+        kept = self._bent
+        if kept[0] != sizes.tobytes():
+            self._bent = kept = sizes.tobytes(), self.bends @ sizes
+        return kept[1]
 
     def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array, start: float) -> Array:
         """Apply one sensor effect by its laws; errors of angles and arms act through the slopes and parts of the measured torque."""
