@@ -8,6 +8,7 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -33,6 +34,7 @@ def imports(file: Path) -> Iterator[str]:
             yield from (alias.name for alias in node.names if alias.name in MODULES)
 
 
+@cache
 def arrows(folders: bool) -> dict[str, set[str]]:
     """Who imports whom; the front door of the package offers what lies behind it and is imported by nobody."""
     found: dict[str, set[str]] = defaultdict(set)
@@ -60,15 +62,21 @@ def test_the_chain_knows_no_vehicle_file_and_the_report_no_program() -> None:
     assert arrows(folders=True)["report"] <= {"errors", "files", "provenance", "recording", "units", "vehicle"}
 
 
+@cache
+def strings() -> dict[Path, set[str]]:
+    """Every string in the code of each file of the package."""
+    trees = {file: ast.parse(file.read_text(encoding="utf-8")) for file in MODULES.values()}
+    return {
+        file.relative_to(PACKAGE): {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+        for file, tree in trees.items()
+    }
+
+
 @pytest.mark.parametrize("effect", CATALOGUE)
 def test_an_effect_is_named_in_its_own_file_only(effect: str) -> None:
     """No string outside is its id, one of its fields or it with values; the proof's simulators hide effects by name on purpose."""
-    named = [
-        file.relative_to(PACKAGE)
-        for file in MODULES.values()
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and re.fullmatch(rf"{effect}(_[a-z0-9_]+)?(:.*)?", node.value)
-    ]
+    own = re.compile(rf"{effect}(_[a-z0-9_]+)?(:.*)?")
+    named = {file for file, texts in strings().items() if any(map(own.fullmatch, texts))}
     assert {file for file in named if file.parts[0] not in ("proof", "effects")} == set()
     assert CATALOGUE[effect].id == effect
     assert (PACKAGE / "effects" / f"{effect}.py").exists()
