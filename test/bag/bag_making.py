@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.recording import Channel, Kind
@@ -29,6 +30,8 @@ SENSOR = Channel(Kind.TORQUE, "sensor", "steering/measured_torque")
 CHANNELS = (LEFT, RIGHT, MAIN_A, AIR, SENSOR)
 
 Message = tuple[str, str, int, bytes]  # topic, type, log time, serialised
+STRIDE = 5
+"""Bags of 100 Hz thinned by it have 20 Hz, as slow field recordings have."""
 
 
 def header(stamp_ns: int, frame: str = "axle") -> Any:
@@ -109,3 +112,15 @@ def file_of(folder: Path) -> Path:
     """The storage file in a folder."""
     (file,) = (f for f in folder.iterdir() if f.name != "metadata.yaml")
     return file
+
+
+def thinned_bag(bag: Path, folder: Path) -> Path:
+    """A bag with one message of STRIDE of each topic."""
+    seen: Counter[str] = Counter()
+    kept: list[Message] = []
+    with Reader(bag) as reader:
+        for connection, log_ns, raw in reader.messages():
+            if seen[connection.topic] % STRIDE == 0:
+                kept.append((connection.topic, connection.msgtype, log_ns, bytes(raw)))
+            seen[connection.topic] += 1
+    return write(folder / bag.name, kept)

@@ -4,13 +4,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bag_making import Message, write
-from rosbags.rosbag2 import Reader
+from bag_making import STRIDE
 
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis.result import Diagnosis
@@ -19,8 +17,6 @@ from lugre_steering.recording import Recording, Signal
 from lugre_steering.vehicle import load
 
 VEHICLE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
-STRIDE = 5
-"""At 20 Hz, as slow field recordings have it."""
 
 
 def made(folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white") -> tuple[CaseData, list[Path]]:
@@ -39,18 +35,6 @@ def thinned(bags: list[Path]) -> list[Recording]:
         replace(r, angle={k: every(s) for k, s in r.angle.items()}, pressure={k: every(s) for k, s in r.pressure.items()})
         for r in (read_recording(bag, load(VEHICLE).channels) for bag in bags)
     ]
-
-
-def thinned_bag(bag: Path, folder: Path) -> Path:
-    """A bag with one message of STRIDE of each topic."""
-    seen: Counter[str] = Counter()
-    kept: list[Message] = []
-    with Reader(bag) as reader:
-        for connection, log_ns, raw in reader.messages():
-            if seen[connection.topic] % STRIDE == 0:
-                kept.append((connection.topic, connection.msgtype, log_ns, bytes(raw)))
-            seen[connection.topic] += 1
-    return write(folder / bag.name, kept)
 
 
 def cut(recording: Recording, until_s: float, since_s: float = 0.0) -> Recording:

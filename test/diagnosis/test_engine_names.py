@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_cases import VEHICLE, cut, made, overlap, thinned, thinned_bag
+from bag_making import thinned_bag
+from hidden_cases import VEHICLE, cut, made, overlap, thinned
 
 from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.proof.campaign import Hiding

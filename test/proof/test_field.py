@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from numpy.typing import NDArray
+from remembering import remembered
 from rosbags.highlevel import AnyReader
 from scipy.integrate import solve_ivp
 
@@ -164,6 +165,14 @@ def test_shares_no_code_with_the_estimator_nor_a_law_with_the_second_simulator(n
     shared = {f"lugre_steering.proof.{module}" for module in ("made", "bagfile", "generator", "sensors")}
     own = {name for name in names if name.startswith("lugre_steering") and not name.startswith("lugre_steering.proof.field")}
     assert own <= shared
+
+
+TRACK = remembered(turn_track)
+
+
+@pytest.fixture(autouse=True)
+def _each_track_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulator, "turn_track", TRACK)
 
 
 @pytest.fixture(scope="module")
