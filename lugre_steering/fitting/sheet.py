@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from lugre_steering.data.dataset import Run, motion, with_hydraulics
-from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.fit import Fit, fit, normalised
 from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Candidate, Problem, SheetValue, Values
 from lugre_steering.recording import Array, BagFinding, IntArray
 from lugre_steering.serialise import IN_MEMORY
@@ -162,8 +162,9 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
-    entries = (*_levels(thin), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
-    found = sorted((suspect for suspect, _ in _off(entries)), key=lambda item: item.cost)
+    least = FORETOLD * EXPLAINED
+    levels = _levels(thin) if _foretold(thin, baseline) > least else ()
+    found = sorted((suspect for suspect, _ in _off((*levels, *_geometries(thin, baseline, least)))), key=lambda item: item.cost)
     if not found:
         return None
     floor = float(np.count_nonzero(thin.valid))
@@ -171,6 +172,15 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     if excess <= 0.0 or left > min(1.0 - EXPLAINED, BETTER * rival) * excess or left > BETTER * beside_names:
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
+
+
+def _foretold(problem: Problem, baseline: Fit) -> float:
+    """Share of what is left beyond noise that levels without any prior would explain, to first order."""
+    weight = _weight(problem)
+    left = (problem.measured - baseline.prediction) * weight
+    columns = np.column_stack([baseline.jacobian, baseline.prediction * weight])
+    along = np.linalg.qr(normalised(columns))[0].T @ left
+    return float(along @ along) / max(float(left @ left) - float(np.count_nonzero(weight)), 1e-30)
 
 
 def _off(found: Iterable[tuple[Suspect, float]]) -> list[tuple[Suspect, float]]:
@@ -277,8 +287,8 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
 
 
 def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[tuple[Suspect, float]]:
-    """Hypotheses about single cylinders and those of one circuit, and the surprise that each leaves; sizes only where ``least`` of what is
-    left beyond noise is foretold to go."""
+    """Hypotheses about single cylinders and those of one circuit, and the surprise that each leaves; only those of which is foretold
+    that ``least`` of what is left beyond noise goes, or, of exchanged lines, anything."""
     hydraulics = problem.vehicle.hydraulics
     if hydraulics is None:
         return
@@ -299,7 +309,10 @@ def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator
         trial, result = _refitted(problem, baseline, change(factor))
         yield _suspect(problem, trial, result, key, factor), _surprise(trial, result)
     for name, cylinder in hydraulics.cylinders.items():
-        trial, result = _refitted(problem, baseline, {name: replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)})
+        turned = {name: replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)}
+        if least and not _could_be_better(problem, _changed(problem, turned), baseline):
+            continue
+        trial, result = _refitted(problem, baseline, turned)
         yield _suspect(problem, trial, result, f"hydraulics.cylinders.{name}.cap and .rod exchanged", None), _surprise(trial, result)
 
 
@@ -350,6 +363,15 @@ def _better(
         return factor, 0.0
     beyond = max(float(left @ left) - float(np.count_nonzero(weight)), 1e-30)
     return float(np.clip(factor * np.exp(np.clip(-along / power, -0.5, 0.5)), *SCALES)), along**2 / power / beyond
+
+
+def _could_be_better(problem: Problem, trial: Problem, baseline: Fit) -> bool:
+    """Whether, whatever is recalibrated, to first order less is left in a changed measured torque than the baseline leaves."""
+    weight, basis = _weight(trial), baseline.basis()
+    before, after = ((each.measured - baseline.prediction) * weight for each in (problem, trial))
+    own = after - basis @ (basis.T @ after)
+    shown, seen = (float(np.sum(each.measured[each.valid] ** 2)) for each in (trial, problem))
+    return float(own @ own) * seen < float(before @ before) * shown
 
 
 def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:

@@ -246,6 +246,17 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
     assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
 
 
+def test_exchanged_lines_of_one_cylinder_are_found() -> None:
+    assert VEHICLE.hydraulics is not None
+    cylinders = VEHICLE.hydraulics.cylinders
+    exchanged = replace(cylinders["left_aux"], cap=cylinders["left_aux"].rod, rod=cylinders["left_aux"].cap)
+    wrong = VEHICLE.replace(hydraulics=replace(VEHICLE.hydraulics, cylinders={**cylinders, "left_aux": exchanged}))
+    found = wrong_entry(synchronised(sound(), wrong).problem)
+    assert found is not None
+    assert found.suspects[0].key == "hydraulics.cylinders.left_aux.cap and .rod exchanged"
+    assert found.suspects[0].relative_error < 0.01
+
+
 def test_the_bores_of_one_circuit_are_found_where_it_does_not_always_bear_the_same_share() -> None:
     """Always the same share would be another level of friction, within what recalibration may do."""
     wrong, runs = mistyped("left_main", "right_main"), []
