@@ -42,6 +42,8 @@ GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
 BETTER, GOOD = 0.5, 0.45
 """A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
+ORDINARY = 0.1
+"""Relative error of the nominal model that friction of another form makes as well, and that accuses nobody but a unit."""
 WEAK_BETTER = 0.8
 """The same for the unit of a line that hardly works, whose magnitude speaks too."""
 TIE, SHOWN = 1.15, 3
@@ -98,6 +100,10 @@ class _Hypothesis:
     @property
     def statement(self) -> str:
         return " and ".join(fault.statement for fault in self.faults)
+
+    @property
+    def of_units(self) -> bool:
+        return any(fault.finding == "unit_suspect" for fault in self.faults)
 
     @property
     def topics(self) -> int:
@@ -200,7 +206,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
         return _noted(vehicle, _exchanged_angles(vehicle), ".")
     undone = list(_hypotheses(vehicle, run, model, 1))
     single = [*undone, *(_angle_units(recording, vehicle, run, model) if as_is > GOOD else ())]
-    convincing = [h for h in single if h.error < min(GOOD, h.better * as_is)]
+    convincing = [h for h in single if h.error < min(GOOD, h.better * as_is) and (as_is > ORDINARY or h.of_units)]
     if as_is > GOOD:
         needed = BETTER * min([as_is, *(h.error for h in single)])
         convincing = [h for h in _hypotheses(vehicle, run, model, 2) if h.error < min(GOOD, needed)] or convincing

@@ -287,6 +287,22 @@ def test_the_right_sheet_is_not_suspected() -> None:
     assert wrong_entry(problem) is None
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.03, False), (0.3, True)])
+def test_exchanged_plugs_are_told_where_no_other_friction_does_as_much(share: float, told: bool) -> None:
+    """Two lines that bear nearly the same: exchanged, they miss the torque by a given share of it."""
+    recording, lines = sound()[0], ("main_a", "aux_a")
+    run = prepare(recording, VEHICLE)
+    gains = dict(zip(VEHICLE.hydraulics.lines, run.gains.sum(axis=0), strict=True))  # type: ignore[union-attr]
+    first, second = (gains[line] for line in lines)
+    borne = sum(np.interp(run.time, recording.pressure[x].time_s, recording.pressure[x].value) * gains[x] for x in lines)
+    missed = share * float(np.std(run.measured)) * np.sqrt(2.0) * np.sin(run.time)
+    same, apart = borne / (first + second), missed / (first**2 - second**2)
+    pressures = dict(zip(lines, (same - first * apart, same + second * apart), strict=True))
+    exchanged = {line: Signal(run.time, value) for line, value in pressures.items()}
+    findings = inspect(replace(recording, pressure={**recording.pressure, **exchanged}), VEHICLE).findings
+    assert any(finding.finding == "swapped_lines" for finding in findings) == told
+
+
 def noise(size: float, level: float = 0.0) -> Change:
     return lambda value: level + size * np.random.default_rng(7).standard_normal(value.size)
 
