@@ -11,15 +11,19 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from typer.testing import CliRunner, Result
 
 import lugre_steering
+from lugre_steering import cli
 from lugre_steering.bench.replay import write_cycle
+
+pytestmark = pytest.mark.filterwarnings("error::UserWarning", "error::RuntimeWarning")  # a process would show them on stderr
 
 ROOT = Path(__file__).resolve().parents[1]
 VEHICLE = ROOT / "config" / "test_vehicle.yaml"
@@ -33,6 +37,13 @@ ENVIRONMENT: Mapping[str, str] = os.environ | {
 def run(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "lugre_steering.cli", *map(str, arguments)]
     return subprocess.run(command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=600)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """The command line without the seconds that a process takes to begin, for what is the same in one; in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(cli.app, [*map(str, arguments)], env={"COLUMNS": "80"}, prog_name="lugre-steering")
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +61,10 @@ def test_replay_writes_what_the_contract_promises(bag: Path, tmp_path: Path) -> 
     assert (tmp_path / "out" / f"{bag.name}.png").is_file()
 
 
-def test_text_result_names_the_fit_and_the_folder(bag: Path, tmp_path: Path) -> None:
+def test_text_result_names_the_fit_and_the_folder(bag: Path, tmp_path: Path, here: Callable[..., Result]) -> None:
     named = shutil.copytree(bag, tmp_path / "synthetic_hidden_stop_a")
-    done = run("replay", named, "--vehicle", VEHICLE, "--out", "out", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    done = here("replay", named, "--vehicle", VEHICLE, "--out", "out")
+    assert (done.exit_code, done.stderr) == (0, "")
     assert "RMSE" in done.stdout
     assert f"\n{named.name} " in done.stdout  # whole, at 80 columns
     assert done.stdout.endswith("results in out\n")
@@ -64,16 +75,16 @@ def test_the_version_is_told(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (0, f"lugre-steering {lugre_steering.__version__}\n")
 
 
-def test_brackets_in_names_are_names(tmp_path: Path) -> None:
+def test_brackets_in_names_are_names(tmp_path: Path, here: Callable[..., Result]) -> None:
     """Rich would take them for its markup: lost words, or a traceback."""
     name = "name: test vehicle, front axle, dry concrete"
     sheet = VEHICLE.read_text().replace(name, 'name: "truck [/b] [prototype]"')
     (tmp_path / "own.yaml").write_text(sheet.replace("rubber_dma", f"{VEHICLE.parent}/rubber_dma"))
-    done = run("vehicle", "own.yaml", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    done = here("vehicle", "own.yaml")
+    assert (done.exit_code, done.stderr) == (0, "")
     assert "truck [/b] [prototype]" in done.stdout
-    done = run("simulate", "small-loops", "--vehicle", "own.yaml", "--out", "folder [/x]", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    done = here("simulate", "small-loops", "--vehicle", "own.yaml", "--out", "folder [/x]")
+    assert (done.exit_code, done.stderr) == (0, "")
     assert "folder [/x]" in done.stdout
 
 
@@ -107,19 +118,19 @@ def test_progress_is_shown_on_a_terminal(bag: Path, tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(
-    bag: Path, tmp_path: Path, arguments: tuple[str | Path, ...], words: tuple[str, ...]
+    bag: Path, tmp_path: Path, arguments: tuple[str | Path, ...], words: tuple[str, ...], here: Callable[..., Result]
 ) -> None:
     (tmp_path / "text.txt").write_text("neither a bag nor a vehicle\n")
-    done = run(*(str(argument).replace("{bag}", str(bag)) for argument in arguments), cwd=tmp_path)
-    assert done.returncode == 2
+    done = here(*(str(argument).replace("{bag}", str(bag)) for argument in arguments))
+    assert done.exit_code == 2
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
     assert all(word in done.stderr for word in words), done.stderr
 
 
-def test_list_of_simulations_as_json(tmp_path: Path) -> None:
-    done = run("simulate", "--list", "--json", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+def test_list_of_simulations_as_json(here: Callable[..., Result]) -> None:
+    done = here("simulate", "--list", "--json")
+    assert (done.exit_code, done.stderr) == (0, "")
     rows = json.loads(done.stdout)
     assert {"manoeuvre", "experiment", "file"} == {row["kind"] for row in rows}
     assert all(row["name"] and row["description"] for row in rows)
@@ -129,6 +140,8 @@ def test_wrong_usage_is_exit_code_2_without_traceback(tmp_path: Path) -> None:
     done = run("replay", cwd=tmp_path)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+    absent = run("replay", "absent", "--vehicle", VEHICLE, "--out", "out", cwd=tmp_path)
+    assert (absent.returncode, absent.stdout, len(absent.stderr.splitlines())) == (2, "", 1)
 
 
 def test_help_lists_the_commands(tmp_path: Path) -> None:
@@ -139,10 +152,10 @@ def test_help_lists_the_commands(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not CONFORMANCE.is_dir(), reason="the independent recordings are not here")
 @pytest.mark.parametrize("name", ["baseline_clean", "baseline_noisy"])
-def test_agrees_with_an_independent_simulation(tmp_path: Path, name: str) -> None:
+def test_agrees_with_an_independent_simulation(tmp_path: Path, name: str, here: Callable[..., Result]) -> None:
     """Torque within 250 N m RMS and rubber temperature within 0.3 K, at every 0.1 s."""
-    done = run("replay", CONFORMANCE / name, "--vehicle", VEHICLE, "--out", tmp_path, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = here("replay", CONFORMANCE / name, "--vehicle", VEHICLE, "--out", tmp_path)
+    assert done.exit_code == 0, done.stderr
     expected = np.genfromtxt(CONFORMANCE / "expected.csv", delimiter=",", names=True)
     found: dict[str, list[tuple[float, float]]] = {}
     with AnyReader([tmp_path / name]) as reader:
@@ -160,9 +173,9 @@ def test_agrees_with_an_independent_simulation(tmp_path: Path, name: str) -> Non
         assert np.abs(difference).max() < 0.3
 
 
-def test_what_a_vehicle_file_amounts_to(tmp_path: Path) -> None:
-    done = run("vehicle", VEHICLE, "--out", "sheet", "--json", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+def test_what_a_vehicle_file_amounts_to(tmp_path: Path, here: Callable[..., Result]) -> None:
+    done = here("vehicle", VEHICLE, "--out", "sheet", "--json")
+    assert (done.exit_code, done.stderr) == (0, "")
     result = json.loads(done.stdout)
     found = {row["quantity"]: (row["value"], row["unit"]) for row in result["quantities"]}
     # Half of 90 kN and 6.2 kN; 0.42 m2; 5393.7 N m per degree.
@@ -174,14 +187,14 @@ def test_what_a_vehicle_file_amounts_to(tmp_path: Path) -> None:
     assert (tmp_path / result["picture"]).read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_vehicle_sheet_of_a_rig_has_its_units_and_no_footprint(tmp_path: Path) -> None:
+def test_a_vehicle_sheet_of_a_rig_has_its_units_and_no_footprint(tmp_path: Path, here: Callable[..., Result]) -> None:
     rig = ROOT / "config" / "emps_vehicle.yaml"
-    done = run("vehicle", rig, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    done = here("vehicle", rig)
+    assert (done.exit_code, done.stderr) == (0, "")
     assert "N s/m" in done.stdout
     assert "N m" not in done.stdout
-    refused = run("vehicle", rig, "--out", "sheet", cwd=tmp_path)
-    assert refused.returncode == 2
+    refused = here("vehicle", rig, "--out", "sheet")
+    assert refused.exit_code == 2
     assert "axle" in refused.stderr
     assert not (tmp_path / "sheet").exists()
 
@@ -203,10 +216,6 @@ def test_it_runs_as_a_module_and_h_helps(tmp_path: Path, module: str) -> None:
 
 def test_help_of_every_option_is_whole() -> None:
     """Square brackets of units and defaults are text, in every help there is."""
-    from typer.testing import CliRunner
-
-    from lugre_steering import cli
-
     for registered in cli.app.registered_commands:
         name = registered.name or registered.callback.__name__  # type: ignore[union-attr]
         shown = " ".join(CliRunner().invoke(cli.app, [name, "--help"], env={"COLUMNS": "80"}).stdout.split())
@@ -232,43 +241,40 @@ def test_the_nearest_letters() -> None:
     assert "1\u2009750 … 2 → 3 Ω".encode("ascii", "test.nearest") == b"1 750 ... 2 -> 3 ?"
 
 
-def test_the_list_of_effects_fits_80_columns_and_one_screen_or_so(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "lugre_steering", "effects"]
-    done = subprocess.run(command, cwd=tmp_path, env={**ENVIRONMENT, "COLUMNS": "80"}, capture_output=True, text=True, check=True)
+def test_the_list_of_effects_fits_80_columns_and_one_screen_or_so(here: Callable[..., Result]) -> None:
+    done = here("effects")
+    assert done.exit_code == 0
     lines = done.stdout.splitlines()
     assert len(lines) < 60
     assert max(map(len, lines)) <= 80
 
 
-def test_saved_defaults_stand_in_for_options(bag: Path, tmp_path: Path) -> None:
-    environment = {key: value for key, value in ENVIRONMENT.items() if key != "LUGRE_STEERING_CONFIG"}
-    environment["XDG_CONFIG_HOME"] = str(tmp_path / "etc")
-
-    def tool(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "lugre_steering", *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-
-    assert tool("config").stdout == "no defaults are saved\n"
+def test_saved_defaults_stand_in_for_options(
+    bag: Path, tmp_path: Path, here: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("LUGRE_STEERING_CONFIG")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "etc"))
+    assert here("config").stdout == "no defaults are saved\n"
     (tmp_path / "own.yaml").write_text(VEHICLE.read_text().replace("rubber_dma", f"{VEHICLE.parent}/rubber_dma"))
-    assert tool("config", "vehicle", "own.yaml").returncode == 0
-    assert tool("config", "diagnose.seed", "7").returncode == 0
-    saved = json.loads(tool("config", "--json").stdout)["defaults"]
+    assert here("config", "vehicle", "own.yaml").exit_code == 0
+    assert here("config", "diagnose.seed", "7").exit_code == 0
+    saved = json.loads(here("config", "--json").stdout)["defaults"]
     assert saved == {"vehicle": str(tmp_path / "own.yaml"), "diagnose.seed": 7}
-    done = tool("replay", bag, "--out", "out")  # no --vehicle
-    assert (done.returncode, done.stderr) == (0, "")
-    given = tool("replay", bag, "--out", "out", "--vehicle", "absent.yaml")
-    assert (given.returncode, "absent.yaml" in given.stderr) == (2, True)  # what is given counts
+    done = here("replay", bag, "--out", "out")  # no --vehicle
+    assert (done.exit_code, done.stderr) == (0, "")
+    given = here("replay", bag, "--out", "out", "--vehicle", "absent.yaml")
+    assert (given.exit_code, "absent.yaml" in given.stderr) == (2, True)  # what is given counts
     for wrong in (("diagnose.seed", "x"), ("nothing", "1"), ("replay.seed", "1"), ("vehicle",)):
-        refused = tool("config", *wrong)
-        assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-    assert tool("config", "vehicle", "--unset").returncode == 0
-    assert "Missing option" in tool("replay", bag, "--out", "out").stderr
+        refused = here("config", *wrong)
+        assert (refused.exit_code, len(refused.stderr.splitlines())) == (2, 1)
+    assert here("config", "vehicle", "--unset").exit_code == 0
+    assert "Missing option" in here("replay", bag, "--out", "out").stderr
     (tmp_path / "etc" / "lugre_steering" / "defaults.yaml").write_text("colour: red\n")
-    broken = tool("effects")
-    assert (broken.returncode, len(broken.stderr.splitlines())) == (2, 1)
+    broken = here("effects")
+    assert (broken.exit_code, len(broken.stderr.splitlines())) == (2, 1)
     assert "colour" in broken.stderr
-    assert tool("config", "colour", "--unset").returncode == 0  # the way out that it names
-    assert tool("effects").returncode == 0
+    assert here("config", "colour", "--unset").exit_code == 0  # the way out that it names
+    assert here("effects").exit_code == 0
 
 
 def test_completion_is_offered(tmp_path: Path) -> None:

@@ -68,6 +68,12 @@ def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For what processes have no part in: each takes seconds to begin."""
+    monkeypatch.setattr("lugre_steering.fleet.run.in_processes", lambda function, tasks, _: enumerate(map(function, tasks)))
+
+
 def test_bad_bags_are_in_quarantine_and_stop_nobody(done: Path) -> None:
     result = json.loads((done / "fleet.json").read_text())
     assert (result["finished"], result["examined"], result["cached"]) == (True, 6, 0)
@@ -101,6 +107,7 @@ def test_the_page_says_what_was_left_out_and_loads_nothing(done: Path) -> None:
     assert "https://" not in page
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_what_is_known_is_not_done_again(done: Path, runs: Path, tmp_path: Path) -> None:
     out, data = shutil.copytree(done, tmp_path / "out"), shutil.copytree(runs, tmp_path / "runs")
     again = run(bags_of(runs), VEHICLE, out, options=QUICK, jobs=1, version="1")
@@ -117,6 +124,7 @@ def test_what_is_known_is_not_done_again(done: Path, runs: Path, tmp_path: Path)
     assert run(bags_of(data)[:2], sheet, out, options=QUICK, jobs=1, version="1").cached == 2  # a sheet is what it says
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_two_versions_are_compared(done: Path, runs: Path, tmp_path: Path) -> None:
     out = shutil.copytree(done, tmp_path / "out")
     bags = bags_of(runs)[:3]
@@ -151,10 +159,11 @@ def waiting(condition: object, seconds: float = 120.0) -> Iterator[None]:
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are looked up in /proc")
+@pytest.mark.usefixtures("in_this_process")  # of which the one that is killed is not
 def test_workers_may_be_killed_and_then_the_whole_run(done: Path, runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "lugre_steering.cli", "fleet", runs, "--vehicle", VEHICLE, "--out", out, "--no-diagnose", "-j", "2"]
-    first = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE)
+    arguments = ["fleet", str(runs), "--vehicle", str(VEHICLE), "--out", str(out), "--no-diagnose", "-j", "2"]
+    first = subprocess.Popen([sys.executable, "-m", "lugre_steering.cli", *arguments], env=ENVIRONMENT, stderr=subprocess.PIPE)
     for _ in waiting(lambda: len(children(first.pid)) == 2):
         pass
     os.kill(children(first.pid)[0], signal.SIGKILL)  # whatever it has is done by another
@@ -166,7 +175,8 @@ def test_workers_may_be_killed_and_then_the_whole_run(done: Path, runs: Path, tm
     for _ in waiting(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers)):
         pass  # none is left behind
     assert json.loads((out / "fleet.json").read_text())["finished"] is False
-    second = subprocess.run([*command, "--json"], env=ENVIRONMENT, capture_output=True, check=True)
+    second = CliRunner().invoke(app, [*arguments, "--json"])
+    assert second.exit_code == 0
     result = json.loads(second.stdout)
     assert result["cached"] >= 2
     assert result["cached"] + result["examined"] == 6
@@ -205,6 +215,7 @@ def test_a_bag_that_grows_is_left_for_the_next_run(tmp_path: Path) -> None:
     assert (second.quarantine, second.examined, second.vehicles[0].recordings) == ((), 1, 1)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_map_says_which_vehicle_made_which_bag(runs: Path, tmp_path: Path) -> None:
     file = tmp_path / "map.yaml"
     text = "vehicles:\n  seven: {file: %s, bags: ['*_0', '*_1']}\n  nine: {file: %s, bags: ['*_1', '*_2']}\n"
@@ -242,6 +253,7 @@ def test_what_is_missing_is_named(
     assert "lugre_steering[fleet]" in done.stderr
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_one_is_diagnosed_and_its_physics_stands(tmp_path: Path) -> None:
     """The bundled hidden stop."""
     out = tmp_path / "out"

@@ -659,10 +659,12 @@ def test_without_matplotlib_there_is_no_picture_and_a_message(tmp_path: Path, mo
 
 def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
     peaks = []
-    for seconds in (200.0, 600.0):
+    for seconds in (100.0, 300.0):
         write_cycle(tmp_path / f"run_{seconds:.0f}", seconds)
+        if not peaks:
+            replay([tmp_path / "run_100"], VEHICLE, tmp_path / "out")  # what is imported and loaded once is no part of it
         tracemalloc.start()
         replay([tmp_path / f"run_{seconds:.0f}"], VEHICLE, tmp_path / "out")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert peaks[1] < 1.2 * peaks[0]
+    assert peaks[1] < 1.05 * peaks[0]

@@ -42,6 +42,12 @@ def test_the_lag_solves_its_differential_equation(tau: float) -> None:
     np.testing.assert_allclose(lagged(value, dt, tau), exact, atol=1e-4)
 
 
+@pytest.fixture(autouse=True)
+def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody looks at them here, and they take longer than all the rest."""
+    monkeypatch.setattr("lugre_steering.replay.run.no_pictures", lambda: "not wanted")
+
+
 def recorded(vehicle: Vehicle, folder: Path) -> tuple[Path, Path]:
     """A bag with next to no noise, and the vehicle file that made it."""
     sensing = replace(sensing_of(vehicle), angle_noise_deg=0.0005, angle_resolution_deg=0.0, pressure_noise_Pa=10.0)

@@ -9,6 +9,8 @@ import random
 import shutil
 import sqlite3
 import struct
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import bag_making as make
@@ -31,6 +33,17 @@ def run() -> list[make.Message]:
     return make.steering(60.0)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """A bag of so many seconds in a form, made once, to be copied and damaged."""
+
+    @cache
+    def made(seconds: float, storage: str, compression: str) -> Path:
+        return make.write(tmp_path_factory.mktemp("whole") / "run", make.steering(seconds), storage, compression)
+
+    return made
+
+
 def sound(folder: Path) -> tuple[int, list[str]]:
     """Read all; whatever is delivered must be true. (number of values, names of findings)."""
     with Bag(folder) as bag:
@@ -46,9 +59,9 @@ def sound(folder: Path) -> tuple[int, list[str]]:
 @pytest.mark.parametrize(("storage", "compression"), FORMS)
 @pytest.mark.parametrize("with_metadata", [True, False])
 def test_cut_at_70_percent(
-    tmp_path: Path, run: list[make.Message], storage: str, compression: str, with_metadata: bool
+    tmp_path: Path, run: list[make.Message], whole: Callable[..., Path], storage: str, compression: str, with_metadata: bool
 ) -> None:
-    folder = make.write(tmp_path / "run", run, storage, compression)
+    folder = shutil.copytree(whole(60.0, storage, compression), tmp_path / "run")
     file = make.file_of(folder)
     data = file.read_bytes()
     file.write_bytes(data[: len(data) * 7 // 10])
@@ -66,8 +79,8 @@ def test_cut_at_70_percent(
 
 @pytest.mark.parametrize("fraction", [0.0, 0.001, 0.01, 0.3, 0.9, 0.99, 0.9999])
 @pytest.mark.parametrize(("storage", "compression"), FORMS)
-def test_cut_anywhere(tmp_path: Path, storage: str, compression: str, fraction: float) -> None:
-    folder = make.write(tmp_path / "run", make.steering(5.0), storage, compression)
+def test_cut_anywhere(tmp_path: Path, whole: Callable[..., Path], storage: str, compression: str, fraction: float) -> None:
+    folder = shutil.copytree(whole(5.0, storage, compression), tmp_path / "run")
     file = make.file_of(folder)
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * fraction)])
@@ -81,9 +94,9 @@ def test_cut_anywhere(tmp_path: Path, storage: str, compression: str, fraction: 
 @pytest.mark.parametrize(("storage", "compression"), FORMS)
 @pytest.mark.parametrize("seed", range(12))
 def test_flipped_bytes_never_raise_anything_but_bag_errors(
-    tmp_path: Path, storage: str, compression: str, seed: int
+    tmp_path: Path, whole: Callable[..., Path], storage: str, compression: str, seed: int
 ) -> None:
-    folder = make.write(tmp_path / "run", make.steering(5.0), storage, compression)
+    folder = shutil.copytree(whole(5.0, storage, compression), tmp_path / "run")
     file = make.file_of(folder)
     data = bytearray(file.read_bytes())
     rng = random.Random(seed)
@@ -126,8 +139,8 @@ def test_overwritten_middle_of_a_checksummed_mcap(tmp_path: Path) -> None:
         assert [f.finding for f in bag.findings] == ["damaged_bag"]
 
 
-def test_overwritten_page_of_a_sqlite_file(tmp_path: Path, run: list[make.Message]) -> None:
-    folder = make.write(tmp_path / "run", run, "sqlite3")
+def test_overwritten_page_of_a_sqlite_file(tmp_path: Path, run: list[make.Message], whole: Callable[..., Path]) -> None:
+    folder = shutil.copytree(whole(60.0, "sqlite3", "none"), tmp_path / "run")
     file = make.file_of(folder)
     data = bytearray(file.read_bytes())
     page = len(data) // 2 // 4096 * 4096

@@ -19,7 +19,7 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
-from lugre_steering.diagnosis.laws.refine import free_law, with_law
+from lugre_steering.diagnosis.laws.refine import closed_forms, free_law, with_law
 from lugre_steering.diagnosis.laws.rival import in_place, keeps_names
 from lugre_steering.diagnosis.laws.screen import Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
@@ -155,6 +155,19 @@ def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> Non
     assert beside is not None
     assert beside.fit.effects[0][0].line == "main_a"
     assert not keeps_names(named(problem, line), beside, alone)
+
+
+def test_a_closed_form_is_found_where_the_data_show_only_a_part_of_the_pieces() -> None:
+    """A hinge, of which one direction of the pieces is not seen at all and rounding has made its variance negative."""
+    cell = Cell("gain", Axis("angle"), -0.5, 0.5)
+    places = np.linspace(-0.5, 0.5, 401)
+    pieces = np.linalg.lstsq(cell.basis(places), 0.2 * np.maximum(places - 0.1, 0.0), rcond=None)[0]
+    spread = np.append(np.geomspace(1e-2, 1e-11, pieces.size - 1), -1e-18)
+    for seed in range(10):
+        turned = np.linalg.qr(np.random.default_rng(seed).standard_normal((pieces.size, pieces.size)))[0]
+        _, form, _, values = min(closed_forms(cell, pieces, (turned * spread) @ turned.T), key=lambda found: found[0])
+        assert form == "hinge"
+        assert (values["at"], values["above"]) == (pytest.approx(0.1, abs=0.03), pytest.approx(0.2, rel=0.1))
 
 
 def test_nothing_hidden_gives_no_law() -> None:

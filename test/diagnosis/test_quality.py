@@ -9,23 +9,26 @@ fault was put in, the oracle of the calibration is the recording before the faul
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from remembering import remembered
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
+from lugre_steering.data import dataset, stamps
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import inspect
 from lugre_steering.data.wiring import SKEW_RANGE_S, as_well
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.proof import simulator
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder
@@ -59,6 +62,15 @@ def recording_of(bag: BagData) -> Recording:
     angle = {side: Signal(s.time, s.value) for side, s in zip(("left", "right"), bag.angles, strict=True)}
     pressure = {line: Signal(s.time, s.value) for line, s in zip(SHEET.lines, bag.pressures, strict=True)}
     return Recording(bag.manoeuvre, 0, angle, pressure)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _same_signal_once() -> Iterator[None]:
+    """Most faults touch one channel of the same recording: the others need no smoothing again."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in ((dataset, "smooth_angle"), (dataset, "sensed"), (stamps, "sampling_grid"), (simulator, "run_track")):
+            patch.setattr(module, name, remembered(getattr(module, name)))
+        yield
 
 
 @pytest.fixture(scope="module")

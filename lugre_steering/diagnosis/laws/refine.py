@@ -24,6 +24,8 @@ PULL = 0.03
 TRIED_FORMS = 3
 SHARE, MOST = 0.03, 1e4
 """Size of a law worth seeing, as a share of the torque amplitude, and how many times that it may have."""
+UNSEEN = 1e-10
+"""Share of the largest variance of a fit below which a direction of its values is one that the data do not show."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +127,9 @@ def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tup
     """
     places = np.linspace(cell.low, cell.high, laws.KNOTS)
     onto = np.linalg.pinv(cell.basis(places))
-    root = np.linalg.cholesky(np.linalg.pinv(covariance, rcond=1e-10) + 1e-12 * np.eye(len(coefficients)) / np.mean(np.diag(covariance))).T
+    spread, directions = np.linalg.eigh(covariance)
+    seen = spread > UNSEEN * spread.max()
+    root = (directions[:, seen] / np.sqrt(spread[seen])).T
     target, found = root @ coefficients, []
     for form, fixed, bends in VARIANTS:
         if cell.period and form != "sinusoid":

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Many tests look at the same runs of a simulator from different sides: each run is made once."""
+"""Many tests look at the same simulated runs and the same signals from different sides: what is expensive about them is done once."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import pickle
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
+
+import numpy as np
 
 KEPT = 64
 
@@ -21,8 +23,9 @@ def remembered(pure: Callable[..., Any]) -> Callable[..., Any]:
         key = hashlib.blake2b(pickle.dumps(arguments, protocol=5), digest_size=16).digest()
         if key not in kept:
             kept[key] = pure(*arguments)
-            for array in kept[key] if isinstance(kept[key], tuple) else (kept[key],):
-                array.flags.writeable = False
+            for part in kept[key] if isinstance(kept[key], tuple) else (kept[key],):
+                if isinstance(part, np.ndarray):
+                    part.flags.writeable = False
         kept.move_to_end(key)
         if len(kept) > KEPT:
             kept.popitem(last=False)
