@@ -667,4 +667,4 @@ def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
         replay([tmp_path / f"run_{seconds:.0f}"], VEHICLE, tmp_path / "out")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert peaks[1] < 1.05 * peaks[0]
+    assert peaks[1] < 1.1 * peaks[0]
