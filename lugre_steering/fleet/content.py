@@ -16,8 +16,8 @@ from lugre_steering.effects.registry import ORIGINS
 from lugre_steering.version import __version__
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_SHOWN = ("bench", "fleet", "live", "report")
-"""Rooms that only show or arrange what others compute."""
+_SHOWN = ("bench", "fleet", "live", "report", "config")
+"""Rooms that only show or arrange what others compute, and examples, which are beside the package until it is installed."""
 _STEP = 1 << 20
 
 State = list[list[Any]]
