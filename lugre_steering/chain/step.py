@@ -61,14 +61,19 @@ def _run(p, s, rubber, time, theta, omega, alpha, out, previous, effects):
 
 
 @njit(nogil=True, cache=True)
-def _torque(p, states, rubber, scratch, time, theta, omega, alpha, torque, first, last, effects):
+def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, previous, effects):
+    for i in range(time.size):
+        step(p[0], s[0], rubber, scratch[0], time[i] - previous, theta[i], omega[i], alpha[i], effects)
+        torque[i] = scratch[0].torque
+        previous = time[i]
+
+
+@njit(nogil=True, cache=True)
+def _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects):
+    previous = time[max(first - 1, 0)]
     for track in range(theta.shape[0]):
-        previous = time[max(first - 1, 0)]
-        for i in range(first, last):
-            dt, rate, acceleration = time[i] - previous, omega[track, i], alpha[track, i]
-            step(p[0], states[track], rubber, scratch[0], dt, theta[track, i], rate, acceleration, effects)
-            torque[i] += scratch[0].torque
-            previous = time[i]
+        here, motion = states[track : track + 1], (theta[track, first:last], omega[track, first:last], alpha[track, first:last])
+        _torque(p, here, rubber, scratch, time[first:last], *motion, torques[track, first:last], previous, effects)
 
 
 def new_parameters(composition: Composition) -> Records:
@@ -141,13 +146,13 @@ def torque_in_phases(
     before = phases[0][1]
     theta, omega, alpha = np.atleast_2d(theta, omega, alpha)
     time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))  # one compiled form
-    torque, state, scratch = np.zeros(time.size), new_state(before, len(theta)), np.zeros(1, OUTPUT)
+    torques, states, scratch = np.empty(theta.shape), new_state(before, len(theta)), np.zeros(1, OUTPUT)
     edges = [*np.searchsorted(time, [start for start, _ in phases]), time.size]
     for (_, p), effects, first, last in zip(phases, acting, edges, edges[1:], strict=False):
         if first == last:
             continue
         if first > 0:
-            state["air_temperature"] += p["air_temperature"] - before["air_temperature"]
+            states["air_temperature"] += p["air_temperature"] - before["air_temperature"]
         before = p
-        _torque(p, state, rubber, scratch, time, theta, omega, alpha, torque, first, last, effects)
-    return torque
+        _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects)
+    return np.asarray(torques.sum(axis=0))
