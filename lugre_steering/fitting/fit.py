@@ -304,7 +304,8 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
         at_low[wrong], at_high[wrong] = below[wrong], above[wrong]
         step = np.where(at_low, low, np.where(at_high, high, 0.0))
         free = ~(at_low | at_high)
-        step[free] = _solved(normal[np.ix_(free, free)], -(gradient + normal @ step)[free]) if free.any() else step[free]
+        if free.any():
+            step[free] = _solved(normal[np.ix_(free, free)], -(gradient + normal @ step)[free])
     return np.asarray(np.clip(step, low, high))
 
 

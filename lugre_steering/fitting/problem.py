@@ -211,7 +211,7 @@ class Problem:
         self.presliding = float(record["coulomb_torque"] / record["sigma_0"])
         self.size = size_of(vehicle, self.runs)
         self.standing = standing_effects(vehicle)
-        self._bent: tuple[bytes | None, Array] = None, np.zeros(self.measured.size)
+        self._last_bending: tuple[bytes | None, Array] = None, np.zeros(self.measured.size)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
     @property
@@ -262,6 +262,7 @@ class Problem:
         """The same with more bends, each of ``columns`` (n, k), whose size is known."""
         bent = copy(self)
         bent.bends = np.hstack([self.bends, *columns])
+        bent._last_bending = None, np.zeros(0)
         bent.shapes = int(bent.bends.shape[1] - self.bends.shape[1] + self.shapes)
         return bent
 
@@ -363,10 +364,10 @@ class Problem:
     def _bending(self, x: Array) -> Array:
         """Torque (n,) of the bends; kept, as it is the same for all bags and while a fit moves anything else."""
         sizes = x[self.first_bend : self.nuisances]
-        kept = self._bent
-        if kept[0] != sizes.tobytes():
-            self._bent = kept = sizes.tobytes(), self.bends @ sizes
-        return kept[1]
+        last = self._last_bending  # threads share it: read once, replaced whole
+        if last[0] != sizes.tobytes():
+            self._last_bending = last = sizes.tobytes(), self.bends @ sizes
+        return last[1]
 
     def _through_sensor(self, run: Run, candidate: Candidate, values: Values, torque: Array, start: float) -> Array:
         """Apply one sensor effect by its laws; errors of angles and arms act through the slopes and parts of the measured torque."""

@@ -310,9 +310,10 @@ def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator
         yield _suspect(problem, trial, result, key, factor), _surprise(trial, result)
     for name, cylinder in hydraulics.cylinders.items():
         turned = {name: replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)}
-        if least and not _could_be_better(problem, _changed(problem, turned), baseline):
+        trial = _changed(problem, turned)
+        if least and not _could_be_better(problem, trial, baseline):
             continue
-        trial, result = _refitted(problem, baseline, turned)
+        result = _fitted(trial, start=baseline.x)
         yield _suspect(problem, trial, result, f"hydraulics.cylinders.{name}.cap and .rod exchanged", None), _surprise(trial, result)
 
 
