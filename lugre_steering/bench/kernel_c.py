@@ -31,7 +31,7 @@ void run(long n, const double *time, const double *theta, const double *omega, c
         last_time = time[i];
         last_theta = theta[i];
 
-        double position = (temperature - p->table_low) / p->table_step;
+        double position = (temperature - p->table_low) * (1.0 / p->table_step);
         long row = position > 0.0 ? (long)position : 0;
         if (row > rows - 2) row = rows - 2;
         double weight = fmin(fmax(position - row, 0.0), 1.0);
@@ -48,14 +48,15 @@ void run(long n, const double *time, const double *theta, const double *omega, c
         double rate = omega[i] - speed * z_next * stiffness / g;
 
         double work = g * (fabs(d_theta) + copysign(1.0, d_theta) * (z - z_next)) + sigma_1 * omega[i] * (z_next - z);
-        double heat = fmax(work - 0.5 * stiffness * (z_next * z_next - z * z), 0.0) / p->heat_capacity;
+        double heat = fmax(work - 0.5 * stiffness * (z_next * z_next - z * z), 0.0);
         double k = 0.5 * p->cooling * dt / p->heat_capacity;
         if (k > 0.1) {
             double decay = exp(-2.0 * k);
             temperature = p->air_temperature + (temperature - p->air_temperature) * decay
-                          + heat * (1.0 - decay) / (2.0 * k);
+                          + heat / p->heat_capacity * (1.0 - decay) / (2.0 * k);
         } else {
-            temperature = (temperature * (1.0 - k) + 2.0 * k * p->air_temperature + heat) / (1.0 + k);
+            double share = 1.0 / (1.0 + k), warmth = 1.0 / p->heat_capacity;
+            temperature = temperature * ((1.0 - k) * share) + 2.0 * k * share * p->air_temperature + heat * (warmth * share);
         }
         z = z_next;
         torque[i] = stiffness * z_next + sigma_1 * rate + p->aligning_torque * sin(theta[i])

@@ -15,7 +15,7 @@ REST_RATE_RAD_S = 3e-4
 @law
 def ratios(rubber, low, step, temperature):
     """Stiffness and friction ratios at a temperature [degC], linear between rows, clamped (and told) outside."""
-    position = (temperature - low) / step
+    position = (temperature - low) * (1.0 / step)
     last = rubber.shape[0] - 2
     index = int(position) if position > 0.0 else 0
     if index > last:

@@ -12,9 +12,14 @@ LONG = 0.1
 
 @law
 def short_heat(temperature: float, energy: float, dt: float, capacity: float, cooling: float, air: float) -> float:
-    """``heat`` over an ordinary step: trapezoidal in the cooling."""
+    """``heat`` over an ordinary step: trapezoidal in the cooling.
+
+    (temperature (1 - k) + 2 k air + energy / capacity) / (1 + k), without dividing what the step before must have made:
+    the time of a step is that of its longest chain of operations.
+    """
     k = 0.5 * cooling * dt / capacity
-    return (temperature * (1.0 - k) + 2.0 * k * air + energy / capacity) / (1.0 + k)
+    share, warmth = 1.0 / (1.0 + k), 1.0 / capacity
+    return temperature * ((1.0 - k) * share) + 2.0 * k * share * air + energy * (warmth * share)
 
 
 @law

@@ -64,7 +64,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     drawn = faster * d_theta
     <contact> else:
         z_next = bristle(z, drawn, stiffness, g)
-        work = bristle_work(z, z_next, drawn, g) / faster
+        work = bristle_work(z, z_next, drawn, g) * (1.0 / faster)
         elastic = stiffness * z_next
     sigma_1 = p.damping_factor * math.sqrt(stiffness)
     damping = sigma_1 * (omega - abs(omega) * z_next * stiffness / g)

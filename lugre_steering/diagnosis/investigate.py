@@ -13,6 +13,7 @@ from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.search.search import search
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem, is_rig
@@ -77,7 +78,7 @@ def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) 
     """Baseline fitted with sheet noise first, then with the noise measured at that fit, on the split that suits its errors."""
     sheet = np.concatenate([run.sigma for run in problem.runs])
     weight = np.where(split(problem).fit, 1.0 / sheet, 0.0)
-    starts = [fit(problem, weight, linearisations=25), fit(problem, weight, robust=True, linearisations=25)]
+    starts = [fit(problem, weight, linearisations=25, robust=robust, tolerance=TRIAL_TOLERANCE) for robust in (False, True)]
     first = min((fit(problem, weight, start=start, linearisations=10) for start in starts), key=lambda f: f.cost)
     noise = noise_model(problem, first.x, (), repeated, seed=seed)
     roles = balanced(problem, ((problem.measured - first.prediction) / noise.sigma) ** 2 - 1.0)

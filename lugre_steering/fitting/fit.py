@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dger
 from scipy.linalg.lapack import dposv
 
 from lugre_steering.effects.entry import Parameter
@@ -24,6 +25,9 @@ ROBUST = 3.0
 STEPS, FORETOLD, FAR = 6, 0.5, 0.03
 """Most steps per linearisation, the share of the foretold fall that a step must bring for another one, and the relative fall of the
 cost per linearisation from which the next one is of effects alone."""
+WORTH, UNDAMPED = 0.5, 1e-5
+"""Fall of the cost, in doubts of the problem, that is worth no further step (what decides between models is ten doubts and more), and
+damping below which a step is as long as its linearisation would have it."""
 MOST_SETS, PATIENCE, ROUNDING = 5, 3, 1e-12
 """Sets of bounds tried per value, exchanges of many that may be in vain, and the share of its terms below which a slope is none."""
 
@@ -80,7 +84,7 @@ def fit(
 
     ``weight`` (n,) is 1 / sigma, zero where a sample must not be used. Priors of the calibration enter as extra residuals.
     ``start``: nuisances to begin at, or a fit whose nuisances and, as far as the same is fitted, linearisation are gone on with.
-    ``tolerance``: relative fall of the cost per step below which the fit ends; ``linearisations``: how often it may linearise
+    ``tolerance``: relative fall of the cost per step below which the fit ends, or WORTH; ``linearisations``: how often it may linearise
     anew before it ends anyhow; ``worth``: cost that must still be in reach at the present pace. ``robust`` bounds the influence of
     samples beyond ROBUST sigma (soft L1); ``priors`` off leaves it all to the data.
     """
@@ -167,8 +171,14 @@ class _Vector:
         return self.problem.predict_all(*self.values(p))
 
     def jacobian(self, p: Array, base: Array, first: int) -> Array:
-        """Change of the prediction (n, q - first) per unit of the values from ``first`` on, at p where it is ``base``."""
-        return np.asarray(np.column_stack(in_threads(lambda j: self._column(p, j, base), range(first, p.size))))
+        """Change of the prediction (n, q - first) per unit of the values from ``first`` on, at p where it is ``base``; by columns."""
+        made = np.empty((base.size, p.size - first), order="F")
+
+        def fill(j: int) -> None:
+            made[:, j - first] = self._column(p, j, base)
+
+        in_threads(fill, range(first, p.size))
+        return made
 
     def _column(self, p: Array, j: int, base: Array) -> Array:
         """One column by a forward (or, at the upper bound, backward) difference of 2 % of the scale."""
@@ -191,23 +201,23 @@ class _Vector:
 class _Descent:
     """Where a fit stands: vector ``p``, prediction ``base`` (n,), cost ``left``, weighted Jacobian ``slope`` (n, q).
 
-    ``settled``: no further fall is to be had, as a whole linearisation at this very place says.
+    ``settled``: no further fall is to be had, as a whole linearisation says from which steps have hardly brought any.
     """
 
     def __init__(self, vector: _Vector, weight: Array, robust: bool, p: Array, earlier: Fit | None) -> None:
         self.vector, self.weight, self.robust, self.p = vector, weight, robust, p
         self.base, self.damping, self.settled = vector.predict(p), 1e-3, False
         self.left = self._cost(p, self.base)
+        self.slope = np.empty((self.base.size, p.size), order="F")
         known = 0 if earlier is None else vector.known(earlier, weight)
         if earlier is None or not known:
             self.linearise(whole=True)
             return
-        self.slope = earlier.jacobian[:, :known] * vector.natural(p)[:known]
+        self.slope[:, :known] = earlier.jacobian[:, :known] * vector.natural(p)[:known]
         same = [dict(values) for _, values in vector.effects] == [values for _, values in earlier.effects]
         self._whole = earlier.settled and known == p.size and same
         if known < p.size:
-            further = vector.jacobian(p, self.base, known) * weight[:, None]
-            self.slope = np.hstack([self.slope, further])
+            np.multiply(vector.jacobian(p, self.base, known), weight[:, None], out=self.slope[:, known:])
         self.gram = self.slope.T @ self.slope
 
     def _cost(self, p: Array, predicted: Array) -> float:
@@ -216,16 +226,14 @@ class _Descent:
     def linearise(self, whole: bool) -> None:
         """The Jacobian anew, or only its columns of effects."""
         self._whole = whole or self.p.size == self.vector.nuisances
-        if self._whole:
-            self.slope = self.vector.jacobian(self.p, self.base, 0) * self.weight[:, None]
-        else:
-            first = self.vector.nuisances
-            self.slope[:, first:] = self.vector.jacobian(self.p, self.base, first) * self.weight[:, None]
+        first = 0 if self._whole else self.vector.nuisances
+        np.multiply(self.vector.jacobian(self.p, self.base, first), self.weight[:, None], out=self.slope[:, first:])
         self.gram = self.slope.T @ self.slope
 
     def advance(self, tolerance: float) -> None:
         """Steps as long as they do what the linearisation foretells, by more than ``tolerance`` of the cost."""
-        prior = self.vector.prior
+        prior, before = self.vector.prior, self.left
+        enough = max(tolerance * before, WORTH * self.vector.problem.doubt)
         for age in range(STEPS):
             error = (self.base - self.vector.problem.measured) * self.weight
             gram = self.gram
@@ -235,13 +243,13 @@ class _Descent:
             normal, gradient = gram + np.diag(prior**2), self.slope.T @ error + prior**2 * self.p
             trial, moved, fall = self._step(normal, gradient, exact=age == 0)
             if not fall > 0.0:
-                self.settled = self._whole and age == 0
+                self.settled = self._whole and before - self.left < enough
                 return
             change, secant = trial - self.p, (moved - self.base) * self.weight
             foretold = -(2.0 * gradient @ change + change @ normal @ change)
             self.p, self.base, self.left, self.damping = trial, moved, self.left - fall, max(self.damping / 6.0, 1e-9)
-            self.settled = self._whole and age == 0 and fall < tolerance * self.left
-            if fall < max(tolerance * self.left, FORETOLD * foretold):
+            self.settled = self._whole and before - self.left < enough
+            if fall < FORETOLD * foretold or (fall < enough and self.damping < UNDAMPED):
                 return
             self._correct(secant - self.slope @ change, change / (change @ change))
 
@@ -249,7 +257,7 @@ class _Descent:
         """Broyden's correction: what a step missed (n,), per unit along it (q,); the normal matrix follows."""
         cross = np.outer(self.slope.T @ missed, along)
         self.gram = self.gram + cross + cross.T + (missed @ missed) * np.outer(along, along)
-        self.slope += missed[:, None] * along
+        self.slope = dger(1.0, missed, along, a=self.slope, overwrite_a=True)
 
     def _step(self, normal: Array, gradient: Array, exact: bool) -> tuple[Array, Array, float]:
         """A step within bounds, the prediction there and the fall of the cost; an ``exact`` linearisation is worth ever shorter ones."""

@@ -20,7 +20,7 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
 from lugre_steering.diagnosis.laws.refine import closed_forms, free_law, with_law
-from lugre_steering.diagnosis.laws.rival import in_place, keeps_names
+from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names
 from lugre_steering.diagnosis.laws.screen import Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
@@ -49,7 +49,7 @@ def fitted(problem: Problem, *named: tuple[Candidate, dict[str, float]]) -> Fit:
 
 
 def in_what_is_left(problem: Problem, before: Fit) -> FoundLaws | None:
-    return find(problem, white(problem), split(problem), before, 1)
+    return find(named(problem, before), before, 1)
 
 
 def white(problem: Problem) -> Noise:
@@ -141,8 +141,9 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     (entry,) = entries(beside)
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert [law["title"] for law in described(beside)] == [entry.title]
-    assert not in_place(named(problem, viscous), alone, beside)
-    assert keeps_names(named(problem, viscous), beside, alone)
+    assert not in_place(named(problem, viscous), alone, beside)  # far truer than the law alone
+    assert leaves_names(named(problem, viscous), beside)
+    assert not keeps_names(named(problem, viscous), beside, alone)  # which nothing less would keep: the law alone is one part
     assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
 
 
@@ -154,6 +155,7 @@ def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> Non
     beside = in_what_is_left(problem, line)
     assert beside is not None
     assert beside.fit.effects[0][0].line == "main_a"
+    assert not leaves_names(named(problem, line), beside)
     assert not keeps_names(named(problem, line), beside, alone)
 
 

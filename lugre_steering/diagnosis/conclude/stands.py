@@ -13,7 +13,7 @@ from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
-from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names
+from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names, room_for_laws
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import LONGEST_S
 from lugre_steering.fitting.fit import Fit
@@ -88,16 +88,17 @@ def _tested(done: Finished, seed: int) -> _Tested:
 
 def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:
     """What remains of the names beside laws for what they leave over."""
-    problem, found, (named, clock, judged) = done.problem, done.found, tested
+    found, (named, clock, judged) = done.found, tested
     left = _left(done, named or clock)
     if not left.structured and not (named and done.needs_form):
         return Stands(named, clock, None, judged, left)
-    alone = find(problem, done.noise, done.roles, found.baseline, seed, progress)
+    rivals = not named or room_for_laws(done)
+    alone = find(done, found.baseline, seed, progress) if rivals else None
     if not named:
         return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
-    beside = find(problem, done.noise, done.roles, found.final, seed, progress) if left.structured else None
+    beside = find(done, found.final, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):
-        beside = beside or find(problem, done.noise, done.roles, found.final, seed, progress)
+        beside = beside or find(done, found.final, seed, progress)
         if beside is None or not keeps_names(done, beside, alone):
             nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
             return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)

@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.diagnosis.conclude import verify
+from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
 MOST_LAWS = 2
@@ -77,30 +76,28 @@ class FoundLaws:
         return max(excess(self.problem, self.fitted, held), OWN_ERROR)
 
 
-def find(
-    problem: Problem, noise: Noise, roles: Split, before: Fit, seed: int, progress: Callable[[str], None] = lambda _: None
-) -> FoundLaws | None:
-    """Laws in what a fit leaves over, with or without named effects; None where none stands."""
-    lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS, beside_names=bool(before.effects))
-    weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
-    every = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
+def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None] = lambda _: None) -> FoundLaws | None:
+    """Laws in what a fit leaves over, with or without named effects; None where none stands. Sought on the samples on which names are
+    compared, fitted and judged on all."""
+    there, problem = done.compared, _with_places(done.problem, before)
+    sought, roles, weight = _with_places(there.problem, before), there.roles, there.fitted
     samples = float(roles.fit.sum())
     gains: list[float] = []
     ties: tuple[Tried, ...] = ()
-    current, first_bar, ceiling = before, 0.0, 0.0
+    current, first_bar, ceiling = fit(sought, weight, before.effects, before.x), 0.0, 0.0
     for index in range(MOST_LAWS):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
-        screen = Screen(lawful, current, weight, roles, noise.draws, trace(lawful, current, place, axes_of(lawful)), seed)
+        screen = Screen(sought, current, weight, roles, there.noise.draws, trace(sought, current, place, axes_of(sought)), seed)
         screened = screen.search()
         least = max(bar(screened), OWN_ERROR * samples, SECOND * gains[0] if gains else 0.0)
         first_bar = first_bar or bar(screened)
         if screened[0].gain < least:
             ceiling = max(screened[0].gain, 0.0)
             break
-        tried = _tried(lawful, weight, current, screen, screened, place, progress)
+        tried = _tried(sought, weight, current, screen, screened, place, progress)
         best, gain = tried[0], current.cost - tried[0].fit.cost
-        if gain < least or _unseen(problem, best.fit, roles, noise) >= _unseen(problem, current, roles, noise):
+        if gain < least or _unseen(there, best.fit) >= _unseen(there, current):
             ceiling = max(gain, 0.0)
             break
         if not index:
@@ -110,17 +107,20 @@ def find(
     if not gains:
         return None
     progress("proving the law")
-    judged = verify.verify(lawful, every, before, current, roles, seed)
-    if not judged.interval[0] > 0.0:
-        return None
-    whole = fit(lawful, every, current.effects, current.x, linearisations=6)
-    return FoundLaws(lawful, current, whole, judged, tuple(gains), ties, first_bar, ceiling)
+    fitted, whole = (fit(problem, w, current.effects, current.x, linearisations=6) for w in (done.fitted, done.weight))
+    judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
+    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, ceiling) if judged.interval[0] > 0.0 else None
 
 
-def _unseen(problem: Problem, result: Fit, roles: Split, noise: Noise) -> float:
+def _with_places(problem: Problem, before: Fit) -> Problem:
+    """The problem with places for laws, beside names if there are any; without freedoms, which a vehicle file cannot hold."""
+    return Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS, beside_names=bool(before.effects))
+
+
+def _unseen(there: Finished, result: Fit) -> float:
     """Energy left of all valid samples that were not fitted, in noise variances: laws that cancel each other show there."""
-    unseen = problem.valid & ~roles.fit
-    return float(np.sum(((problem.measured - result.prediction)[unseen] / noise.sigma[unseen]) ** 2))
+    unseen = there.problem.valid & ~there.roles.fit
+    return float(np.sum(((there.problem.measured - result.prediction)[unseen] / there.noise.sigma[unseen]) ** 2))
 
 
 def _tried(

@@ -18,6 +18,13 @@ TRUER = 0.5
 """Share of what another model leaves beyond noise that one must leave at most to be far truer."""
 
 
+def room_for_laws(done: Finished) -> bool:
+    """Whether names leave so much that laws in their place could take clearly more than they do."""
+    there, named = done.compared, done.compared.found
+    rest = excess(there.problem, named.final, there.fitted)
+    return rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
+
+
 def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool:
     """Whether laws ``alone`` stand in place of the names: with clearly more evidence beside the freedoms, no worse in a vehicle file, and
     not far worse than the names with laws ``beside`` them."""
@@ -38,9 +45,10 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
 
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
-    """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them each is needed, and held-out data
-    are explained no worse."""
-    return beside.beyond(done.held) <= alone.beyond(done.held) and leaves_names(done, beside)
+    """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them there are no more parts than without
+    them, each name is needed, and held-out data are explained no worse."""
+    parts = beside.names + len(beside.gains)
+    return parts <= len(alone.gains) and beside.beyond(done.held) <= alone.beyond(done.held) and leaves_names(done, beside)
 
 
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:
