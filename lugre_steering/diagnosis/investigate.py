@@ -71,7 +71,8 @@ def _coarser(problem: Problem, baseline: Fit, most: int) -> tuple[Problem, IntAr
 def _unbent(problem: Problem, weight: Array, baseline: Fit) -> Fit:
     """The baseline with its freedoms; recalibration was bent to imitate what is missing, and from there the way back may be closed."""
     starts = [np.append(baseline.x, np.zeros(problem.bends.shape[1])), problem.start()]
-    return min((fit(problem, weight, start=start, linearisations=20) for start in starts), key=lambda each: each.cost)
+    fits = (fit(problem, weight, start=start, linearisations=20, tolerance=TRIAL_TOLERANCE) for start in starts)
+    return min(fits, key=lambda each: each.cost)
 
 
 def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:

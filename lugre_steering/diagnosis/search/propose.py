@@ -11,7 +11,7 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.diagnosis.search.fingerprint import Score
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial, ranked, refine, timed
+from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial, ranked, refine, timed, worth_of
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
@@ -71,10 +71,14 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
     for own in seen:
         best = own.before - own.trials[0].cost if own.trials else 0.0
         leading |= {trial.candidate.label: trial for trial in own.trials if own.before - trial.cost > LEADING * best}
-    trials = []
-    for trial in leading.values():
-        again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE)
-        trials.append(refine(problem, weight, replace(trial, fit=again, cost=again.cost)))
+    trials, best = list[Trial](), current.cost
+    for trial in sorted(leading.values(), key=lambda each: each.cost):
+        worth = worth_of(current.cost, best)
+        again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE, worth=worth)
+        trials.append(replace(trial, fit=again, cost=again.cost))
+        if again.cost <= worth:
+            trials[-1] = refine(problem, weight, trials[-1])
+        best = min(best, trials[-1].cost)
     return Proposal(problem, current, seen[0].scores, ranked(trials, current.cost))
 
 

@@ -66,7 +66,7 @@ class Round:
     @property
     def worth(self) -> float:
         """Cost that a trial must be able to reach to matter."""
-        return self.best + NEAR * (self.before - self.best)
+        return worth_of(self.before, self.best)
 
     def _joint(self, score: Score) -> Trial:
         if not _cornered(self.problem, self.current):
@@ -133,6 +133,11 @@ class Round:
         for _ in range(RETIMED if tried.since else 0):
             best = retime(self.problem, self.weight, best)
         return best
+
+
+def worth_of(before: float, best: float) -> float:
+    """Cost that a trial must be able to reach to matter beside the best one."""
+    return best + NEAR * (before - best)
 
 
 def _partial(score: Score) -> bool:
