@@ -53,13 +53,15 @@ class Physics(Protocol):
     def amplitudes(self) -> Sequence[str]: ...
     @property
     def per_line(self) -> bool: ...
+    @property
+    def sha256(self) -> str: ...
 
 
 @dataclass(frozen=True)
 class Hook:
     """A place in the chain: what is done there with the ``part`` of a law, and what the laws there may read.
 
-    ``given`` maps quantities to expressions of the step; those of ``EARLIER`` hooks are known as well.
+    ``given`` maps quantities to expressions of the step; those of earlier hooks of the step are known as well.
     """
 
     put: str
@@ -158,7 +160,8 @@ _kept: list[Physics] = []
 def _compose(effects: Sequence[Physics]) -> Composition:
     laws = {f"{effect.id}__{hook}": function for effect in effects for hook, function in effect.hooks.items()}
     text = _text(effects)
-    sources = [text, *(_source(function) for function in laws.values())]
+    # A law may use what its own text does not show, as constants and helpers of its file.
+    sources = [text, *(_source(function) for function in laws.values()), *(effect.sha256 for effect in effects)]
     name = f"composed_{hashlib.sha256(chr(0).join(sources).encode()).hexdigest()[:12]}"
     if name in _made:
         return _made[name]

@@ -15,7 +15,10 @@ import numpy as np
 from lugre_steering.recording import Array
 
 STAGES = ("motion", "contact", "thermal", "parallel_torque", "measurement")
-
+NEEDS = ("hydraulics", "rubber")
+"""Sections of the vehicle file that an effect may need."""
+RELATIVE_TO = ("max_angle", "slip", "duration")
+"""Properties of a recording [rad, rad, s] that a parameter may be relative to."""
 
 LOG_SCALE = 0.3
 
@@ -25,7 +28,7 @@ class Parameter:
     """One number of an effect. Amplitudes (no ``grid``) are neutral at zero; shapes are tried over a grid before the fit.
 
     ``scale`` is a typical size in the given unit, used for signatures and finite differences. ``relative_to`` multiplies grid
-    and scale by a property of the recording: 'max_angle' [rad], 'slip' [rad], 'duration' [s].
+    and scale by a property of the recording (RELATIVE_TO).
     """
 
     name: str
@@ -109,7 +112,7 @@ class Effect:
     memory: Mapping[str, float | str | tuple[float, ...]] = field(default_factory=dict)
     rivals: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    """Sections of the vehicle file without which it means nothing: 'hydraulics', 'rubber'."""
+    """Sections of the vehicle file without which it means nothing (NEEDS)."""
     not_recorded: str = ""
     """What the standard topics would lack to show it; such an effect is offered, never named."""
     per_line: bool = False
@@ -138,6 +141,8 @@ class Effect:
     """Rows of numbers that its laws read beside the parameters, with their lengths."""
     constants: Mapping[str, float | Array] = field(default_factory=dict)
     """What stands in its tables, and what its parameters are where nothing is given."""
+    sha256: str = ""
+    """Hash of the source that foreign physics comes from: code compiled of another one is not its own."""
 
     @property
     def observable(self) -> bool:

@@ -9,6 +9,7 @@ import hashlib
 import importlib.util
 import math
 import re
+import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -98,23 +99,28 @@ def read_effects(file: Path) -> tuple[list[Effect], str]:
         content = file.read_bytes()
     except OSError as error:
         raise EffectError(f"{file}: cannot be read: {error.strerror or error}; expected a .py or .yaml file of effects") from error
+    sha256 = hashlib.sha256(content).hexdigest()
     if file.suffix == ".py":
-        found = _of_module(_run(file), str(file))
+        found = _of_module(_run(file, sha256), str(file))
     elif file.suffix in (".yaml", ".yml"):
         found = _of_yaml(file)
     else:
         raise EffectError(f"{file}: got the ending '{file.suffix}', expected .py or .yaml")
-    return found, hashlib.sha256(content).hexdigest()
+    return found, sha256
 
 
-def _run(file: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"lugre_steering_own_{file.stem}", file)
+def _run(file: Path, sha256: str) -> ModuleType:
+    """The module of a user's file, under a name that tells its content: compiled code that is kept looks for it by that name."""
+    spec = importlib.util.spec_from_file_location(f"lugre_steering_own_{file.stem}_{sha256[:16]}", file)
     assert spec is not None
     assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    if spec.name in sys.modules:
+        return sys.modules[spec.name]
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever a user's own Python raises
+        del sys.modules[spec.name]
         raise EffectError(f"{file}: cannot be run: {type(error).__name__}: {error}") from error
     return module
 

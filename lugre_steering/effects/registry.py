@@ -5,12 +5,14 @@ packages offer (entry points ``lugre_steering.effects``), and what users add fro
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import hashlib
 import importlib
-import inspect
+import importlib.util
 import os
 import pkgutil
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
@@ -23,6 +25,7 @@ from lugre_steering.chain.compose import Composition, check, compose
 from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.step import new_parameters, run_side
 from lugre_steering.effects import own
+from lugre_steering.effects.declared import check_declared
 from lugre_steering.effects.entry import STAGES, Effect
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
@@ -102,12 +105,14 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
         if new.id in CATALOGUE:
             known = ORIGINS[new.id].source if new.id in ORIGINS else "lugre_steering itself"
             raise EffectError(f"{where}: effect '{new.id}': there is one of this name in {known}; expected another id")
+        foreign = dataclasses.replace(new, sha256=origin.sha256)
         try:
-            check(new)
-            _try(new)
+            check_declared(foreign, {*CATALOGUE, *(other.id for other in effects)})
+            check(foreign)
+            _try(foreign)
         except EffectError as error:
             raise EffectError(f"{where}: {error}") from error
-        CATALOGUE[new.id], ORIGINS[new.id] = new, origin
+        CATALOGUE[new.id], ORIGINS[new.id] = foreign, origin
     _sort()
 
 
@@ -131,11 +136,29 @@ def _try(new: Effect) -> None:
         phase = 3.0 * time
         theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))
         out = run_side(p, np.ones((2, 2)), np.asarray(time), theta, omega, alpha)
-    except Exception as error:  # Numba's errors are many and long; the last line says what it stumbled over
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-        raise EffectError(f"effect '{new.id}': its laws cannot be compiled: {lines[0] if lines else type(error).__name__}") from error
+    except Exception as error:  # Numba's errors are many and long
+        owed = "; a law returns its part, then every memory that it names" if new.memory else ""
+        raise EffectError(f"effect '{new.id}': its laws cannot be compiled: {_reason(error)}{owed}") from error
     if not all(np.isfinite(out[name]).all() for name in OUTPUT.names or ()):
         raise EffectError(f"effect '{new.id}': got torques that are no numbers at its typical size, expected finite ones")
+
+
+def _reason(error: Exception) -> str:
+    """What Numba stumbled over: it stands behind the last of the lines that say where in its own works that was."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    lines = [line.strip() for line in text.rpartition("Failed in nopython mode pipeline")[2].splitlines() if line.strip()]
+    telling = [line for line in lines if not line.startswith("(step:")]
+    return telling[0] if telling else type(error).__name__
+
+
+def _content(module: str) -> str:
+    """SHA-256 of all Python files of the package (or single file) that a module belongs to."""
+    spec = importlib.util.find_spec(module.partition(".")[0])
+    folders = [Path(folder) for folder in spec.submodule_search_locations or ()] if spec is not None else []
+    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
+    if not folders and spec is not None and spec.origin is not None:
+        files = [Path(spec.origin)]
+    return hashlib.sha256(b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)).hexdigest()
 
 
 def _add_installed() -> None:
@@ -146,11 +169,11 @@ def _add_installed() -> None:
         except Exception as error:  # whatever a foreign package raises
             raise EffectError(f"{where}: entry point '{entry.name}' cannot be loaded: {type(error).__name__}: {error}") from error
         effects = own.of_objects(found, f"{where}: entry point '{entry.name}'")
-        written = "".join(inspect.getsource(getattr(one, "py_func", one)) for each in effects for one in each.hooks.values())
-        _add(effects, Origin(where, hashlib.sha256(written.encode()).hexdigest()), where)
+        _add(effects, Origin(where, _content(entry.module)), where)
 
 
 for _effect in CATALOGUE.values():
+    check_declared(_effect, CATALOGUE)
     check(_effect)
 _sort()
 _add_installed()

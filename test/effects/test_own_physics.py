@@ -104,6 +104,82 @@ def test_a_memory_of_yaml_follows_its_update() -> None:
     assert steady < added[-1] / 400.0 < 1.1 * structure
 
 
+OWN_PYTHON = """
+from lugre_steering.effects import Effect, Parameter, law
+
+GAIN = 1.0
+
+@law
+def shape(theta):
+    return GAIN * theta
+
+def torque(stiffness, theta):
+    return stiffness * shape(theta)
+
+EFFECT = Effect(
+    id="own_spring", stage="parallel_torque", tier=2, title="own spring", equation="k theta", source="own", trace="a line",
+    coordinate="angle", parameters=(Parameter("stiffness", "N m/rad", "stiffness", 1e4),), hooks={"torque": torque},
+)
+"""
+
+
+def test_own_python_runs_as_it_stands_now(tmp_path: Path) -> None:
+    """A constant that only a helper of the law reads: what is compiled of it is kept between starts, and follows the file."""
+    file, sheet = tmp_path / "mine.py", f"""
+import numpy as np, sys
+from lugre_steering.chain.step import torque_side
+from lugre_steering.effects import registry
+from lugre_steering.vehicle import load
+from lugre_steering.vehicle.model import build_model
+
+registry.add_files([sys.argv[1]])
+model = build_model(load(r"{SHEET}"))
+p, time = model.parameters[0].copy(), np.arange(50) * 0.01
+still = np.zeros(50), np.zeros(50)
+plain = torque_side(p, model.rubber, time, np.full(50, 0.1), *still)
+p["own_spring_stiffness"] = 1000.0
+print(round((torque_side(p, model.rubber, time, np.full(50, 0.1), *still) - plain)[-1], 6), registry.ORIGINS["own_spring"].sha256)
+"""
+
+    def added(gain: str) -> list[str]:
+        file.write_text(OWN_PYTHON.replace("GAIN = 1.0", f"GAIN = {gain}"))
+        done = subprocess.run([sys.executable, "-c", sheet, str(file)], capture_output=True, text=True, check=True)
+        assert done.stderr == ""  # what was kept is not damaged
+        return done.stdout.split()
+
+    first, again, changed = added("1.0"), added("1.0"), added("3.0")
+    assert first == again
+    assert float(first[0]) == pytest.approx(100.0)
+    assert float(changed[0]) == pytest.approx(300.0)
+    assert changed[1] != first[1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('stage="parallel_torque"', 'stage="engine"', "stage: got 'engine'; expected one of contact"),
+        ("tier=2", 'tier=2, acts_by=("stifness",)', "acts_by: got 'stifness'; did you mean 'stiffness'"),
+        ("tier=2", 'tier=2, places=(("stiffness", "end"),)', "places: got 'end'"),
+        ("tier=2", 'tier=2, play="gap"', "play: got 'gap'"),
+        ("tier=2", 'tier=2, needs=("rubbr",)', "needs: got 'rubbr'; did you mean 'rubber'"),
+        ("tier=2", 'tier=2, rivals=("end_stopp",)', "rivals: got 'end_stopp'; did you mean 'end_stop'"),
+        ("tier=2", 'tier=2, memory={"wound": "sigma_O"}', "memory.wound: got 'sigma_O'; did you mean 'sigma_0'"),
+        ("tier=2", 'tier=2, constants={"table": 1.0}', "constants: got 'table'"),
+        ('"stiffness", 1e4)', '"stiffness", 1e4, relative_to="angle")', "relative_to: got 'angle'; did you mean 'max_angle'"),
+        ("hooks={", "hooks={} and {", "hooks: got none"),
+        ("* shape(theta)", "* shape(thta)", "name 'thta' is not defined"),
+        ("def torque(stiffness, theta):", "def torque(stiffness, theta, wound):", "every memory that it names"),
+    ],
+)
+def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, new: str, words: str) -> None:
+    text = OWN_PYTHON if "memory that" not in words else OWN_PYTHON.replace("tier=2", 'tier=2, memory={"wound": 0.0}')
+    assert old in text
+    (tmp_path / "mine.py").write_text(text.replace(old, new))
+    with pytest.raises(EffectError, match=words) as caught:
+        registry.add_files([tmp_path / "mine.py"])
+    assert len(str(caught.value).splitlines()) == 1
+
+
 @pytest.mark.usefixtures("catalogue")
 def test_physics_of_users_runs_live_as_in_replay() -> None:
     registry.add_files([RIPPLE])
@@ -118,6 +194,19 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
     path = os.pathsep.join([str(tmp_path / "site"), *filter(None, [os.environ.get("PYTHONPATH", "")])])
     told = run("effects", "centre_detent", "--check", "--json", PYTHONPATH=path)
     assert json.loads(told.stdout) == {"id": "centre_detent", "broken": []}, told.stderr
+    hidden = ("--effect", "centre_detent:hold=4000,width=0.02")
+    assert run("simulate", "double-cycle", *hidden, "--rate", "50", "--out", tmp_path, PYTHONPATH=path).returncode == 0
+    bag, augmented = tmp_path / "synthetic_double_cycle", tmp_path / "d" / "augmented.yaml"
+    done = run("diagnose", bag, "--vehicle", SHEET, "--out", tmp_path / "d", "--no-report", "--json", PYTHONPATH=path)
+    found = json.loads(done.stdout)
+    assert [effect["id"] for effect in found["effects"]] == ["centre_detent"]
+    assert found["effects"][0]["parameters"]["hold"]["value"] == pytest.approx(4000.0, rel=0.02)
+    lacking = run("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")
+    assert lacking.returncode == 2
+    assert "lugre-steering-example-physics" in lacking.stderr
+    code = tmp_path / "site" / "example_physics.py"
+    code.write_text(code.read_text().replace("0.5 * (1.0 - x * x)", "0.4 * (1.0 - x * x)"))
+    assert "others under the same name" in run("vehicle", augmented, PYTHONPATH=path).stderr
     assert "not in the catalogue" in run("effects", "centre_detent").stderr
 
 
