@@ -35,6 +35,8 @@ MARKS = {
 }
 """By kind of file, what stands near the beginning of every one that was written here."""
 _HEAD = 4096
+LONGEST_RECORD = 1 << 27
+"""Bytes of a result: one over many recordings has some kilobytes for each."""
 _LOCK = f".{MAKER}.lock"
 _TEMPORARY = re.compile(rf"\.{MAKER}_[0-9a-f]{{16}}")
 
@@ -294,7 +296,7 @@ def earlier_result(
 def read_record(file: Path, schema: str) -> dict[str, Any] | None:
     """The content of a JSON file of this ``schema``; None for anything else."""
     try:
-        content = json.loads(file.read_bytes())
+        content = json.loads(read_text(file, LONGEST_RECORD))
         return dict(content) if content["schema"] == schema else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None

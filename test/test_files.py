@@ -15,8 +15,17 @@ import pytest
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
-from lugre_steering.errors import DataError, LugreSteeringError, VehicleFileError
-from lugre_steering.files import is_ours, new_folder, output_folder, replacing, temporary_folder, write_text
+from lugre_steering.effects.own import read_effects
+from lugre_steering.errors import DataError, EffectError, LugreSteeringError, VehicleFileError
+from lugre_steering.files import (
+    is_ours,
+    new_folder,
+    output_folder,
+    read_record,
+    replacing,
+    temporary_folder,
+    write_text,
+)
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate.manoeuvres import from_yaml
 from lugre_steering.vehicle import load, save
@@ -234,6 +243,9 @@ def test_a_pipe_or_device_is_refused_at_once(tmp_path: Path) -> None:
     for file in (tmp_path / "pipe.yaml", Path("/dev/zero")):
         with pytest.raises(VehicleFileError, match="no regular file"):
             load(file)
+        with pytest.raises(EffectError, match="no regular file"):
+            read_effects(file)
+        assert read_record(file, "lugre_steering/summary/1") is None
     for table in ("/dev/zero", tmp_path / "pipe.yaml"):
         sheet = tmp_path / "sheet.yaml"
         sheet.write_text(SHEET.read_text().replace("rubber_dma_10hz.csv", str(table)))

@@ -29,7 +29,7 @@ from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
-from lugre_steering.live.plan import planned_angles
+from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.live.table import ParameterError, read_options
 from lugre_steering.recording import Kind
 from lugre_steering.replay.run import replay
@@ -253,12 +253,13 @@ def test_plans_take_effect_in_recorded_order(tmp_path: Path) -> None:
 
 def test_unusable_plans_are_counted(tmp_path: Path) -> None:
     topic, kind, log, data = command(make.T0, make.T0 + SECOND, [0.1])
-    bad = [command(make.T0, log, [np.nan]), (topic, kind, log + 1, data[:-4])]
+    bad = [command(make.T0, log, [np.nan]), (topic, kind, log + 1, data[:-4]), (topic, kind, log + 2, data + bytes(PLAN_BYTES))]
     bag = make.write(tmp_path / "run", sorted([*drive(), *bad], key=lambda row: row[2]))
     counts = replay([bag], VEHICLE, tmp_path / "out")["bags"][0]["samples"]["command"]
     assert counts["used"] == 0
-    assert sum(counts["rejected"].values()) == 2
+    assert sum(counts["rejected"].values()) == 3
     assert counts["rejected"]["malformed"] == 1
+    assert counts["rejected"][f"more than {PLAN_BYTES} bytes"] == 1
 
 
 def test_needs_no_ros(tmp_path: Path) -> None:

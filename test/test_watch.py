@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import io
 import math
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
 from lugre_steering.watch.detector import LEARN, SCORES, STATE, THRESHOLD, Watch, weigh
-from lugre_steering.watch.window import CAPACITY, Samples, read_window, write_window
+from lugre_steering.watch.window import CAPACITY, SAMPLE, Samples, read_window, write_window
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
 VEHICLE = load(FILE)
@@ -114,6 +116,17 @@ def test_bad_windows_are_refused_in_words(tmp_path: Path) -> None:
         file.write_bytes(content)
         with pytest.raises(DataError, match="damaged"):
             read_window(file, VEHICLE.channels)
+    with zipfile.ZipFile(io.BytesIO(whole)) as archive:
+        about = archive.read("about.npy")
+    claim = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        claim, {"descr": np.lib.format.dtype_to_descr(SAMPLE), "fortran_order": False, "shape": (10**12,)}
+    )
+    with zipfile.ZipFile(file, "w") as archive:  # more samples than any memory holds
+        archive.writestr("about.npy", about)
+        archive.writestr("samples.npy", claim.getvalue())
+    with pytest.raises(DataError, match="damaged"):
+        read_window(file, VEHICLE.channels)
     file.write_bytes(whole)
     with pytest.raises(DataError, match="expected"):
         read_window(file, load(FILE.with_name("single_joint_example.yaml")).channels)

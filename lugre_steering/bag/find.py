@@ -17,6 +17,7 @@ import yaml
 from lugre_steering import yaml_text
 from lugre_steering.bag.reader import SUFFIXES
 from lugre_steering.errors import BagError
+from lugre_steering.files import read_text
 from lugre_steering.recording import BagFinding
 
 REPLAYED = {"lugre_steering": "replay"}
@@ -95,7 +96,7 @@ def is_replayed(bag: Path) -> bool:
 def custom_data(bag: Path) -> Mapping[str, Any] | None:
     """What its writer has noted in the metadata of a bag; None where there is nothing to read."""
     try:
-        content: Any = yaml_text.parse((bag / _METADATA).read_text(encoding="utf-8"))
+        content: Any = yaml_text.parse(read_text(bag / _METADATA, yaml_text.LONGEST))
         noted = content["rosbag2_bagfile_information"]["custom_data"]
     except (OSError, ValueError, yaml.YAMLError, LookupError, TypeError):
         return None

@@ -19,6 +19,7 @@ from typing import Any
 
 import yaml
 
+from lugre_steering import yaml_text
 from lugre_steering.chain.compiled import exp, law
 from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
@@ -26,7 +27,7 @@ from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
 from lugre_steering.errors import EffectError
 from lugre_steering.expression import ExpressionError, parse
-from lugre_steering.files import write_text
+from lugre_steering.files import read_text, write_text
 from lugre_steering.schema import Reader
 
 PAIRED = ("wind_up", "contact")
@@ -96,10 +97,11 @@ class _Kept:
 def read_effects(file: Path) -> tuple[list[Effect], str]:
     """Effects of a user's file, and the SHA-256 of its content, by which vehicle files know it again."""
     try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise EffectError(f"{file}: cannot be read: {error.strerror or error}; expected a .py or .yaml file of effects") from error
-    sha256 = hashlib.sha256(content).hexdigest()
+        content = read_text(file, yaml_text.LONGEST)
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise EffectError(f"{file}: cannot be read: {why}; expected a .py or .yaml file of effects") from error
+    sha256 = hashlib.sha256(content.encode()).hexdigest()
     if file.suffix == ".py":
         found = _of_module(_run(file, sha256), str(file))
     elif file.suffix in (".yaml", ".yml"):

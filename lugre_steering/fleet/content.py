@@ -28,7 +28,8 @@ def files_of(bag: Path) -> list[Path]:
     """The files whose bytes are the recording."""
     if not bag.is_dir():
         return [bag]
-    return sorted(file for file in bag.iterdir() if file.name.endswith(SUFFIXES) or file.name == "metadata.yaml")
+    named = (file for file in bag.iterdir() if file.name.endswith(SUFFIXES) or file.name == "metadata.yaml")
+    return sorted(file for file in named if file.is_file())
 
 
 def state(bag: Path) -> State:

@@ -20,15 +20,12 @@ from trajectory_msgs.msg import JointTrajectory
 
 from lugre_steering.ackermann import other_track
 from lugre_steering.errors import DataError
-from lugre_steering.estimator import PLAN_POINTS
+from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.live.health import Health
-from lugre_steering.live.plan import planned_angles
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
 
 COMMAND = "steering/command"
-PLAN_BYTES = 512 * PLAN_POINTS
-"""Of a trajectory of as many points, with velocities, accelerations and efforts of 15 joints; a longer one is not even read."""
 PLAN_SHARE = 0.1
 PLAN_BURST_S = 0.02
 """Of the time so much, at most, goes into plans, and so much at once: what comes beyond is left out, and the next one is heard."""

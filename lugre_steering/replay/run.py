@@ -33,8 +33,8 @@ from lugre_steering.chain.step import Records
 from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError, ImplausibleWarning
 from lugre_steering.estimator import Estimator, Options
-from lugre_steering.files import is_ours, new_folder, output_folder, read_record, write_record
-from lugre_steering.live.plan import planned_angles
+from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
+from lugre_steering.files import is_ours, new_folder, output_folder, read_record, read_text, write_record
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
 from lugre_steering.pool import WorkerDiedError, in_processes
 from lugre_steering.provenance import Provenance
@@ -195,7 +195,7 @@ def _refuse_foreign(folder: Path) -> None:
     if not os.path.lexists(folder):
         return
     try:
-        content: Any = yaml_text.parse((folder / "metadata.yaml").read_text(encoding="utf-8"))
+        content: Any = yaml_text.parse(read_text(folder / "metadata.yaml", yaml_text.LONGEST))
         described = content["rosbag2_bagfile_information"]
         own = {"metadata.yaml", *described["relative_file_paths"]}
         ours = described["custom_data"] == REPLAYED
@@ -410,6 +410,9 @@ class Passage:
 
     def _plan(self, raw: bytes) -> None:
         latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
+        if len(raw) > PLAN_BYTES:
+            self._commands[f"more than {PLAN_BYTES} bytes"] += 1
+            return
         try:
             message = _types().deserialize_cdr(raw, TRAJECTORY)
         except Exception:  # flipped bytes may raise anything

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from lugre_steering.errors import DataError
+from lugre_steering.files import read_text
 from lugre_steering.recording import Array, Recording
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle import Axle, Vehicle
@@ -32,6 +33,8 @@ SMOOTHING_S = 0.2
 continuous."""
 SHORTEST_S, LONGEST_S = 0.05, 7200.0
 LARGEST_DEG = 60.0
+LONGEST_CSV = 1 << 28
+"""Bytes of a table of angles: two hours at the grid's rate have a few dozen million."""
 
 
 @dataclass(frozen=True)
@@ -313,8 +316,8 @@ def from_csv(file: Path, vehicle: Vehicle) -> Motion:
 
 def _csv_rows(file: Path) -> tuple[list[str], Array]:
     try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()  # spreadsheets put a byte order mark first
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_text(file, LONGEST_CSV).removeprefix("\ufeff").splitlines()  # spreadsheets put a byte order mark first
+    except (OSError, ValueError) as error:
         raise DataError(f"{file}: cannot be read: {error}") from error
     kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if len(kept) < 3:

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lugre_steering.errors import DataError
-from lugre_steering.estimator import PLAN_POINTS
+from lugre_steering.estimator.estimator import PLAN_POINTS
 from lugre_steering.recording import Array, IntArray
 
 if TYPE_CHECKING:  # replay reads the same messages without ROS
     from trajectory_msgs.msg import JointTrajectory
+
+PLAN_BYTES = 512 * PLAN_POINTS
+"""Of a trajectory of as many points, with velocities, accelerations and efforts of 15 joints; a longer one is not even read."""
 
 
 def planned_angles(message: JointTrajectory, joints: Sequence[str], latest_ns: int) -> tuple[IntArray, Array]:
