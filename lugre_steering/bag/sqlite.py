@@ -32,6 +32,7 @@ _JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"  # begins a journal, and en
 _STEPS, _STEPS_PER_BYTE = 10_000_000, 4  # of SQLite's machine for one query; a message takes some 15 and 60 bytes
 _STEPS_APART = 100_000
 _TEXT_LIMIT = 64 << 20  # bytes of all names, types and definitions
+_INDEX = "timestamp_idx"  # as rosbag2 names it
 _PIECE_BYTES = 8 << 20
 _PIECE_ROWS = 1_000  # twice as fast as 20 000: rows die before the garbage collector looks at them
 
@@ -43,7 +44,8 @@ class SqliteFile:
 
     def __init__(self, path: Path, number: Callable[[Connection], int], findings: list[Finding]) -> None:
         self.path, self._number, self.findings = path, number, findings
-        self._salvaged = False
+        self._salvaged = self._checked = False
+        self._order = "NOT INDEXED"  # how rows are found
         self._stack = ExitStack()
         try:
             self._open()
@@ -72,6 +74,8 @@ class SqliteFile:
         # Lets SQLite open a file that is shorter than its header says; nothing is ever written to it.
         self._db.execute("PRAGMA writable_schema=ON")
         self._index = self._read_topics()
+        if any(_text(row[1]) == _INDEX for row in self._execute("PRAGMA index_list(messages)")):
+            self._order = f"INDEXED BY {_INDEX}"
         if page and size < expected and self._opened == self.path:
             self._salvage(f"cut off after {size} of {expected} bytes", "truncated_bag")
 
@@ -167,19 +171,43 @@ class SqliteFile:
 
     def runs(self, wanted: set[int] | None) -> list[tuple[int, Iterator[Messages]]]:
         """(first log time, its messages in log order); ``wanted`` limits them to some connections."""
-        topics = [number for number, index in self._index.items() if wanted is None or index in wanted]
+        unwanted = [number for number, index in self._index.items() if not (wanted is None or index in wanted)]
+        self._check()
         try:
             (begin,) = self._execute("SELECT MIN(timestamp) FROM messages").fetchone()
         except sqlite3.DatabaseError:
             begin = 0  # unknown: reading will tell
-        return [(begin if isinstance(begin, int) else 0, self._pieces(topics))]
+        return [(begin if isinstance(begin, int) else 0, self._pieces(unwanted))]
 
-    def _pieces(self, topics: Sequence[int]) -> Iterator[Messages]:
+    def _check(self) -> None:
+        """Salvage what SQLite would leave out without an error: a damaged page of the tree hides those below it.
+
+        Rows found by their log time are also looked up in the table, so it is enough that there are as many of them.
+        """
+        if self._checked or self._salvaged:
+            return
+        self._checked = True
+        try:
+            if self._order == "NOT INDEXED":
+                (faults,) = self._execute("PRAGMA quick_check(1)").fetchone()
+                statement = "" if faults == b"ok" else _text(faults).removeprefix("*** in database main ***\n")
+            else:
+                # COUNT(*) would go through a tree whose branches meet again without counting steps.
+                held, found = (
+                    self._execute(f"SELECT COUNT(1) FROM messages {how}").fetchone()[0] for how in ("NOT INDEXED", self._order)
+                )
+                statement = "" if held == found else f"{found} of {held} rows can be found by their log time"
+        except sqlite3.DatabaseError as error:
+            statement = _text(error)
+        if statement:
+            self._salvage(f"damaged: {statement}", "damaged_bag")
+
+    def _pieces(self, unwanted: Sequence[int]) -> Iterator[Messages]:
         after: tuple[int, int] | None = None
         self._left_out = 0
         while True:
             try:
-                cursor = self._select(topics, after)
+                cursor = self._select(unwanted, after)
                 size = 100
                 while rows := cursor.fetchmany(size):
                     messages = self._columns(rows)
@@ -199,16 +227,19 @@ class SqliteFile:
             if finding not in self.findings:  # a bag may be read more than once
                 self.findings.append(finding)
 
-    def _select(self, topics: Sequence[int], after: tuple[int, int] | None) -> sqlite3.Cursor:
-        """Rows in log order, ``after`` some (timestamp, id); without the content of those that no message is as large as."""
+    def _select(self, unwanted: Sequence[int], after: tuple[int, int] | None) -> sqlite3.Cursor:
+        """Rows in log order, ``after`` some (timestamp, id); without the content of those that no message is as large as.
+
+        Rows of topics that are not known come as well, to be told.
+        """
         conditions: list[str] = []
-        if len(topics) < len(self._index):
-            conditions.append(f"topic_id IN ({','.join(map(str, topics))})")
+        if unwanted:
+            conditions.append(f"topic_id NOT IN ({','.join(map(str, unwanted))})")
         if after is not None:
             conditions.append("(timestamp, id) > (?, ?)")
         where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
         data = f"CASE WHEN typeof(data) = 'blob' AND length(data) <= {MESSAGE_LIMIT} THEN data END"
-        query = f"SELECT id, topic_id, timestamp, {data} FROM messages {where} ORDER BY timestamp, id"
+        query = f"SELECT id, topic_id, timestamp, {data} FROM messages {self._order} {where} ORDER BY timestamp, id"
         return self._execute(query, after or ())
 
     def _columns(self, rows: list[Row]) -> Messages:
@@ -237,7 +268,8 @@ class SqliteFile:
         )
         copy.executemany("INSERT OR IGNORE INTO messages VALUES(?, ?, ?, ?)", self._reachable_rows())
         copy.execute("COMMIT")
-        copy.execute("CREATE INDEX timestamp_idx ON messages(timestamp)")
+        copy.execute(f"CREATE INDEX {_INDEX} ON messages(timestamp)")
+        self._order = f"INDEXED BY {_INDEX}"
         count, first, last = copy.execute("SELECT COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages").fetchone()
         upto = f" up to t={(last - first) / 1e9:.3f} s" if count else ""
         copy.set_progress_handler(self._count_steps, _STEPS_APART)
@@ -259,7 +291,7 @@ def _is_log(file: Path) -> bool:
 
 
 _ALLOWED = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_PRAGMA}
-_FUNCTIONS = {"min", "length", "typeof"}
+_FUNCTIONS = {"count", "min", "length", "typeof"}
 
 
 def _authorise(action: int, _: str | None, name: str | None, __: str | None, view: str | None) -> int:

@@ -152,6 +152,42 @@ def test_overwritten_page_of_a_sqlite_file(tmp_path: Path, run: list[make.Messag
     assert "message_count" in findings
 
 
+@pytest.mark.parametrize("with_metadata", [True, False])
+@pytest.mark.parametrize(("kind", "indexed"), [(2, True), (10, True), (5, True), (5, False)])  # sqlite.org/fileformat2, 1.6
+def test_one_bit_in_the_tree_of_an_sqlite_bag_costs_nothing(
+    tmp_path: Path, run: list[make.Message], whole: Callable[..., Path], kind: int, indexed: bool, with_metadata: bool
+) -> None:
+    """SQLite leaves out without an error what lies below cells that an index page does not count; the rows are whole."""
+    folder = shutil.copytree(whole(60.0, "sqlite3", "none"), tmp_path / "run")
+    file = make.file_of(folder)
+    if not indexed:
+        with contextlib.closing(sqlite3.connect(file)) as db:
+            db.execute("DROP INDEX timestamp_idx")
+            db.execute("VACUUM")
+    if not with_metadata:
+        (folder / "metadata.yaml").unlink()
+    data = bytearray(file.read_bytes())
+    count = next(page + 3 for page in range(4096, len(data), 4096) if data[page] == kind and any(data[page + 3 : page + 5]))
+    cells = int.from_bytes(data[count : count + 2], "big")
+    data[count : count + 2] = (cells ^ 1 << cells.bit_length() - 1).to_bytes(2, "big")
+    file.write_bytes(data)
+    read, findings = sound(folder)
+    assert read == len(run)
+    assert sorted({*findings} - {"no_metadata"}) == ["damaged_bag"]
+
+
+def test_messages_whose_topic_is_lost_are_told_to_who_reads_some_topics(tmp_path: Path, whole: Callable[..., Path]) -> None:
+    folder = shutil.copytree(whole(5.0, "sqlite3", "none"), tmp_path / "run")
+    file = make.file_of(folder)
+    (folder / "metadata.yaml").unlink()
+    with contextlib.closing(sqlite3.connect(file)) as db:
+        db.execute("DELETE FROM topics WHERE name = ?", ("/" + make.LEFT.topic,))
+        db.commit()
+    said = [f.statement for f in read_recording(folder, [make.MAIN_A]).findings if f.finding == "damaged_bag"]
+    assert len(said) == 1
+    assert "500 rows are no messages (topic" in said[0]
+
+
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_empty_bag(tmp_path: Path, storage: str) -> None:
     empty = make.write(tmp_path / "run", [], storage)
