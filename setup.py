@@ -59,6 +59,7 @@ setup(
         "peers": ["scikit-learn>=1.3", "pysindy>=2.0", "gplearn>=0.4.2"],
         "test": [
             *DOCS,
+            "pandas>=2.0",
             "pytest>=7.4",
             "pytest-rerunfailures>=15.0",
             "pytest-xdist>=3.7",

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import sys
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -14,8 +16,18 @@ class _Room(ModuleType):
     """A package that is called like the function of its name in its ``library`` module, which is loaded only then."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return self._function(*arguments, **options)
+
+    @property
+    def _function(self) -> Callable[..., Any]:
         library = importlib.import_module(f"{self.__name__}.library")
-        return getattr(library, self.__name__.rpartition(".")[2])(*arguments, **options)
+        function: Callable[..., Any] = getattr(library, self.__name__.rpartition(".")[2])
+        return function
+
+    @property
+    def __signature__(self) -> inspect.Signature:
+        """As help and editors show it."""
+        return inspect.signature(self._function)
 
 
 def make_callable(room: str) -> None:

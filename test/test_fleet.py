@@ -30,7 +30,7 @@ from lugre_steering.fleet.result import Fleet
 from lugre_steering.fleet.run import run
 from lugre_steering.fleet.tables import KINDS
 from lugre_steering.fleet.vehicles import member_of, read_members
-from lugre_steering.fleet.work import Options
+from lugre_steering.fleet.work import Options, Task, process
 from lugre_steering.resources import config_folder
 from lugre_steering.schemas import schema_of
 
@@ -286,6 +286,13 @@ def test_a_dask_cluster_does_the_same_though_a_worker_is_killed(done: Path, runs
     assert missing_then[0] > 0  # in mid-run
     strip = {"seconds": None}
     assert [row | strip for row in table(tmp_path / "out", "scores")] == [row | strip for row in table(done, "scores")]
+
+
+def test_a_worker_without_the_physics_of_the_command_does_not_work(runs: Path, tmp_path: Path) -> None:
+    task = Task(runs / "run_0", "truck", VEHICLE, tmp_path, "1", QUICK, {"chain_ripple": "0" * 64})
+    with pytest.raises(LugreSteeringError, match=r"other physics of users \(none\) than this command \(chain_ripple\)"):
+        process(task)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="Dask is not installed")

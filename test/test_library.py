@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import json
 import re
 import shutil
@@ -61,6 +62,20 @@ def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
     assert [name for name in dir(ls) if not name.startswith("__")] == sorted(ls.__all__)
     with pytest.raises(AttributeError, match="no attribute 'replays'"):
         ls.replays  # noqa: B018
+
+
+def test_rooms_show_what_they_are_called_with() -> None:
+    assert list(inspect.signature(ls.replay).parameters) == ["data", "vehicle", "options"]
+    assert list(inspect.signature(ls.simulate).parameters)[:3] == ["what", "vehicle", "effects"]
+
+
+def test_one_file_or_effect_needs_no_list() -> None:
+    with pytest.raises(ls.LugreSteeringError, match=r"none\.yaml: cannot be read"):
+        ls.add_effects("none.yaml")
+    with pytest.raises(ls.LugreSteeringError, match=r"none\.py: cannot be read"):
+        ls.add_effects(Path("none.py"))
+    made = ls.simulate("double-cycle", effects="end_stop:engage_angle=0.3,stiffness=1e5", angle_rate_Hz=5.0)
+    assert list(made.effects) == ["end_stop"]
 
 
 def test_a_room_stays_callable_whatever_part_of_it_was_imported() -> None:

@@ -21,7 +21,7 @@ from lugre_steering import units
 from lugre_steering.data.dataset import GAP_S, angle_noise
 from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
 from lugre_steering.data.pieces import in_pieces
-from lugre_steering.data.sensing import worse_than_said
+from lugre_steering.data.sensing import FOURTH, worse_than_said
 from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring, span
 from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
@@ -54,8 +54,6 @@ PARKED = 0.02
 """Share of a presliding length that a track at rest may seem to move by angle noise."""
 LATE_S = 1.0
 """A channel that starts later or ends earlier than the others by more than this is missing there."""
-FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-"""Fourth difference: blind to motion and to pump ripple far below the sampling rate, sqrt(70) times white noise."""
 
 
 @dataclass(frozen=True)

@@ -87,9 +87,9 @@ def composed(ids: Iterable[str] | None = None, laws: int = 0) -> Composition:
     return compose([*(effect for effect in CATALOGUE.values() if effect.id in chosen), *map(slot, range(laws))])
 
 
-def add_files(files: Sequence[str | Path]) -> None:
-    """Add users' physics to the catalogue, here and in processes that are started from here."""
-    paths = [Path(file) for file in files]
+def add_files(files: str | Path | Sequence[str | Path]) -> None:
+    """Add users' physics (one file or several) to the catalogue, here and in processes that are started from here."""
+    paths = [Path(file) for file in ([files] if isinstance(files, (str, Path)) else files)]
     for file in paths:
         effects, sha256 = own.read_effects(file)
         _add(effects, Origin(file.name, sha256), str(file))

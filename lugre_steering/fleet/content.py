@@ -53,10 +53,14 @@ def digest_of(bag: Path) -> str:
     return whole.hexdigest()
 
 
+def foreign() -> dict[str, str]:
+    """SHA-256 of the users' physics that this process knows, by name."""
+    return {name: origin.sha256 for name, origin in ORIGINS.items()}
+
+
 def key_of(bag_sha256: str, vehicle_sha256: str, options: Mapping[str, Any]) -> str:
     """The name under which results of these inputs are kept, those of every version."""
-    foreign = {name: origin.sha256 for name, origin in ORIGINS.items()}
-    inputs = [bag_sha256, vehicle_sha256, dict(options), foreign]
+    inputs = [bag_sha256, vehicle_sha256, dict(options), foreign()]
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:40]
 
 

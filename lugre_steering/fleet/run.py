@@ -19,7 +19,7 @@ from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.fleet.changes import differences
 from lugre_steering.fleet.claims import BUDGET, Claim, by_vehicle, claims, shared, unusual
 from lugre_steering.fleet.cluster import on_cluster
-from lugre_steering.fleet.content import code_version
+from lugre_steering.fleet.content import code_version, foreign
 from lugre_steering.fleet.page import write_page
 from lugre_steering.fleet.result import PAGE, RECORD, SCHEMA, Fleet, VehicleSummary
 from lugre_steering.fleet.store import Store
@@ -97,7 +97,7 @@ def _sorted(bags: Sequence[Path], members: list[Member], store: Store) -> tuple[
         if known is not None:
             records.append(known)
         else:
-            tasks.append(Task(bag, member.name, member.file, store.folder, store.version, store.options))
+            tasks.append(Task(bag, member.name, member.file, store.folder, store.version, store.options, foreign()))
     return records, tasks
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -20,10 +20,11 @@ from lugre_steering.calibration.calibrate import check_motion
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.effects.registry import VARIABLE
 from lugre_steering.errors import BagError, DataError, ImplausibleWarning, LugreSteeringError
 from lugre_steering.files import read_record, write_record
 from lugre_steering.fitting.clocks import synchronised
-from lugre_steering.fleet.content import State, digest_of, key_of, state
+from lugre_steering.fleet.content import State, digest_of, foreign, key_of, state
 from lugre_steering.fleet.signed import Signed, signed
 from lugre_steering.recording import Recording
 from lugre_steering.replay.library import replay
@@ -48,7 +49,8 @@ class Options:
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker needs for one recording; ``store``: the folder of records, which all workers share."""
+    """What a worker needs for one recording; ``store``: the folder of records, which all workers share; ``physics``: SHA-256 of the
+    users' physics that it must know, by name."""
 
     bag: Path
     member: str
@@ -56,6 +58,7 @@ class Task:
     store: Path
     version: str
     options: Options
+    physics: Mapping[str, str]
 
 
 def record_file(store: Path, inputs: str, version: str) -> Path:
@@ -68,6 +71,12 @@ def process(task: Task) -> Record:
 
     A bag that changes meanwhile is told to, and nothing about it is kept.
     """
+    if task.physics != foreign():
+        here, wanted = (", ".join(known) or "none" for known in (foreign(), task.physics))
+        raise LugreSteeringError(
+            f"a worker knows other physics of users ({here}) than this command ({wanted}); start the workers with {VARIABLE} naming the "
+            "same files, or leave --scheduler out"
+        )
     begun = time.perf_counter()
     head: Record = {
         "schema": SCHEMA, "bag": str(task.bag), "member": task.member, "version": task.version, "options": asdict(task.options),

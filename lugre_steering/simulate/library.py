@@ -14,14 +14,14 @@ from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
 def simulate(
-    what: str | Path, vehicle: Vehicle | str | Path | None = None, *, effects: Sequence[str] = (), **sensing: float
+    what: str | Path, vehicle: Vehicle | str | Path | None = None, *, effects: str | Sequence[str] = (), **sensing: float
 ) -> Simulation:
     """Drive a manoeuvre and record it: no file is written before ``save``.
 
     ``what``: a built-in manoeuvre ('double-cycle'; ``lugre-steering simulate --list`` shows all), a YAML or CSV file, or a bag whose
     angles are driven; ``vehicle``: a vehicle or the path of its file, the shipped test vehicle if left out; ``effects``: physics to
-    add, each 'id:parameter=value,...' (SI); ``sensing``: ``angle_rate_Hz``, ``pressure_rate_Hz``, ``jitter_s``, ``angle_noise_deg``,
-    ``angle_resolution_deg``, ``pressure_noise_Pa``, ``pressure_resolution_Pa``, ``seed``.
+    add, each 'id:parameter=value,...' (SI), one or several; ``sensing``: ``angle_rate_Hz``, ``pressure_rate_Hz``, ``jitter_s``,
+    ``angle_noise_deg``, ``angle_resolution_deg``, ``pressure_noise_Pa``, ``pressure_resolution_Pa``, ``seed``.
     """
     model = load_vehicle(None) if vehicle is None else vehicle_of(vehicle)
-    return simulation(str(what), with_effects(model, list(effects)), sensing)
+    return simulation(str(what), with_effects(model, [effects] if isinstance(effects, str) else list(effects)), sensing)
