@@ -110,6 +110,53 @@ def test_faults_are_flagged_within_a_fifth_of_a_second(name: str, reason: str) -
     assert BEGIN_S <= t[told][0] <= BEGIN_S + 0.2
 
 
+def push_both(rate_Hz: int, reading: Fault, seconds: float = 9.0, lost: float = 0.0) -> tuple[Estimator, Records]:
+    """The estimator and its torques, of both sides at a rate, with a share of the messages lost."""
+    rng, estimator, rows = np.random.default_rng(1), Estimator(VEHICLE), []
+    for i in range(round(seconds * rate_Hz)):
+        t = i / rate_Hz
+        for side in (0, 1):
+            angle = reading(side, t, 0.3 * math.sin(0.7 * t)) + float(rng.normal(0.0, SIGMA))
+            if rng.random() >= lost:
+                rows += [row.copy() for row in estimator.push(side, T0 + round(t * 1e9), angle)[0]]
+    return estimator, np.array(rows)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 5])
+@pytest.mark.parametrize(
+    ("rate_Hz", "jump"), [(10, 1.1), (10, 1.9), (20, 0.6), (20, 1.0), (50, 0.35), (100, 0.11), (100, -0.19), (500, 0.03), (1000, 0.015)]
+)
+def test_a_jump_that_two_periods_would_allow_is_no_slip(rate_Hz: int, jump: float, samples: int) -> None:
+    """The joint may turn by 10 rad/s. Each of the two times that it is put at one reading leaves 5 sigma times 309 kN m/rad of torque."""
+    begin, end = 6.0, 6.0 + samples / rate_Hz
+    _, sound = push_both(rate_Hz, lambda _side, _t, angle: angle)
+    estimator, rows = push_both(
+        rate_Hz, lambda side, t, angle: angle + jump if side == 0 and begin - 1e-6 <= t < end - 1e-6 else angle
+    )
+    assert estimator.counters["angle/left"]["angle_jump"] == 2
+    _, i, j = np.intersect1d(rows["stamp_ns"], sound["stamp_ns"], return_indices=True)
+    after = seconds_of(rows)[i] > end + 1.5 / rate_Hz
+    assert np.abs(rows["total"][i] - sound["total"][j])[after].max() < 2 * 5 * SIGMA * 309e3 + 0.005 * FRICTION_NM
+    assert np.abs(rows["temperature"][i] - sound["temperature"][j]).max() < 0.1
+
+
+@pytest.mark.parametrize(("rate_Hz", "spike"), [(20, 0.6), (20, -0.9), (100, 0.11), (100, -0.19), (1000, 0.015)])
+def test_single_spikes_are_no_jump(rate_Hz: int, spike: float) -> None:
+    estimator, _ = push_both(rate_Hz, lambda side, t, angle: angle + spike * (side == 0 and round(t * rate_Hz) % rate_Hz == 5))
+    left = estimator.counters["angle/left"]
+    assert left["spike"] == 9
+    assert "angle_jump" not in left
+
+
+@pytest.mark.parametrize("rate_Hz", [10, 20, 100, 1000])
+@pytest.mark.parametrize("lost", [0.0, 0.4])
+def test_fast_motion_is_no_jump_though_messages_are_lost(rate_Hz: int, lost: float) -> None:
+    """Up to 9 of the 10 rad/s that a joint may turn by."""
+    estimator, _ = push_both(rate_Hz, lambda _side, t, _angle: 0.9 * math.sin(10.0 * t), 5.0, lost)
+    for side in ("left", "right"):
+        assert not {"spike", "angle_jump"} & set(estimator.counters[f"angle/{side}"])
+
+
 def test_noise_beyond_the_sheet_is_told_and_does_not_turn_into_slip() -> None:
     rng = np.random.default_rng(2)
     _, rows = drive(during(6.0, 10.0, lambda _s, _t, angle: angle + float(rng.normal(0.0, math.radians(1.0)))))

@@ -154,19 +154,38 @@ def _jump_in_time(core, k, stamp_ns, value, follows_suspect):
 
 
 @inner
-def _reach(c, ch, stamp_ns):
-    """How far [rad] the reading of a joint can change since the last one."""
-    return c.max_rate * (stamp_ns - ch.last_ns) * 1e-9 + 10.0 * c.angle_noise
+def _reach(c, time_ns):
+    """How far [rad] the reading of a joint can change in a time."""
+    return c.max_rate * time_ns * 1e-9 + 10.0 * c.angle_noise
+
+
+@inner
+def _goes_with_suspect(core, ch, stamp_ns, value):
+    """Whether an angle that follows a suspect one goes on from that, rather than from the last accepted one.
+
+    The time of the suspect allows the joint no more way: else a jump could pass as motion at its second sample.
+    """
+    c, change = core.config[0], value - ch.last_value
+    since_ns, suspect_since_ns = stamp_ns - ch.last_ns, stamp_ns - ch.suspect_ns
+    lead_ns = ch.suspect_ns - ch.last_ns
+    if lead_ns <= 0 or abs(ch.suspect_value - ch.last_value) <= _reach(c, lead_ns):
+        return False  # suspect for its stamp alone
+    omega = core.motion[ch.index].omega
+    from_suspect = abs(value - ch.suspect_value - omega * suspect_since_ns * 1e-9)
+    if from_suspect < abs(change - omega * since_ns * 1e-9):
+        return True
+    return abs(change) > _reach(c, suspect_since_ns) and not reachable(core, ch.index, ch.last_ns, stamp_ns, change)
 
 
 @inner
 def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
     """What an angle means that the joint cannot have reached: refused, a new beginning, a confirmed jump; else ``_GOES_ON``."""
     c = core.config[0]
-    reach = _reach(c, ch, stamp_ns)
+    reach = _reach(c, stamp_ns - ch.last_ns)
     change = value - ch.last_value
     # After absurd readings the next ones are no better than they: the angle is believed where it can have gone.
     strayed = core.guard[ch.index].absurd and not reachable(core, ch.index, ch.last_ns, stamp_ns, change)
+    strayed = strayed or (follows_suspect and _goes_with_suspect(core, ch, stamp_ns, value))
     if not strayed and abs(change) <= reach:
         return _GOES_ON
     near = follows_suspect and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
@@ -199,7 +218,7 @@ def admit(core, k, stamp_ns, value):
         verdict = _jump_in_time(core, k, stamp_ns, value, follows_suspect)
     # Only what may be a jump is worth the call: to hand over the whole core costs 0.1 us.
     if verdict == _GOES_ON and ch.kind == Kind.ANGLE and (
-        core.guard[ch.index].absurd or abs(value - ch.last_value) > _reach(c, ch, stamp_ns)
+        follows_suspect or core.guard[ch.index].absurd or abs(value - ch.last_value) > _reach(c, ahead)
     ):
         verdict = _jump_of_angle(core, ch, stamp_ns, value, follows_suspect)
     if verdict != _GOES_ON:
