@@ -20,6 +20,8 @@ from lugre_steering.vehicle.size import angle_unit
 
 MAX_RATE_HZ = 125.0
 GAP_S = 0.25
+TURNED_RAD = 1e-4
+"""Step of the derivative of arms by the angle."""
 BRIDGED_S = 0.05
 """Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
@@ -77,12 +79,6 @@ def motion(time: Array, theta: Array) -> tuple[Array, Array]:
     return omega, alpha
 
 
-def angle_noise(vehicle: Vehicle) -> float:
-    """Standard deviation of one angle sample [rad], quantisation included."""
-    sensors = vehicle.sensors
-    return float(np.radians(np.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / np.sqrt(12.0))))
-
-
 def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     """Common clock, smoothed angles, measured torque. Raises DataError when a needed channel is missing or too short."""
     signals = {f"angle/{side}": recording.angle.get(side) for side in vehicle.sides}
@@ -100,14 +96,14 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     time, valid = _clock(recording.name, present)
     seen = {name: _on_clock(time, signal, sensed(signal)) for name, signal in present.items()}
     worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
-    angle = worst if worst.sigma() > angle_noise(vehicle) else Sensing(angle_noise(vehicle), 0.0)
+    angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else Sensing(vehicle.sensors.angle_sigma, 0.0)
     theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), angle.sigma()) for side in vehicle.sides])
     omega, alpha = motion(time, theta)
     rounding = np.zeros(0)
     if vehicle.hydraulics is not None:
         gains = line_gains(vehicle, theta)
         pressure = np.array([_at(time, present[f"pressure/{line}"]) for line in lines]) - gauge_offset(vehicle)
-        turned = line_gains(vehicle, theta + 1e-4)
+        turned = line_gains(vehicle, theta + TURNED_RAD)
         sensors = [seen[f"pressure/{line}"] for line in lines]
         noise = np.array([max(vehicle.sensors.pressure_noise_Pa, sensor.sigma()) for sensor in sensors])
         sigma = np.sqrt(((gains.sum(axis=0) * noise[:, None]) ** 2).sum(axis=0))
@@ -118,8 +114,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
         pressure = _at(time, present["measured_torque"])[None, :]
         sigma = np.full(time.size, max(vehicle.torque_sensor.noise_Nm, seen["measured_torque"].sigma()))
-    side_torque = np.einsum("slt,lt->st", gains, pressure)
-    side_slope = np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure)
+    side_torque, side_slope = _of_sides(gains, turned, pressure)
     measured = side_torque.sum(axis=0)
     if float(np.ptp(measured)) <= 1e-9 * float(np.abs(measured).max()):
         raise DataError(
@@ -150,12 +145,15 @@ def _air(recorded: Signal | None, vehicle: Vehicle) -> tuple[tuple[float, float]
 
 def with_hydraulics(run: Run, vehicle: Vehicle) -> Run:
     """The run as the cylinders of another vehicle would show it: same motion, same pressures."""
-    gains, turned = line_gains(vehicle, run.theta), line_gains(vehicle, run.theta + 1e-4)
-    side_torque = np.einsum("slt,lt->st", gains, run.pressure)
-    return replace(
-        run, gains=gains, side_torque=side_torque, side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, run.pressure),
-        measured=side_torque.sum(axis=0),
-    )  # fmt: skip
+    gains, turned = line_gains(vehicle, run.theta), line_gains(vehicle, run.theta + TURNED_RAD)
+    side_torque, side_slope = _of_sides(gains, turned, run.pressure)
+    return replace(run, gains=gains, side_torque=side_torque, side_slope=side_slope, measured=side_torque.sum(axis=0))
+
+
+def _of_sides(gains: Array, turned: Array, pressure: Array) -> tuple[Array, Array]:
+    """Torque of each side (sides, n) [N m] by its gains (sides, lines, n), and its slope [N m/rad] by those of angles turned a little."""
+    slopes = (turned - gains) / TURNED_RAD
+    return np.einsum("slt,lt->st", gains, pressure), np.einsum("slt,lt->st", slopes, pressure)
 
 
 def _first_air(recorded: Signal | None) -> float | None:
@@ -168,16 +166,16 @@ def _first_air(recorded: Signal | None) -> float | None:
 def ideal_run(vehicle: Vehicle, name: str, time: Array, theta: Array, rates: tuple[Array, Array], torque: Array, sigma: float) -> Run:
     """A run (n samples) whose perfect sensors see ``torque`` at ``theta`` (sides, n); ``rates``: its first two derivatives."""
     if vehicle.hydraulics is not None:
-        gains, turned = line_gains(vehicle, theta), line_gains(vehicle, theta + 1e-4)
+        gains, turned = line_gains(vehicle, theta), line_gains(vehicle, theta + TURNED_RAD)
         pressure = line_pressures(torque, total_gains(vehicle, theta))
     else:
         gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
         pressure = torque[None, :]
     omega, alpha = rates
+    side_torque, side_slope = _of_sides(gains, turned, pressure)
     return Run(
         name=name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
-        side_torque=np.einsum("slt,lt->st", gains, pressure),
-        side_slope=np.einsum("slt,lt->st", (turned - gains) / 1e-4, pressure),
+        side_torque=side_torque, side_slope=side_slope,
         measured=torque, sigma=np.full(time.size, sigma), valid=np.ones(time.size, bool),
     )  # fmt: skip
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
-from lugre_steering.data.dataset import GAP_S, angle_noise
+from lugre_steering.data.dataset import GAP_S
 from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.sensing import FOURTH, worse_than_said
@@ -201,7 +201,7 @@ def _rejected(recording: Recording, vehicle: Vehicle) -> list[Finding]:
 def _sheet_noise(vehicle: Vehicle, channel: Channel) -> float:
     """Standard deviation of one sample as the vehicle file says, in the channel's unit."""
     if channel.kind is Kind.ANGLE:
-        return angle_noise(vehicle)
+        return vehicle.sensors.angle_sigma
     if channel.kind is Kind.TORQUE and vehicle.torque_sensor is not None:
         return vehicle.torque_sensor.noise_Nm
     return vehicle.sensors.pressure_noise_Pa

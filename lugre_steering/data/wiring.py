@@ -21,7 +21,7 @@ from scipy.stats import theilslopes
 
 from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.step import torque_side
-from lugre_steering.data.dataset import Run, angle_noise, prepare
+from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
@@ -138,7 +138,7 @@ def _telling(piece: Recording, vehicle: Vehicle) -> Run | None:
         run = prepare(piece, vehicle)
     except DataError:
         return None
-    if float(np.ptp(run.theta, axis=1).max()) < 40.0 * angle_noise(vehicle) or run.valid.sum() < 20:
+    if float(np.ptp(run.theta, axis=1).max()) < 40.0 * vehicle.sensors.angle_sigma or run.valid.sum() < 20:
         return None
     total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
     return None if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))) else run

@@ -20,7 +20,7 @@ from scipy.optimize import nnls
 from scipy.signal import butter, sosfiltfilt
 
 from lugre_steering.chain.baseline import REST_RATE_RAD_S
-from lugre_steering.data.dataset import Run, angle_noise, motion
+from lugre_steering.data.dataset import Run, motion
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.recording import Array
@@ -194,7 +194,7 @@ def repeated_motion(problem: Problem, draws: int, seed: int) -> list[list[Run]]:
         rng, run = np.random.default_rng([seed, bag]), problem.runs[bag]
         # One sensor for both tracks makes one error.
         sensors = 1 if problem.vehicle.sensors.angle_from else len(run.theta)
-        sigma = run.angle.sigma() or angle_noise(problem.vehicle)
+        sigma = run.angle.sigma() or problem.vehicle.sensors.angle_sigma
         repeated = []
         for _ in range(draws):
             noisy = _sensed_again(run, sigma, rng, sensors)

@@ -373,9 +373,7 @@ def from_recording(recording: Recording, vehicle: Vehicle) -> Motion:
 def _quiet(angle: Array, vehicle: Vehicle) -> Array:
     """Recorded angles with a parked joint truly at rest: noise below four standard deviations is no motion (play
     operator)."""
-    sensors = vehicle.sensors
-    sigma = math.radians(math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0)))
-    return np.array(_play(angle.tolist(), 4.0 * sigma))
+    return np.array(_play(angle.tolist(), 4.0 * vehicle.sensors.angle_sigma))
 
 
 def _play(values: Sequence[float], half_width: float) -> list[float]:

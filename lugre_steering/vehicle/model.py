@@ -97,10 +97,7 @@ def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:
         values["aligning_torque"] = values.get("aligning_torque", 0.0) + vehicle.gravity.sin_Nm
     values["torque_unit"] = decade(values["coulomb_torque"], FRICTION_NM)
     values["angle_unit"] = angle_unit(vehicle)
-    sensors = vehicle.sensors
-    values["angle_noise"] = math.radians(
-        math.hypot(sensors.angle_noise_deg, sensors.angle_resolution_deg / math.sqrt(12.0))
-    )
+    values["angle_noise"] = vehicle.sensors.angle_sigma
     return values
 
 

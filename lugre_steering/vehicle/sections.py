@@ -9,6 +9,7 @@ possible and yet unlike any real vehicle is the business of ``plausible.py``.
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -254,6 +255,11 @@ class Sensors:
     """True over shown pressure; fitted by `calibrate --free pressure_gain`."""
     angle_from: str | None = None
     """The only side with an angle sensor; the other follows from Ackermann geometry."""
+
+    @property
+    def angle_sigma(self) -> float:
+        """Standard deviation of one angle sample [rad], quantisation included."""
+        return math.radians(math.hypot(self.angle_noise_deg, self.angle_resolution_deg / math.sqrt(12.0)))
 
 
 @dataclass(frozen=True)

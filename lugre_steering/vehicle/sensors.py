@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the sensors of a vehicle make of it, by the laws of the effects in its file; the same for live node, fit and simulator."""
+"""What the sensors of a vehicle make of it, by the laws of the effects in its file: for the simulator, and for the check of wiring."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.chain.compiled import njit
 from lugre_steering.chain.rates import MOTION, follow
-from lugre_steering.data.dataset import Run, _at, angle_noise
+from lugre_steering.data.dataset import Run, _at
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -44,5 +44,5 @@ def _causal(vehicle: Vehicle, recording: Recording, side: str, time: Array) -> A
     angle, rate = recording.angle[side], recording.rate.get(side)
     given = np.full(angle.time_s.size, np.nan) if rate is None else np.interp(angle.time_s, rate.time_s, rate.value)
     state, motion = np.zeros(1, MOTION), np.zeros((3, angle.time_s.size))
-    _follow_all(state[0], angle.time_s, angle.value, given, angle_noise(vehicle), motion)
+    _follow_all(state[0], angle.time_s, angle.value, given, vehicle.sensors.angle_sigma, motion)
     return np.array([_at(time, Signal(angle.time_s, row)) for row in motion])
