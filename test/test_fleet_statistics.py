@@ -117,6 +117,13 @@ def fleet_of_two(days: int = 25) -> list[dict]:
     return [*first, *second]
 
 
+def test_a_claim_keeps_what_its_recording_cannot_tell_it_from() -> None:
+    size = {"offset": {"value": 2e4, "ci95": [1e4, 3e4], "unit": "Pa"}}
+    effect = {"id": "pressure_offset", "p_value": 1e-9, "parameters": size, "indistinguishable_from": ["slope_bias", "direction_asymmetry"]}
+    (claim,) = claims([record("A", 1, {}, effects=[effect])])
+    assert claim.rivals == "slope_bias, direction_asymmetry"
+
+
 def test_what_is_too_weak_in_each_and_present_in_all_is_found() -> None:
     found = [claim for claim in claims(fleet_of_two()) if claim.stands]
     joint = [(claim.vehicle, claim.effect) for claim in found if claim.kind == "joint"]

@@ -37,7 +37,7 @@ class Claim:
 
     ``value`` with its 95 % interval and standard error in ``unit``; ``since``: date (ISO) of the recording, or of the first one
     after a change; ``leads``: the strongest of the effects that its vehicle shows jointly; ``named_in``: how many of ``recordings``
-    have a diagnosis of their own that names the effect.
+    have a diagnosis of their own that names the effect; ``rivals``: names that such a diagnosis cannot tell it from, comma between.
     """
 
     kind: Kind
@@ -56,6 +56,7 @@ class Claim:
     since: str | None = None
     leads: bool = False
     error: float | None = None
+    rivals: str = ""
 
     @property
     def stands(self) -> bool:
@@ -123,9 +124,10 @@ def _named(vehicle: str, record: Record) -> Iterator[Claim]:
     for effect in record["effects"]:
         name, fitted = next(iter(effect["parameters"].items()), ("", _NO_VALUE))
         low, high = fitted["ci95"]
-        value, unit, p = fitted["value"], fitted["unit"], effect["p_value"]
-        when = record["recorded"]
-        yield Claim("recording", vehicle, record["bag"], effect["id"], name, value, low, high, unit, p, named_in=1, since=when)
+        yield Claim(
+            "recording", vehicle, record["bag"], effect["id"], name, fitted["value"], low, high, fitted["unit"], effect["p_value"],
+            named_in=1, since=record["recorded"], rivals=", ".join(effect["indistinguishable_from"]),
+        )  # fmt: skip
 
 
 Estimates = Mapping[tuple[str, int], list[tuple[Record, Mapping[str, Any]]]]

@@ -43,7 +43,7 @@ def _standing(result: Mapping[str, Any], vehicle: str) -> str:
         if claim["vehicle"] != vehicle:
             continue
         if claim["leads"] or claim["kind"] == "recording":
-            told.append(claim["effect"])
+            told.append(claim["effect"] + (f" (or {claim['rivals']})" if claim["rivals"] else ""))
         elif claim["kind"] == "since":
             told.append(f"{claim['effect']} since {claim['since'][:10]}")
         elif claim["kind"].startswith("trend"):

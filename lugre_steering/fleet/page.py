@@ -54,7 +54,7 @@ def _verdict(fleet: Fleet) -> tuple[Tone, str, str]:
     having = {claim.vehicle: claim for claim in reversed(fleet.claims) if claim.leads or claim.kind == "recording"}
     alone = [claim for claim in fleet.claims if claim.leads and not claim.named_in]
     if having:
-        what = [f"{_title(claim)} on {vehicle}" for vehicle, claim in sorted(having.items())]
+        what = [f"{_title(claim)}{_rivals(claim)} on {vehicle}" for vehicle, claim in sorted(having.items())]
         more = f", and {len(what) - MOST_VEHICLES} vehicles more" if len(what) > MOST_VEHICLES else ""
         weak = ", ".join(sorted({_title(claim) for claim in alone}))
         joint = f" Too weak for any single recording, and seen in all together: {weak}." if weak else ""
@@ -83,6 +83,12 @@ def _title(claim: Claim) -> str:
     return (CATALOGUE[name].title if name in CATALOGUE else name) + (f" ({line})" if line else "")
 
 
+def _rivals(claim: Claim) -> str:
+    """What it may be as well."""
+    names = [CATALOGUE[name].title if name in CATALOGUE else name for name in claim.rivals.split(", ") if name]
+    return f" (or, not to be told apart: {', '.join(names)})" if names else ""
+
+
 def _limited(header: Sequence[str], rows: Sequence[Row | Sequence[str]], numeric: Sequence[int], file: str) -> str:
     """A table of the first rows, and where the others are."""
     if not rows:
@@ -103,8 +109,8 @@ def _effects(fleet: Fleet) -> str:
         size = f"{code(shown.parameter)} {text(value)} {text(shown.unit)}"
         leads, role = any(claim.leads for claim in claims), "fits too" if not named else "named"
         cells = (
-            text(vehicle), f"{text(_title(shown))} ({code(effect)})", "leads" if leads else role, f"{len(named)} of {total[vehicle]}",
-            text(first), size, text(ends), text(words.chance(min(claim.q_value for claim in claims))),
+            text(vehicle), f"{text(_title(shown) + _rivals(shown))} ({code(effect)})", "leads" if leads else role,
+            f"{len(named)} of {total[vehicle]}", text(first), size, text(ends), text(words.chance(min(claim.q_value for claim in claims))),
         )  # fmt: skip
         rows.append(Row(cells, LEADS if leads or named else None))
     header = ("vehicle", "effect", "", "named in", "first on", "size", "95 % interval", "q")
