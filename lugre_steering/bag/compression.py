@@ -20,7 +20,9 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 CHUNK_LIMIT = 128 << 20  # bytes of one chunk, packed or not: read at once, and a few copies of it must fit into memory
 MESSAGE_LIMIT = 32 << 20  # bytes of one message: more than any camera or laser sends
 _FED, _STEP = 1 << 16, 1 << 17  # bytes given to a codec, and taken from it, at a time (zstd makes blocks of 128 kB)
-_FREE, _RATIO = 256 << 20, 20  # recordings of sensors shrink to a tenth at best
+_FREE, _RATIO = 256 << 20, 50  # bytes; recordings of sensors shrink to a fifteenth at best
+_FREE_MESSAGES = 200_000
+_LEAST = 4  # bytes of a file for each message: no two have the same times, so 7 are left of them at best
 
 
 class TooLargeError(Exception):
@@ -28,17 +30,29 @@ class TooLargeError(Exception):
 
 
 class Allowance:
-    """How much one pass over a file of ``size`` bytes may unpack: bounds what a small hostile file can cost."""
+    """How much one pass over a file of ``size`` bytes may unpack: bounds what a small hostile file can cost.
+
+    Bytes and messages count apart: a message costs as much time as some 500 bytes, but what sets a recording apart from
+    repeated bytes differs between them. Both grow with the file, so a recording of any length has enough.
+    """
 
     def __init__(self, size: int) -> None:
-        self._total = self._left = _FREE + _RATIO * size
+        self._bytes = self._bytes_left = _FREE + _RATIO * size
+        self._messages = self._messages_left = _FREE_MESSAGES + size // _LEAST
 
     def spend(self, size: int) -> None:
         """Take ``size`` bytes off."""
-        if size > self._left:
-            self._left = 0
-            raise TooLargeError(f"they unpack to more than the {self._total >> 20} MB that a file of this size may")
-        self._left -= size
+        if size > self._bytes_left:
+            self._bytes_left = 0
+            raise TooLargeError(f"they unpack to more than the {self._bytes >> 20} MB that a file of this size may")
+        self._bytes_left -= size
+
+    def spend_messages(self, count: int) -> None:
+        """Take ``count`` messages off."""
+        if count > self._messages_left:
+            self._messages_left = 0
+            raise TooLargeError(f"they unpack to more than the {self._messages} messages that a file of this size may hold")
+        self._messages_left -= count
 
 
 class _Zstandard:

@@ -53,7 +53,6 @@ _SUMMARY_LIMIT = 256 << 20  # bytes; one of a recording of 100 GB has some 50 MB
 _TOPICS_LIMIT = 64 << 20  # bytes of all definitions and descriptions of topics
 _MOST_REPORTED = 30  # findings of one file
 _NO_HEADS = np.empty(0, MESSAGE_HEAD)
-_MESSAGE_COST = 500  # a message costs as much time as this many bytes
 
 Data = bytes | bytearray | memoryview
 
@@ -126,10 +125,11 @@ class McapFile:
     """One MCAP file; ``number`` gives the index of a topic among those of all files of the bag."""
 
     def __init__(
-        self, path: Path, number: Callable[[Connection], int], findings: list[Finding], *, unpacked: bool = False
+        self, path: Path, number: Callable[[Connection], int], findings: list[Finding], *, packed: int = 0
     ) -> None:
+        """``packed``: bytes of the compressed file that this one comes from, where it does."""
         self.path, self._number, self.findings = path, number, findings
-        self._unpacked = unpacked  # from a compressed file, where damage has no edges
+        self._unpacked = packed > 0  # from a compressed file, where damage has no edges
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._index = np.full(1 << 16, -1, np.int32)  # MCAP channel number -> index of the connection
         self._known = np.zeros(1 << 16, np.bool_)
@@ -143,7 +143,8 @@ class McapFile:
         self._learned = 0  # bytes of topics and schemas
         self._file = path.open("rb")
         self._size = path.stat().st_size
-        self._allowance = Allowance(self._size)
+        self._recorded_size = packed or self._size
+        self._allowance = Allowance(self._recorded_size)
         if self._file.read(len(MAGIC)) != MAGIC:
             self._file.close()
             raise BagError(f"{path}: not an MCAP file (it does not begin with the MCAP magic bytes)")
@@ -158,7 +159,7 @@ class McapFile:
         self._wanted = self._index
         if wanted is not None:
             self._wanted = np.where(np.isin(self._index, list(wanted)), self._index, -1)
-        self._allowance = Allowance(self._size)
+        self._allowance = Allowance(self._recorded_size)
         return [(run.begin_ns, self._load(run)) for run in self._runs]
 
     def _load(self, run: _Run) -> Iterator[Messages]:
@@ -169,7 +170,7 @@ class McapFile:
             reason, whole, believed, data = str(damage), False, damage.located, damage.remains
         starts, broken = self._find(data, torn=run.torn)
         try:
-            self._allowance.spend(_MESSAGE_COST * len(starts))
+            self._allowance.spend_messages(len(starts))
         except TooLargeError as error:
             reason, starts, whole = str(error), array("q"), False
         if not believed and not broken:

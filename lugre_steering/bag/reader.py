@@ -131,7 +131,7 @@ class Bag:
 
     def _open(self, path: Path) -> None:
         """Open one file by its content, not by its name."""
-        shown, reason = path, ""
+        shown, reason, packed = path, "", 0
         try:
             with path.open("rb") as file:
                 head = file.read(16)
@@ -141,19 +141,19 @@ class Bag:
                 if reason := expand_file(path, plain):
                     reason = f"{reason}; "
                     self._say("truncated_bag", f"{path.name}: {reason}what came before was read")
-                path = plain
+                path, packed = plain, path.stat().st_size
                 with path.open("rb") as file:
                     head = file.read(16)
             if not head:
                 raise BagError(f"{shown}: {reason}the file is empty")
             if head.startswith(mcap.MAGIC):
-                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self._number, self.findings, unpacked=path is not shown)
+                opened: mcap.McapFile | sqlite.SqliteFile = mcap.McapFile(path, self._number, self.findings, packed=packed)
             elif head.startswith(sqlite.MAGIC):
                 opened = sqlite.SqliteFile(path, self._number, self.findings)
             else:
                 raise BagError(f"{shown}: {reason}not a recording (neither MCAP nor sqlite3 by its first bytes)")
             self._stack.callback(opened.close)
-            self._size += path.stat().st_size
+            self._size += packed or path.stat().st_size
             self._files.append(opened)
         except OSError as error:
             raise BagError(f"{shown}: cannot be read ({error.strerror or error})") from error

@@ -16,12 +16,14 @@ import bag_making as make
 import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from bag_making import CHANNELS, LEFT, MAIN_A, T0
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
-from lugre_steering.bag import Bag, BagWriter, Part, read_recording
+from lugre_steering.bag import Bag, BagWriter, Part, cdr, read_recording
 from lugre_steering.bag.compression import zstd_decompressor
+from lugre_steering.bag.mcap_records import records
 from lugre_steering.bench import fuzz, fuzz_bag
 from lugre_steering.errors import BagError
 
@@ -135,6 +137,51 @@ def test_a_compressed_file_that_unpacks_without_end(tmp_path: Path) -> None:
     (tmp_path / "run.mcap.zstd").write_bytes(zeros("zstd", 4000))
     with pytest.raises(BagError, match=r"run\.mcap\.zstd.*unpack to more than"):
         Bag(tmp_path / "run.mcap.zstd")
+
+
+def packed_records(record: bytes, count: int) -> bytes:
+    """An MCAP record many times over, as one zstd chunk."""
+    plain = record * count
+    return chunk("zstd", zstandard.ZstdCompressor().compress(plain), len(plain))
+
+
+def test_chunks_of_messages_without_end(tmp_path: Path) -> None:
+    messages = make.steering(1.0)
+    file = mcap(tmp_path / "run.mcap", messages, whole=False)
+    data = file.read_bytes()
+    end = data.rindex(b"\x0f" + struct.pack("<Q", 4))
+    empty = struct.pack("<BQHIQQ", 5, 22, 1, 0, T0, T0)
+    file.write_bytes(data[:end] + packed_records(empty, 1_000_000) * 5 + data[end:])
+    begin = time.monotonic()
+    count, said = values(file)
+    assert count == len(messages)
+    assert "unpack to more than" in said
+    assert time.monotonic() - begin < 10.0
+
+
+def test_a_long_recording_in_well_packed_chunks_is_read_to_its_end(tmp_path: Path) -> None:
+    """So regular that a message takes ten bytes of the file, and longer than what any file may unpack to."""
+    count, step = 1_000_000, 10_000_000
+    stamp = T0 + step * np.arange(count, dtype=np.int64)
+    with BagWriter(tmp_path / "plain") as writer:
+        topic = writer.add_topic(*LINE)
+        for part in np.array_split(stamp, 30):
+            writer.write([Part(topic, part, cdr.encode_fluid_pressure(part, "axle", np.full(part.size, 7e5)))])
+    plain = make.file_of(tmp_path / "plain").read_bytes()
+    known = np.ones(1 << 16, np.bool_)
+    packed, topics = bytearray(), b""
+    for op, at, after in records(lambda at, size: plain[at : at + size], 8, len(plain) - 8, known):
+        if op in (3, 4):
+            topics += plain[at:after]
+        elif op == 6:
+            (body,) = struct.unpack_from("<Q", plain, at + 41)
+            packed += chunk("zstd", zstandard.ZstdCompressor().compress(plain[after - body : after]), body)
+    file = tmp_path / "run.mcap"
+    file.write_bytes(plain[:8] + topics + packed + plain[-8:])
+    recording = read_recording(file, [MAIN_A])
+    assert len(packed) < 20 * count
+    assert recording.pressure["main_a"].value.size == count
+    assert [f.finding for f in recording.findings] == []
 
 
 def test_messages_that_unpack_without_end(tmp_path: Path) -> None:
