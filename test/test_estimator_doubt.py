@@ -254,6 +254,67 @@ def test_pressures_of_a_coarse_sensor_are_not_frozen() -> None:
     assert all("pressure frozen" not in told for _t, told in held)
 
 
+@pytest.mark.parametrize("sides", [(0,), (1,)])
+def test_an_encoder_that_freezes_but_for_the_noise_of_the_sheet_is_told_within_a_fifth_of_a_second(sides: tuple[int, ...]) -> None:
+    rng, place = np.random.default_rng(5), held(sides)
+    _, rows = drive(during(6.0, 10.0, lambda side, t, angle: place(side, t, angle) + float(rng.normal(0.0, SIGMA)) * (side in sides)))
+    t, told = seconds_of(rows), np.array(["angle frozen" in doubts(row) for row in rows])
+    assert BEGIN_S <= t[told][0] <= BEGIN_S + 0.2
+    assert told[(t > BEGIN_S + 0.2) & (t < END_S)].all()
+    assert not told[(t < BEGIN_S) | (t > END_S + 0.1)].any()
+
+
+def test_angles_that_freeze_but_for_noise_while_the_pressures_swing_are_told() -> None:
+    """Both at once: the torque begins to swing at the end of a stroke, and by 2 kN m within a fifth of a second."""
+    strokes, estimator, rng, told = Strokes(VEHICLE), Estimator(VEHICLE), np.random.default_rng(2), []
+    for i in range(1000):
+        t = 0.01 * i
+        values = np.concatenate([strokes.at(min(t, 6.0) + 0.9)[:2], strokes.at(t + 0.9)[2:6]])
+        for channel, value in enumerate(values.tolist()):
+            reading = value + (SIGMA if channel < 2 else 1.5e4) * float(rng.standard_normal())
+            told += [t for row in estimator.push(channel, T0 + i * PERIOD_NS, reading)[0] if "angle frozen" in doubts(row)]
+    assert 6.0 <= told[0] < 7.0
+
+
+def moved_by(steps: list[tuple[float, float, float]], seconds: float, late: int = 0) -> list[tuple[float, str]]:
+    """When which doubts were told where the sides go to places (time, left, right) in between in straight lines, with noise; the right
+    one comes ``late`` samples later."""
+    rng, estimator, told = np.random.default_rng(7), Estimator(VEHICLE), []
+    t, places = 0.01 * np.arange(round(seconds * 100)), np.array(steps).T
+    angles = np.array([np.interp(t, places[0], place) for place in places[1:]]) + rng.normal(0.0, SIGMA, (2, t.size))
+    for i in range(t.size):
+        for side in (0, 1):
+            j = i - late * side
+            if j >= 0:
+                rows = estimator.push(side, T0 + j * PERIOD_NS, float(angles[side, j]))[0]
+                told += [(0.01 * i, reason) for row in rows for reason in doubts(row)]
+    return told
+
+
+def test_sound_sides_that_pause_and_creep_are_not_frozen() -> None:
+    creep = math.radians(0.05)
+    steps = [(0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (40.0, 30 * creep, 27 * creep), (50.0, 30 * creep, 27 * creep), (51.0, 0.2, 0.18),
+             (60.0, 0.2, 0.18), (90.0, 0.2 + 30 * creep, 0.18)]  # at last one side alone  # fmt: skip
+    assert moved_by(steps, 90.0) == []
+
+
+@pytest.mark.parametrize("late", [0, 50])
+def test_a_side_that_comes_later_than_the_other_is_not_frozen(late: int) -> None:
+    steps = [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (5.0, 0.4, 0.36), (8.0, 0.4, 0.36), (10.0, 0.0, 0.0)]
+    assert moved_by(steps, 12.0, late) == []
+
+
+def test_a_side_that_stood_and_goes_on_from_there_is_not_taken_for_frozen_again() -> None:
+    """A vehicle that turns one side at a time: told at the first time of each side, then learnt."""
+    steps = [(0.0, 0.0, 0.0)]
+    for k in range(4):
+        steps += [(6.0 * k + 1, 0.0, 0.0), (6.0 * k + 2, 0.2, 0.0), (6.0 * k + 3, 0.2, 0.0), (6.0 * k + 4, 0.2, 0.2),
+                  (6.0 * k + 5, 0.2, 0.2), (6.0 * k + 6, 0.0, 0.0)]  # fmt: skip
+    told = moved_by(steps, 24.0)
+    assert told[0][0] < 1.3
+    assert all(reason == "angle frozen" and t < 6.0 for t, reason in told)
+
+
 def test_a_jump_is_believed_soon_where_the_measured_torque_speaks_for_it() -> None:
     """Stamps of both angles and pressures 0.5 s behind, from then on: the angle has jumped and stays plausible."""
     strokes, estimator, rng = Strokes(VEHICLE), Estimator(VEHICLE, Options(max_rate_rad_s=2.0)), np.random.default_rng(2)

@@ -30,10 +30,14 @@ SETTLED_S = 0.2
 FASTER = 1.5
 """How much faster than ever before a joint may be while nobody sees it."""
 FASTEST_MEMORY_S = 0.1
+STANDING_SIGMA = 5.0
+"""A reading this many times its noise from where it stood has moved: chance alone does that once in 200 000 samples."""
 STILL_NS = 100_000_000
 STILL_SAMPLES = 5
 UNSEEN_SIGMA = 20.0
 """Motion of so many times the noise of an angle must change its reading."""
+CREEP_MEMORY_S = 1.0
+"""Motion of the other side that comes slower than this does not speak against an angle that stands but for its noise."""
 NOISY_SIGMA = 10.0
 NOISE_MEMORY_S = 0.2
 PRESSURE_MEMORY_S = 1.0
@@ -61,10 +65,15 @@ GUARD = np.dtype(
         ("returned", np.bool_),  # to where the shadow can have gone
         ("absurd", np.bool_),  # the readings since the last accepted one
         ("fastest", np.float64),  # rate that the joint has shown while trusted [rad/s]
-        ("still_ns", np.int64),  # since when the reading has not changed at all
+        ("still_ns", np.int64),  # since when the reading has not changed by more than its noise
         ("still", np.int64),  # samples since
-        ("still_other", np.float64),  # angle of the other side then [rad]
+        ("same", np.int64),  # samples in a row that were equal to the one before
+        ("place", np.float64),  # where it stands: mean of the first of them [rad]
+        ("still_other", np.float64),  # angle of the other side then, followed slowly [rad]; NaN: none yet
+        ("apart", np.int64),  # samples in a row for which the other side was away from there
         ("frozen", np.bool_),
+        ("frozen_at", np.float64),  # reading then [rad]
+        ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault
         ("before", np.float64),  # change of the reading before the last [rad]
         ("bend", np.float64),  # difference of the last two changes [rad]
         ("noise", np.float64),  # variance of the reading, as neighbours tell it [rad2]
@@ -81,20 +90,40 @@ def noise_of(core, side):
 
 
 @inner
+def _stand(g, stamp_ns, value):
+    """The reading [rad] stands nowhere else from this sample on."""
+    g.still_ns, g.still, g.same, g.place = stamp_ns, 0, 0, value
+    g.still_other, g.apart = math.nan, 0
+
+
+@inner
+def _thaw(core, side, ch, stamp_ns, value):
+    """A frozen angle moves: if it goes on from where it was, it was sound and only stood."""
+    g = core.guard[side]
+    if abs(value - g.frozen_at) > UNSEEN_SIGMA * core.config[0].angle_noise:
+        g.frozen = False
+        g.stands = g.stands or reachable(core, side, ch.last_ns, stamp_ns, value - ch.last_value)
+
+
+@inner
 def watch(core, side, ch, dt, value):
     """Learn from the next reading [rad] of a side, ``dt`` [s] after the last: whether it stands still, and its noise.
 
     Neighbouring second differences of a smooth motion have one sign; of white noise their product is -4 variances.
     """
     g, sigma = core.guard[side], core.config[0].angle_noise
+    stamp_ns = ch.last_ns if dt <= 0.0 else ch.last_ns + np.int64(dt * 1e9)
     change = value - ch.last_value
-    if change != 0.0 or dt <= 0.0:
-        g.still_ns = ch.last_ns if dt <= 0.0 else ch.last_ns + np.int64(dt * 1e9)
-        g.still = 0
-        g.frozen = False
-        g.still_other = math.nan
+    if g.frozen:
+        _thaw(core, side, ch, stamp_ns, value)
+    same = g.same + 1 if change == 0.0 else 0
+    if dt <= 0.0 or abs(value - g.place) > STANDING_SIGMA * sigma:
+        _stand(g, stamp_ns, value)
     else:
         g.still += 1
+        if g.still < STILL_SAMPLES:
+            g.place += (value - g.place) / (g.still + 1)
+        g.same = same
     bend = change - g.before
     limit = (3.0 * NOISY_SIGMA * sigma) ** 2  # one spike is no noise
     weight = min(1.0, dt / NOISE_MEMORY_S)
@@ -104,25 +133,52 @@ def watch(core, side, ch, dt, value):
 
 @inner
 def still(core, side, stamp_ns):
-    """Whether the reading of a side has not changed at all for so long that motion must have changed it."""
+    """Whether the reading of a side has shown no motion for so long that motion must have shown.
+
+    Of a side that is known to stand on its own, only equal readings tell.
+    """
     g = core.guard[side]
-    return g.still >= STILL_SAMPLES and stamp_ns - g.still_ns >= STILL_NS
+    enough = g.same if g.stands else g.still
+    return enough >= STILL_SAMPLES and stamp_ns - g.still_ns >= STILL_NS
 
 
 @inner
-def angle_doubts(core, side, stamp_ns):
-    """Doubts about the angle of a side at its newest sample."""
+def _watch_other(core, side, dt, stamp_ns):
+    """Freeze the angle of a side that stands still at its newest sample, ``dt`` [s] after the last, while the other side moves.
+
+    The other side counts as far as its stamps lie within the standstill: one of them may come later than the other.
+    """
+    g, c, other = core.guard[side], core.config[0], 1 - side
+    seen_ns = core.channels[other].last_ns
+    if core.motion[other].started == 0.0 or seen_ns < g.still_ns or seen_ns > stamp_ns:
+        return
+    theta = core.motion[other].theta
+    if math.isnan(g.still_other):
+        g.still_other = theta
+    elif g.same < STILL_SAMPLES:
+        g.still_other += (theta - g.still_other) * min(1.0, dt / CREEP_MEMORY_S)
+    g.apart = g.apart + 1 if abs(theta - g.still_other) > UNSEEN_SIGMA * c.angle_noise else 0
+    if g.apart >= STILL_SAMPLES and still(core, side, stamp_ns):  # fewer may be a spike
+        _freeze(core, side)
+
+
+@inner
+def _freeze(core, side):
+    """From now on the angle of the side is frozen, until its reading moves."""
+    g = core.guard[side]
+    if not g.frozen:
+        g.frozen, g.frozen_at = True, core.channels[side].last_value
+
+
+@inner
+def angle_doubts(core, side, dt, stamp_ns):
+    """Doubts about the angle of a side at its newest sample, ``dt`` [s] after the last."""
     g, c = core.guard[side], core.config[0]
     found = 0
     if g.shadow_ns != 0:
         found |= JUMPED
-    if core.state.size > 1 and c.angle_noise > 0.0 and g.still > 0:
-        other = 1 - side
-        if math.isnan(g.still_other) and core.motion[other].started != 0.0:
-            g.still_other = core.motion[other].theta
-        moved = abs(core.motion[other].theta - g.still_other)
-        if moved > UNSEEN_SIGMA * c.angle_noise and core.guard[other].still < STILL_SAMPLES and still(core, side, stamp_ns):
-            g.frozen = True
+    if core.state.size > 1 and c.angle_noise > 0.0:
+        _watch_other(core, side, dt, stamp_ns)
     if g.frozen:
         found |= FROZEN
     if noise_of(core, side) > c.angle_noise:
@@ -146,7 +202,7 @@ def weigh_pressures(core, stamp_ns, measured):
     c.swing_from += (measured - c.swing_from) * min(1.0, dt / PRESSURE_MEMORY_S)
     if abs(measured - c.swing_from) > stiffness * UNSEEN_SIGMA * c.angle_noise:
         for side in range(core.state.size):
-            core.guard[side].frozen = True
+            _freeze(core, side)
 
 
 @inner
@@ -216,7 +272,10 @@ def re_anchor(core, side, ch, stamp_ns, value):
         state.theta += turned
         state.contact_angle += turned
         step(p, state, core.rubber, out, passed, value, 0.0, 0.0, c.effects)
-    g.absurd, g.frozen, g.still, g.still_ns = False, False, 0, stamp_ns
+    g.absurd = g.frozen = False
+    _stand(g, stamp_ns, value)
+    for other in range(core.state.size):  # a jump is no motion
+        core.guard[other].still_other, core.guard[other].apart = math.nan, 0
     g.before = g.bend = 0.0
     _stand_at(motion, value)
 

@@ -164,7 +164,7 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     ch.last_value = value
     waiting = core.waiting[side, _seat(ch, core.waiting.shape[1])]
     _wait(waiting, stamp_ns, state, motion, output)
-    waiting.doubts = angle_doubts(core, side, stamp_ns) | _outside(c, state, motion, saturated)
+    waiting.doubts = angle_doubts(core, side, dt, stamp_ns) | _outside(c, state, motion, saturated)
     waiting.feed_forward = preview(core, side, stamp_ns)
     latest = _pair(core)
     if latest == 0:
