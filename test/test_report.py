@@ -602,7 +602,7 @@ def test_drawn_differences_follow_the_laws() -> None:
         expected = (values["stiffness"] * np.sign(found.run.theta) * beyond).sum(axis=0)
         np.testing.assert_allclose(found.difference, expected, atol=1e-6 * values["stiffness"])
     chirp = next(t for t in card.traces(CATALOGUE["end_stop"]) if t.manoeuvre.name == "chirp")
-    assert chirp.visible_rms == 0.0  # 10 deg never reach the stop
+    assert chirp.visible_rms < 1e-9  # 10 deg never reach the stop: but for rounding [N m]
     for found in card.traces(CATALOGUE["slope_bias"]):
         np.testing.assert_allclose(found.difference, found.values["torque"], rtol=1e-9)
     for found in card.traces(CATALOGUE["time_delay"]):
