@@ -152,11 +152,11 @@ def _reason(error: Exception) -> str:
 
 
 def _content(module: str) -> str:
-    """SHA-256 of all Python files of the package (or single file) that a module belongs to."""
+    """SHA-256 of all Python files of the package (or single file) that a loaded module belongs to."""
     spec = importlib.util.find_spec(module.partition(".")[0])
-    folders = [Path(folder) for folder in spec.submodule_search_locations or ()] if spec is not None else []
-    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
-    if not folders and spec is not None and spec.origin is not None:
+    assert spec is not None
+    files = sorted(file for folder in spec.submodule_search_locations or () for file in Path(folder).rglob("*.py"))
+    if not files and spec.origin is not None:
         files = [Path(spec.origin)]
     return hashlib.sha256(b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)).hexdigest()
 

@@ -104,6 +104,15 @@ def test_a_memory_of_yaml_follows_its_update() -> None:
     assert steady < added[-1] / 400.0 < 1.1 * structure
 
 
+def refusal(file: Path, text: str, old: str, new: str, words: str) -> str:
+    """What is said of a file of effects with one thing changed."""
+    assert old in text
+    file.write_text(text.replace(old, new))
+    with pytest.raises(EffectError, match=words) as caught:
+        registry.add_files([file])
+    return str(caught.value)
+
+
 OWN_PYTHON = """
 from lugre_steering.effects import Effect, Parameter, law
 
@@ -125,7 +134,7 @@ EFFECT = Effect(
 
 def test_own_python_runs_as_it_stands_now(tmp_path: Path) -> None:
     """A constant that only a helper of the law reads: what is compiled of it is kept between starts, and follows the file."""
-    file, sheet = tmp_path / "mine.py", f"""
+    file, program = tmp_path / "mine.py", f"""
 import numpy as np, sys
 from lugre_steering.chain.step import torque_side
 from lugre_steering.effects import registry
@@ -143,7 +152,7 @@ print(round((torque_side(p, model.rubber, time, np.full(50, 0.1), *still) - plai
 
     def added(gain: str) -> list[str]:
         file.write_text(OWN_PYTHON.replace("GAIN = 1.0", f"GAIN = {gain}"))
-        done = subprocess.run([sys.executable, "-c", sheet, str(file)], capture_output=True, text=True, check=True)
+        done = subprocess.run([sys.executable, "-c", program, str(file)], capture_output=True, text=True, check=True)
         assert done.stderr == ""  # what was kept is not damaged
         return done.stdout.split()
 
@@ -173,11 +182,7 @@ print(round((torque_side(p, model.rubber, time, np.full(50, 0.1), *still) - plai
 )
 def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, new: str, words: str) -> None:
     text = OWN_PYTHON if "memory that" not in words else OWN_PYTHON.replace("tier=2", 'tier=2, memory={"wound": 0.0}')
-    assert old in text
-    (tmp_path / "mine.py").write_text(text.replace(old, new))
-    with pytest.raises(EffectError, match=words) as caught:
-        registry.add_files([tmp_path / "mine.py"])
-    assert len(str(caught.value).splitlines()) == 1
+    assert len(refusal(tmp_path / "mine.py", text, old, new, words).splitlines()) == 1
 
 
 @pytest.mark.usefixtures("catalogue")
@@ -227,13 +232,7 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_effect_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
-    file = tmp_path / "mine.yaml"
-    text = RIPPLE.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new))
-    with pytest.raises(EffectError, match=words) as caught:
-        registry.add_files([file])
-    assert "mine.yaml" in str(caught.value)
+    assert "mine.yaml" in refusal(tmp_path / "mine.yaml", RIPPLE.read_text(), old, new, words)
 
 
 @pytest.mark.parametrize(
