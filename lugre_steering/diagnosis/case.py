@@ -4,15 +4,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from lugre_steering.data.quality import Quality
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import WrongSheet
+from lugre_steering.fitting.sheet import Suspect, WrongSheet, sheet_finding
 from lugre_steering.recording import BagFinding, Finding, Recording
 from lugre_steering.vehicle import Vehicle
+
+ENTRIES = {
+    "swapped_lines": "hydraulics.lines, or cap and rod lines, exchanged: {}", "swapped_angles": "topics.left and .right exchanged: {}",
+    "sign_flipped": "sign of {}", "unit_suspect": "unit of {}", "angle_zero": "zero of the angle sensor {}",
+}  # fmt: skip
+"""What of the vehicle file a fault of the wiring may as well be; in braces: the topics."""
 
 
 def by_bag(findings: Mapping[str, Finding]) -> list[BagFinding]:
@@ -35,6 +42,13 @@ class Case:
     def blocking(self) -> list[str]:
         """What makes any verdict about physics meaningless."""
         return [f"{quality.recording.name}: {finding.statement}" for quality in self.qualities for finding in quality.blocking]
+
+    def miswired(self) -> list[BagFinding]:
+        """What is connected, or written in the vehicle file, otherwise than the recordings show: no recording can tell which."""
+        doubted = {(f.finding, f.topic): f for f in self.findings if f.finding in ENTRIES}
+        suspects = [Suspect(ENTRIES[what].format(topic), None, None, math.inf) for what, topic in doubted]
+        said = "; ".join(finding.statement for finding in doubted.values())
+        return [sheet_finding(f"the vehicle file and the recordings disagree: {said}", suspects)] if suspects else []
 
     def found(self, findings: Mapping[str, Finding]) -> None:
         """Keep findings by the name of their recording."""

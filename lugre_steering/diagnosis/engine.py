@@ -71,7 +71,7 @@ def diagnose_recordings(
     progress("checking the data")
     case = Case(vehicle, [inspect(recording, vehicle) for recording in recordings])
     if case.blocking:
-        return case.insufficient("The data must be put right first. " + " ".join(case.blocking))
+        return case.insufficient("The data must be put right first. " + " ".join(case.blocking), more=case.miswired())
     progress("estimating the motion")
     try:
         pieces, cut = in_pieces(case.usable)

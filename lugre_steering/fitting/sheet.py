@@ -62,17 +62,22 @@ STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 @dataclass(frozen=True)
 class Suspect:
     """An entry of the vehicle file: its key, by which factor it seems wrong (None: exchanged), and the error that is left with it
-    put right, as share of the measured torque; ``right``: the problem with it put right."""
+    put right, as share of the measured torque (None: not fitted); ``right``: the problem with it put right."""
 
     key: str
     factor: float | None
-    relative_error: float
+    relative_error: float | None
     cost: float = field(metadata=IN_MEMORY)
     right: Problem | None = field(default=None, metadata=IN_MEMORY, repr=False)
 
     @property
     def words(self) -> str:
         return self.key if self.factor is None else f"{self.key} (times {self.factor:.3g})"
+
+    @property
+    def puts_right(self) -> bool:
+        """Whether with it next to nothing is left."""
+        return self.relative_error is not None and self.relative_error < PUT_RIGHT
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,12 @@ class WrongSheet:
 
     def finding(self) -> SheetFinding:
         """As an entry of ``data_quality``."""
-        return SheetFinding("wrong_sheet", "", "", (), self.statement, tuple(replace(one, right=None) for one in self.suspects))
+        return sheet_finding(self.statement, self.suspects)
+
+
+def sheet_finding(statement: str, suspects: Iterable[Suspect]) -> SheetFinding:
+    """The finding ``wrong_sheet`` as an entry of ``data_quality``."""
+    return SheetFinding("wrong_sheet", "", "", (), statement, tuple(replace(one, right=None) for one in suspects))
 
 
 def torque_ratio(product: float, square: float) -> float:
@@ -123,7 +133,7 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
         return None
     suspect, _ = found[0]
     floor = float(np.count_nonzero(thin.valid)) / doubt
-    fits = suspect.relative_error < PUT_RIGHT or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
+    fits = suspect.puts_right or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise:
         return None
     return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]), certain=bool(stuck))

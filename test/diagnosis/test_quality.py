@@ -25,6 +25,7 @@ from lugre_steering.data import dataset, stamps
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.quality import inspect
 from lugre_steering.data.wiring import SKEW_RANGE_S, as_well
+from lugre_steering.diagnosis.case import Case as DiagnosisCase
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
@@ -275,6 +276,11 @@ def test_wrong_wiring_stops_the_diagnosis(fault: str, sound: Recording) -> None:
     assert said in quality.findings[0].statement
     start, end = float(sound.angle["left"].time_s[0]), float(sound.angle["left"].time_s[-1])
     assert overlap(quality.findings[0].intervals_s, [(start, end)]) > 0.8
+    # The plugs, or the vehicle file: which of them is wrong no recording shows. Clocks stand in no vehicle file.
+    doubted = DiagnosisCase(VEHICLE, [quality]).miswired()
+    assert [sheet.finding for sheet in doubted] == ([] if name == "clock_skew" else ["wrong_sheet"])
+    assert all(topic in suspect.key for sheet in doubted for suspect in sheet.suspects)
+    assert all(sheet.suspects and quality.findings[0].statement in sheet.statement for sheet in doubted)
 
 
 def flipped(side: str) -> Fault:
