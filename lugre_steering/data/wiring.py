@@ -40,6 +40,8 @@ UNTOLD = 0.3
 """Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
 GAIN = 1.6
 """The nominal level may be wrong by this factor; units and lost circuits are further off."""
+MISTYPED = 13.0
+"""By which factor loads and friction of a wrong vehicle file may be off; units are further."""
 BETTER, GOOD = 0.5, 0.45
 """A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
 ORDINARY = 0.1
@@ -186,12 +188,12 @@ def _torques(model: Model, run: Run) -> Array:
     return np.array([torque_side(p, model.rubber, run.time, *row) for p, *row in rows])
 
 
-def _error(run: Run, measured: Array, expected: Array) -> float:
-    """Relative error of the expected torque, both about their means, with a gain within GAIN."""
+def _error(run: Run, measured: Array, expected: Array, most: float = GAIN) -> float:
+    """Relative error of the expected torque, both about their means, with a gain of at most ``most``, or its reciprocal at least."""
     a, b = measured[run.valid] - measured[run.valid].mean(), expected[run.valid] - expected[run.valid].mean()
     # Plain sums: threads of a linear algebra library cost more than they save here.
     aa, ab, bb = float(np.sum(a * a)), float(np.sum(a * b)), float(np.sum(b * b))
-    gain = float(np.clip(ab / max(bb, 1e-30), 1.0 / GAIN, GAIN))
+    gain = float(np.clip(ab / max(bb, 1e-30), 1.0 / most, most))
     return float(np.sqrt(max(aa - 2.0 * gain * ab + gain**2 * bb, 0.0) / max(aa, gain**2 * bb, 1e-30)))
 
 
@@ -199,7 +201,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     """The faults of the simplest hypothesis among the best, if it is convincing."""
     model = build_model(vehicle)
     total = _torques(model, run).sum(axis=0)
-    as_is = _error(run, run.measured, total)
+    as_is, mistyped = _error(run, run.measured, total), _error(run, run.measured, total, MISTYPED)
     correlation = float(np.corrcoef(run.measured[run.valid], total[run.valid])[0, 1])
     mirrored = _mirrored(vehicle, run)
     if mirrored and as_is <= GOOD:
@@ -208,7 +210,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     single = [*undone, *(_angle_units(recording, vehicle, run, model) if as_is > GOOD else ())]
     convincing = [h for h in single if h.error < min(GOOD, h.better * as_is) and (as_is > ORDINARY or h.of_units)]
     if as_is > GOOD:
-        needed = BETTER * min([as_is, *(h.error for h in single)])
+        needed = BETTER * min([as_is, mistyped, *(h.error for h in single)])
         convincing = [h for h in _hypotheses(vehicle, run, model, 2) if h.error < min(GOOD, needed)] or convincing
     if not convincing and mirrored and correlation > 0.0:
         return _noted(vehicle, _exchanged_angles(vehicle), ".")
@@ -225,6 +227,8 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
             return _no_torque(vehicle)
         return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE and not _lacks_terms(vehicle, run, total) else ()
     best = min(h.error for h in convincing)
+    if mistyped <= min(POOR, TIE * best + 0.01):
+        return ()  # a level of the vehicle file may be wrong as well; all its entries are compared later
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
     rivals = as_well([(h.error, h.statement) for h in tied if h is not first])

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +36,10 @@ ERROR_S = 1.0
 """How long an error of the friction law's form lasts."""
 SAMPLES, RATE_HZ = 6000, 25.0
 """Samples and rate to which the hypotheses are fitted: enough to rank them."""
-SCALES = (0.5, 2.0)
+SCALES = (0.4, 2.5)
 """Range of the factor on a bore or an arm."""
+ARMS = (0.5, 0.7, 1.4, 2.0)
+"""Factors that are tried on all arms together: measured from the wrong place, or on another vehicle."""
 EXPLAINED, BETTER = 0.8, 0.9
 """Share of what the baseline leaves that a wrong entry must explain, and share of what named physics leaves that it may leave."""
 KEPT = 0.5
@@ -115,6 +118,19 @@ def sheet_finding(statement: str, suspects: Iterable[Suspect]) -> SheetFinding:
     return SheetFinding("wrong_sheet", "", "", (), statement, tuple(replace(one, right=None) for one in suspects))
 
 
+class _Tried(NamedTuple):
+    """A suspected entry, the surprise that is left with it put right, and whether recalibration still stops at a bound: then it is
+    not what was wrong, however little is left."""
+
+    suspect: Suspect
+    surprise: float
+    stuck: bool
+
+
+def _least(tried: _Tried) -> tuple[bool, float]:
+    return tried.stuck, tried.suspect.cost
+
+
 def torque_ratio(product: float, square: float) -> float:
     """Factor on an expected torque that fits the measured one best: sum of products over sum of squares of the expected one."""
     return product / square if square > 0.0 else float("nan")
@@ -128,15 +144,15 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     stuck = at_bounds(thin, baseline.x, LEVELS)
     if not stuck and surprise < SURPRISE:
         return None
-    found = sorted(_off((*_levels(thin), *_geometries(thin, baseline))), key=lambda item: item[0].cost)
+    found = sorted(_off((*_levels(thin), *_geometries(thin, baseline))), key=_least)
     if not found:
         return None
-    suspect, _ = found[0]
+    best = found[0].suspect
     floor = float(np.count_nonzero(thin.valid)) / doubt
-    fits = suspect.puts_right or suspect.cost - floor < RELIEVED * (baseline.cost - floor)
-    if not fits or min(left for other, left in found if other.cost < TIED * suspect.cost) > RELIEVED * surprise:
+    fits = best.puts_right or best.cost - floor < RELIEVED * (baseline.cost - floor)
+    if not fits or min(tried.surprise for tried in found if tried.suspect.cost < TIED * best.cost) > RELIEVED * surprise:
         return None
-    return WrongSheet(_ratio(thin), tuple(item for item, _ in found[:SHOWN]), certain=bool(stuck))
+    return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), certain=bool(stuck))
 
 
 def physics_instead(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
@@ -174,7 +190,7 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
     least = FORETOLD * EXPLAINED
     levels = _levels(thin) if _foretold(thin, baseline) > least else ()
-    found = sorted((suspect for suspect, _ in _off((*levels, *_geometries(thin, baseline, least)))), key=lambda item: item.cost)
+    found = sorted((tried.suspect for tried in _off((*levels, *_geometries(thin, baseline, least)))), key=lambda item: item.cost)
     if not found:
         return None
     floor = float(np.count_nonzero(thin.valid))
@@ -193,9 +209,9 @@ def _foretold(problem: Problem, baseline: Fit) -> float:
     return float(along @ along) / max(float(left @ left) - float(np.count_nonzero(weight)), 1e-30)
 
 
-def _off(found: Iterable[tuple[Suspect, float]]) -> list[tuple[Suspect, float]]:
+def _off(found: Iterable[_Tried]) -> list[_Tried]:
     """Those whose entry is off by more than drawings and tapes are."""
-    return [(suspect, left) for suspect, left in found if suspect.factor is None or abs(np.log(suspect.factor)) > OFF]
+    return [tried for tried in found if tried.suspect.factor is None or abs(np.log(tried.suspect.factor)) > OFF]
 
 
 def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
@@ -265,8 +281,8 @@ def _ratio(problem: Problem) -> float:
     return torque_ratio(float(problem.measured[problem.valid] @ expected), float(expected @ expected))
 
 
-def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
-    """Hypotheses about whole levels, and the surprise that each leaves."""
+def _levels(problem: Problem) -> Iterator[_Tried]:
+    """Hypotheses about whole levels."""
     vehicle = problem.vehicle
     known = [c for c in problem.calibrations if c.name != GAIN.name]
     others = [c for c in known if c.name != LEVEL.name]
@@ -291,14 +307,13 @@ def _levels(problem: Problem) -> Iterator[tuple[Suspect, float]]:
         if vehicle.axle is not None and vehicle.track is not None and name == LOAD.name and factor is not None:
             share = vertical_load(vehicle.axle, vehicle.track) / (0.5 * vehicle.axle.load_N)  # the tracks' own weight is no load
             factor = max((factor - 1.0) * share + 1.0, 1e-3)
-        freed = (name,) if name else (LEVEL.name, STIFF.name)
-        suspect = _suspect(problem, trial, result, key, factor)
-        yield suspect if name else replace(suspect, cost=SEVERAL * suspect.cost), _surprise(trial, result, freed)
+        tried = _tried(problem, trial, result, key, factor, (name,) if name else (LEVEL.name, STIFF.name))
+        yield tried if name else tried._replace(suspect=replace(tried.suspect, cost=SEVERAL * tried.suspect.cost))
 
 
-def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[tuple[Suspect, float]]:
-    """Hypotheses about single cylinders and those of one circuit, and the surprise that each leaves; only those of which is foretold
-    that ``least`` of what is left beyond noise goes, or, of exchanged lines, anything."""
+def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tried]:
+    """Hypotheses about single cylinders, those of one circuit, and the arms of all; only those of which is foretold that ``least`` of
+    what is left beyond noise goes, or, of exchanged lines, anything."""
     hydraulics = problem.vehicle.hydraulics
     if hydraulics is None:
         return
@@ -314,17 +329,19 @@ def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator
         factor, share = _better(problem, problem, baseline, change, 1.0)
         if share < least:
             continue
-        trial, result = _refitted(problem, baseline, change(factor))
-        factor, _ = _better(problem, trial, result, change, factor)
-        trial, result = _refitted(problem, baseline, change(factor))
-        yield _suspect(problem, trial, result, key, factor), _surprise(trial, result)
-    for name, cylinder in hydraulics.cylinders.items():
-        turned = {name: replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)}
+        factor, _ = _better(problem, *_refitted(problem, baseline, change(factor)), change, factor)
+        yield _tried(problem, *_refitted(problem, baseline, change(factor)), key, factor)
+    if not least:  # levers of half or twice the length are too far off for a linearisation
+        arms = [(_resized(hydraulics.cylinders, _knuckle, factor), factor) for factor in ARMS]
+        tried = [_tried(problem, *_refitted(problem, baseline, each), "knuckle_m of all cylinders", f) for each, f in arms]
+        yield min(tried, key=_least)
+    for names in (*((name,) for name in hydraulics.cylinders), *circuits(hydraulics)):
+        turned = {name: _turned(hydraulics.cylinders[name]) for name in names}
         trial = _changed(problem, turned)
         if least and not _could_be_better(problem, trial, baseline):
             continue
         result = _fitted(trial, start=baseline.x)
-        yield _suspect(problem, trial, result, f"hydraulics.cylinders.{name}.cap and .rod exchanged", None), _surprise(trial, result)
+        yield _tried(problem, trial, result, f"hydraulics.cylinders.{' and '.join(names)}.cap and .rod exchanged", None)
 
 
 def circuits(hydraulics: Hydraulics) -> list[tuple[str, ...]]:
@@ -357,6 +374,10 @@ def _bore(cylinder: Cylinder, factor: float) -> Cylinder:
 
 def _knuckle(cylinder: Cylinder, factor: float) -> Cylinder:
     return replace(cylinder, knuckle_m=tuple(factor * value for value in cylinder.knuckle_m))
+
+
+def _turned(cylinder: Cylinder) -> Cylinder:
+    return replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)
 
 
 def _better(
@@ -393,6 +414,12 @@ def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:
         hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, **cylinders})
     )
     return Problem(vehicle, [with_hydraulics(run, vehicle) for run in problem.runs], problem.calibrations)
+
+
+def _tried(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None, freed: Sequence[str] = ()) -> _Tried:
+    """``freed``: names of levels that the entry sets free."""
+    stuck = at_bounds(trial, result.x, [name for name in LEVELS if name not in freed])
+    return _Tried(_suspect(problem, trial, result, key, factor), _surprise(trial, result, freed), bool(stuck))
 
 
 def _suspect(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None) -> Suspect:

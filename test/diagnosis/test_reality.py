@@ -246,6 +246,24 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
     assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
 
 
+@pytest.mark.parametrize(("factor", "told"), [(0.5, 1.4), (2.0, 0.5)])
+def test_arms_that_are_all_measured_from_the_wrong_place_are_suspected_first(factor: float, told: float) -> None:
+    """A factor of the knuckle pivots, as coarsely as it is tried: with levers twice as long all pressures do twice the work."""
+    assert VEHICLE.hydraulics is not None
+    cylinders = VEHICLE.hydraulics.cylinders.items()
+    wrong = {name: replace(c, knuckle_m=(factor * c.knuckle_m[0], factor * c.knuckle_m[1])) for name, c in cylinders}
+    found = wrong_sheet(synchronised(sound(), VEHICLE.replace(hydraulics=replace(VEHICLE.hydraulics, cylinders=wrong))).problem)
+    assert found is not None
+    assert (found.suspects[0].key, found.suspects[0].factor) == ("knuckle_m of all cylinders", told)
+
+
+def test_a_level_far_off_is_no_fault_of_the_wiring() -> None:
+    """A fifth of the torque that the sheet expects: a flipped sign and two exchanged lines together would show much the same."""
+    assert VEHICLE.friction is not None
+    friction = replace(VEHICLE.friction, static=5.0 * VEHICLE.friction.static, coulomb=5.0 * VEHICLE.friction.coulomb)
+    assert not any(inspect(recording, VEHICLE.replace(friction=friction)).blocking for recording in sound())
+
+
 def test_exchanged_lines_of_one_cylinder_are_found() -> None:
     assert VEHICLE.hydraulics is not None
     cylinders = VEHICLE.hydraulics.cylinders

@@ -37,7 +37,7 @@ def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[s
 
 def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path) -> None:
     ripple = ("--effect", "chain_ripple:torque=1500,pitch=0.11", "--effects", RIPPLE)
-    made = run("simulate", "double-cycle", *ripple, "--rate", "50", "--out", tmp_path)
+    made = run("simulate", "double-cycle", *ripple, "--rate", "20", "--out", tmp_path)
     assert made.returncode == 0, made.stderr
     bag = tmp_path / "synthetic_double_cycle"
     done = run("diagnose", bag, "--vehicle", SHEET, "--effects", RIPPLE, "--out", tmp_path / "d", "--no-report", "--json")
@@ -200,7 +200,7 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
     told = run("effects", "centre_detent", "--check", "--json", PYTHONPATH=path)
     assert json.loads(told.stdout) == {"id": "centre_detent", "broken": []}, told.stderr
     hidden = ("--effect", "centre_detent:hold=4000,width=0.02")
-    assert run("simulate", "double-cycle", *hidden, "--rate", "50", "--out", tmp_path, PYTHONPATH=path).returncode == 0
+    assert run("simulate", "double-cycle", *hidden, "--rate", "20", "--out", tmp_path, PYTHONPATH=path).returncode == 0
     bag, augmented = tmp_path / "synthetic_double_cycle", tmp_path / "d" / "augmented.yaml"
     done = run("diagnose", bag, "--vehicle", SHEET, "--out", tmp_path / "d", "--no-report", "--json", PYTHONPATH=path)
     found = json.loads(done.stdout)
