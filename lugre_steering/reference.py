@@ -22,7 +22,7 @@ from lugre_steering.cli import app
 from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.live.table import OPTION_TABLE, TABLE, Parameter
+from lugre_steering.estimator.node_parameters import OPTION_TABLE, TABLE, Parameter
 from lugre_steering.schema import meanings_of, section_in, unit_of
 from lugre_steering.vehicle.plausible import KEYS
 from lugre_steering.vehicle.sections import Vehicle

@@ -11,10 +11,10 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.calibration.estimate import DRAWS, Estimate
 from lugre_steering.calibration.result import FittedKey
-from lugre_steering.diagnosis.search.rig import carried
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.problem import Effects, Problem, is_rig
+from lugre_steering.fitting.rig import carried
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
 EDGE = 0.01

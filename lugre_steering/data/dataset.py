@@ -13,8 +13,8 @@ from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.data.stamps import evened
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Kind, Recording, Signal
-from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.size import angle_unit
 

@@ -19,8 +19,8 @@ from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.data.sensing import white_noise
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
-from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.model import build_model
 
 MEAN_S = 0.25

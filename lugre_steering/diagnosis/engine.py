@@ -16,8 +16,8 @@ from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.diagnosis.case import Case, by_bag
 from lugre_steering.diagnosis.conclude.conclusion import conclude
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_out import left_out
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import Diagnosis

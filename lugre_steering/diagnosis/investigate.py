@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.search.search import search
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array, IntArray
 
 NULL_DRAWS = 16

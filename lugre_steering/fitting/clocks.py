@@ -31,6 +31,8 @@ SHORTEST_S, SURE = 2e-4, 4.0
 ALIKE_S = 1e-3
 """Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
 WORTH_SAYING_S = 2e-3
+APART_S = 0.015
+"""How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form."""
 ROUNDS = 6
 SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
@@ -170,3 +172,10 @@ def _finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
         f"{topics}: stamped {1e3 * abs(late):.1f} ms (+-{2e3 * deviation:.1f}) too {'late' if late > 0.0 else 'early'} against the angles; "
         "taken out here; synchronise the clocks of the devices, or stamp where the sensor is read",
     )  # fmt: skip
+
+
+def still_apart(problem: Problem, torque: Array) -> Array:
+    """Columns (n, bags): what a torque (n,) changes by if the sensors of a bag are APART_S apart, whatever the friction is like."""
+    parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)
+    changes = np.concatenate([np.gradient(part, run.time) for run, part in parts])
+    return np.column_stack([APART_S * changes * (problem.bag == bag) for bag in range(len(problem.runs))])

@@ -21,10 +21,10 @@ from std_srvs.srv import Trigger
 
 from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.estimator.state_file import read_state, write_state
 from lugre_steering.live.console import Console
 from lugre_steering.live.parameters import changed, declare
 from lugre_steering.live.session import TICK_S, Session
-from lugre_steering.live.state_file import read_state, write_state
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
 

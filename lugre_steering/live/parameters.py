@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as Change
 
 from lugre_steering.estimator import Options
-from lugre_steering.live.table import BY_ROS, OPTION_TABLE, QOS, TABLE, Parameter, ParameterError
+from lugre_steering.estimator.node_parameters import BY_ROS, OPTION_TABLE, QOS, TABLE, Parameter, ParameterError
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState, Temperature
 
-from lugre_steering.live.seen import Seen
 from lugre_steering.recording import NODE
+from lugre_steering.watch.seen import Seen
 
 WRENCHES = {"torque": "torque", "cylinder_torque": "cylinder torque", "residual": "residual"}
 

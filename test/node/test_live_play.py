@@ -17,9 +17,9 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
-from lugre_steering.live.seen import Seen
-from lugre_steering.live_view import BARS, spark, view
 from lugre_steering.node import arguments_of
+from lugre_steering.watch.seen import Seen
+from lugre_steering.watch.view import BARS, spark, view
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 VEHICLE = PACKAGE_ROOT / "config" / "test_vehicle.yaml"

@@ -18,7 +18,7 @@ from live_harness import PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
-from lugre_steering.live.table import OPTION_TABLE, TABLE
+from lugre_steering.estimator.node_parameters import OPTION_TABLE, TABLE
 
 FIXED = {"autostart", "effects_files", "executor", "frame_id", "input_depth", "publish_commands", "watch_folder"}
 CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"

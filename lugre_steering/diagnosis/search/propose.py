@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search.fingerprint import Score
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial, ranked, refine, timed, worth_of
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Round, Trial, ranked, refine, timed, worth_of
 from lugre_steering.recording import Array
 
 SHORTLIST, SHORT = 7, 0.08

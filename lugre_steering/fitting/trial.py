@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.diagnosis.search import onset
-from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.fitting import onset
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.recording import Array

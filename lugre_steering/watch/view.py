@@ -16,8 +16,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from lugre_steering.live.seen import SHOWN_S, Line, Seen
 from lugre_steering.report.words import number
+from lugre_steering.watch.seen import SHOWN_S, Line, Seen
 
 LEVELS = ("ok", "warning", "error", "stale")
 COLOURS = ("green", "yellow", "red", "magenta")
