@@ -18,6 +18,7 @@ from typing import Any
 
 import typer.main
 
+from lugre_steering.chain.compose import HOOKS
 from lugre_steering.cli import app
 from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
@@ -129,6 +130,12 @@ def effects() -> str:
     return table(("id", "physics", "stage", "parameters"), rows)
 
 
+def hooks() -> str:
+    """Where in the chain an effect may act."""
+    rows = [(f"`{name}`", hook.does.replace("``", "`"), _listed(hook.given) or "-") for name, hook in HOOKS.items()]
+    return table(("hook", "a law there gives", "and may read, beside what the hooks above it know"), rows)
+
+
 def law_parts() -> str:
     """What a law of the vehicle file may change, and what it may depend on."""
     channels, coordinates = (", ".join(f"`{name}` [{unit}]" for name, unit in of.items()) for of in (CHANNELS, COORDINATES))
@@ -158,7 +165,7 @@ def _option(parameter: Any) -> tuple[str, str]:
 
 
 TABLES: Mapping[str, Callable[[], str]] = {
-    "vehicle": vehicle_keys, "laws": law_parts, "parameters": node_parameters, "effects": effects, "commands": commands,
+    "vehicle": vehicle_keys, "laws": law_parts, "parameters": node_parameters, "effects": effects, "hooks": hooks, "commands": commands,
 }  # fmt: skip
 
 

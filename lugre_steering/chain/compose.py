@@ -123,12 +123,6 @@ class Composition:
     arm_factor: Law
     line_error: Law
 
-    @property
-    def effect_fields(self) -> tuple[str, ...]:
-        """Parameters of the effects in the record of a track."""
-        assert self.parameters.names is not None
-        return self.parameters.names[len(BASELINE_FIELDS) : -1]
-
 
 _made: dict[str, Composition] = {}
 _asked: dict[tuple[tuple[str, int], ...], Composition] = {}

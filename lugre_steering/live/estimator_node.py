@@ -50,7 +50,6 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._began_ns = self._reported_ns = self._saved_ns = time.monotonic_ns()
         self._news_ns = 0
         self._reports = 0
-        self._namesakes = 0
         self._console = Console(self.get_logger())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Steady, so that health is reported while simulated time stands still.
