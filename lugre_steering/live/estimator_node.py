@@ -78,7 +78,6 @@ class SteeringTorqueEstimator(LifecycleNode):
         begin = time.monotonic()
         try:
             vehicle = self._load(self.settings.vehicle_file)
-            self.get_logger().info("loading compiled code (the first start compiles it, which takes up to a minute)")
             self.session = Session(self, self.settings, vehicle, self.guarded, self._latency_window)
         except LugreSteeringError as error:
             self._refusal = error

@@ -13,6 +13,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
+from lugre_steering.chain.cache import tell_compiling
 from lugre_steering.chain.step import Records
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.doubt import INPUTS
@@ -43,6 +44,7 @@ class Session:
         latency_window: int,
     ) -> None:
         self.settings, self.vehicle, self.active = settings, vehicle, False
+        tell_compiling(node.get_logger().info)
         warm_up(vehicle, settings.options)
         self.estimator = Estimator(vehicle, settings.options, lean=True)
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
@@ -92,6 +94,7 @@ class Session:
 
     def reload(self, vehicle: Vehicle) -> None:
         """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
+        tell_compiling(self._node.get_logger().info)
         self.estimator = self.estimator.continued(vehicle)
         self.vehicle = vehicle
         self.watch = Watch(vehicle)
