@@ -492,12 +492,12 @@ def fleet(
     from lugre_steering.fleet.command import show_fleet
     from lugre_steering.fleet.result import facts, gate
     from lugre_steering.fleet.run import run
-    from lugre_steering.fleet.work import Options
+    from lugre_steering.fleet.work import FleetOptions
 
     wanted, found = gate(fail_on or ()), find(bags, out)
     with progress_bar() as progress:
         done = run(
-            found.bags, vehicle, out, options=Options(diagnose, seed), jobs=jobs, scheduler=scheduler, skipped=found.skipped,
+            found.bags, vehicle, out, options=FleetOptions(diagnose, seed), jobs=jobs, scheduler=scheduler, skipped=found.skipped,
             progress=progress,
         )  # fmt: skip
     if as_json:

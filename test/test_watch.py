@@ -19,7 +19,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
 from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, Watch, weigh
-from lugre_steering.watch.window import CAPACITY, SAMPLE, Samples, read_window, write_window
+from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, read_window, write_window
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
 VEHICLE = load(FILE)
@@ -75,8 +75,8 @@ def test_a_standing_vehicle_is_not_judged() -> None:
     assert watch.scores == []
 
 
-def filled(seconds: float) -> Samples:
-    strokes, samples = Strokes(VEHICLE), Samples()
+def filled(seconds: float) -> SampleRing:
+    strokes, samples = Strokes(VEHICLE), SampleRing()
     for i in range(round(100 * seconds)):
         for channel, value in enumerate(strokes.at(0.01 * i).tolist()):
             samples.add(channel, T0 + i * 10_000_000, value, math.nan)
@@ -96,7 +96,7 @@ def test_a_window_comes_back_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_the_ring_keeps_the_latest() -> None:
-    samples = Samples()
+    samples = SampleRing()
     for i in range(CAPACITY + 10):
         samples.add(0, i + 1, float(i), math.nan)
     rows = samples.since(0)

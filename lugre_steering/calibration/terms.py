@@ -25,10 +25,9 @@ def terms_of(problem: Problem, seed: int = 0) -> Effects:
     """The terms and where their fit may begin; none for a vehicle, or for what the vehicle file has."""
     if not is_rig(problem.vehicle):
         return ()
-    valid = problem.valid.astype(float)
-    first = fit(problem, valid / np.concatenate([run.sigma for run in problem.runs]), robust=True)
+    first = fit(problem, problem.sensor_weight, robust=True)
     noise = noise_model(problem, first.x, (), repeated_motion(problem, DRAWS, seed), seed=seed)
-    weight = valid / noise.sigma
+    weight = problem.valid / noise.sigma
     found = carried(problem, noise, weight, fit(problem, weight, start=first.x))
     return found[-1][0].effects if found else ()
 

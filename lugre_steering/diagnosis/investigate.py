@@ -77,8 +77,7 @@ def _unbent(problem: Problem, weight: Array, baseline: Fit) -> Fit:
 
 def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:
     """Baseline fitted with sheet noise first, then with the noise measured at that fit, on the split that suits its errors."""
-    sheet = np.concatenate([run.sigma for run in problem.runs])
-    weight = np.where(split(problem).fit, 1.0 / sheet, 0.0)
+    weight = np.where(split(problem).fit, 1.0 / problem.sigma, 0.0)
     starts = [fit(problem, weight, linearisations=25, robust=robust, tolerance=TRIAL_TOLERANCE) for robust in (False, True)]
     first = min((fit(problem, weight, start=start, linearisations=10) for start in starts), key=lambda f: f.cost)
     noise = noise_model(problem, first.x, (), repeated, seed=seed)

@@ -111,15 +111,13 @@ def _alike(late: Array, deviation: Array) -> bool:
 
 
 def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:
-    weight = problem.valid / np.concatenate([run.sigma for run in problem.runs])
     effects, x = (effects, None) if start is None else (start.effects, start.x)
-    return fit(problem, weight, effects, x, linearisations=20, robust=True, tolerance=1e-4)
+    return fit(problem, problem.sensor_weight, effects, x, linearisations=20, robust=True, tolerance=1e-4)
 
 
 def clock_offsets(problem: Problem, baseline: Fit) -> list[Offset]:
     """How late the torque of each bag is stamped, by what the baseline leaves of it beside all that was fitted."""
-    sigma = np.concatenate([run.sigma for run in problem.runs])
-    weight = problem.valid / sigma
+    weight = problem.sensor_weight
     residual = (problem.measured - baseline.prediction) * weight
     # Bounded influence, as in the fit: a few large errors must not decide.
     trust = 1.0 / np.sqrt(1.0 + (residual / max(3.0 * float(np.median(np.abs(residual))), 1e-30)) ** 2)
@@ -150,7 +148,7 @@ def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bo
     slow_sensor = next(effect for effect in CATALOGUE.values() if "lag" in effect.hooks)
     (tau,) = slow_sensor.parameters
     lag = Candidate(slow_sensor, free=(tau.name,)), {tau.name: float(late.mean())}
-    weight = original.valid / np.concatenate([run.sigma for run in original.runs])
+    weight = original.sensor_weight
     slow = fit(original, weight, [*start.effects, lag], start.x, linearisations=10, robust=True, tolerance=1e-4)
     used = np.count_nonzero(weight)
     return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)

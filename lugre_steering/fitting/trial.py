@@ -169,7 +169,7 @@ def ranked(trials: Sequence[Trial], before: float) -> list[Trial]:
     return sorted(trials, key=lambda trial: rank(trial, before))
 
 
-def timed(trial: Trial) -> bool:
+def is_timed(trial: Trial) -> bool:
     """Whether what a trial found begins or ends within the recordings."""
     return bool(trial.candidate.since) or any(trial.fit.effects[-1][1].get(edge) for edge in ("time_start", "time_end"))
 

@@ -25,7 +25,7 @@ from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.watch import detector
 from lugre_steering.watch.detector import Watch
-from lugre_steering.watch.window import Samples, write_window
+from lugre_steering.watch.window import SampleRing, write_window
 
 LEAVE_S = 2.0
 """No longer does the last ramp to zero take: who stops the node waits a few seconds before he kills it."""
@@ -50,7 +50,7 @@ class Session:
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
         self.outputs = Outputs(node, vehicle, settings)
         self.watch = Watch(vehicle)
-        self.samples = Samples() if settings.watch_folder is not None else None
+        self.samples = SampleRing() if settings.watch_folder is not None else None
         self.alarm = False  # the watch has just found that the model no longer matches
         self._node = node
         self._torque_ns = 0  # stamp of the newest torque

@@ -21,7 +21,7 @@ UNIT = re.compile(r"(1|[0-9]|N|m|rad|deg|s|K|W|J|Pa|kg|degC|[/^() ])+")
 NOTICED = 1e-6
 """Change of the torque, as a share of its amplitude, from which a parameter acts."""
 
-Motion = tuple[Array, Array, Array, Array]
+Driven = tuple[Array, Array, Array, Array]
 
 
 def broken(effect: Effect) -> list[str]:
@@ -52,14 +52,14 @@ class _Bench:
             p[field] = number
         return p
 
-    def torque(self, p: Records, motion: Motion | None = None) -> Array:
+    def torque(self, p: Records, motion: Driven | None = None) -> Array:
         return torque_side(p, self.rubber, *(motion or self.motion))
 
     def change(self, a: Array, b: Array) -> float:
         return float(np.sqrt(np.mean((a - b) ** 2)) / np.abs(self.plain).max())
 
 
-def _cycles() -> Motion:
+def _cycles() -> Driven:
     """Time, angle, rate, acceleration (n,): two cycles of 25 deg at 6 deg/s with rests at the limits, then reversals of 3 deg."""
     corners = np.radians([0.0, 25.0, 25.0, -25.0, -25.0, 25.0, 25.0, -25.0, -25.0, 0.0, 0.0])
     at = np.cumsum(np.concatenate([[1.0], np.maximum(np.abs(np.diff(corners)) / np.radians(6.0), 2.0)]))

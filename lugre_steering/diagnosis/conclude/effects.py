@@ -147,5 +147,5 @@ def _where(done: Finished, candidate: Candidate, part: Array) -> list[Place]:
             low_size, high_size = locate.active_range(axes["|steering angle|"], piece)
             if low_size > BOTH_SIDES * high_size:
                 axis, low, high = "|steering angle|", low_size, high_size
-        entries.append(Place(run.name, tuple(spans), axis, (low, high), done.unit(units.COORDINATES[axis])))
+        entries.append(Place(run.name, tuple(spans), axis, (low, high), done.unit(units.COORDINATE_UNITS[axis])))
     return entries

@@ -134,5 +134,5 @@ def _where(
             spans, piece = locate.intervals(run.time, shape[part]), shape[part]
         if spans:
             between = locate.active_range(values[axis], piece)
-            entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATES[axis])))
+            entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATE_UNITS[axis])))
     return entries

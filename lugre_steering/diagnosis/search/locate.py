@@ -45,7 +45,7 @@ def intervals(time: Array, part: Array) -> tuple[tuple[float, float], ...]:
 
 
 def coordinates(run: Run, torque: Array, temperature: Array | None = None) -> dict[str, Array]:
-    """State-space coordinates (n,) of one run, by the names of ``units.COORDINATES``."""
+    """State-space coordinates (n,) of one run, by the names of ``units.COORDINATE_UNITS``."""
     mean_rate = run.omega.mean(axis=0)
     dt = run.time[1] - run.time[0]
     moving = np.abs(mean_rate) > 1e-3 * run.angle_unit
