@@ -35,7 +35,6 @@ STEP_REMAINDER = 0.25
 """Share of the time step's error that may be left after it was taken out."""
 
 
-
 @dataclass(frozen=True)
 class Estimate:
     """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles and weather), then

@@ -12,7 +12,7 @@ from lugre_steering.data.sensing import SensorNoise, sensed
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.data.stamps import evened
 from lugre_steering.errors import DataError
-from lugre_steering.recording import Array, Kind, Recording, Signal
+from lugre_steering.recording import Array, Kind, Mask, Recording, Signal
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
@@ -48,7 +48,7 @@ class Run:
     side_slope: Array
     measured: Array
     sigma: Array
-    valid: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    valid: Mask
     air: tuple[tuple[float, float], ...] = ()
     """Instants [s] from which the recorded air has another temperature [degC]; before the first, that of the vehicle file."""
     angle_unit: float = 1.0
@@ -180,7 +180,7 @@ def ideal_run(vehicle: Vehicle, name: str, time: Array, theta: Array, rates: tup
     )  # fmt: skip
 
 
-def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, Mask]:
     """Uniform clock over the span that all channels share, at the slowest channel's rate; false where any has a gap."""
     spacing = {key: float(np.median(np.diff(signal.time_s))) for key, signal in signals.items()}
     step = max(*spacing.values(), 1.0 / MAX_RATE_HZ)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -26,10 +26,9 @@ from lugre_steering.fleet.store import Store
 from lugre_steering.fleet.tables import KINDS, need_parquet, rows, write_tables
 from lugre_steering.fleet.vehicles import Member, member_of, read_members
 from lugre_steering.fleet.work import FleetOptions, Record, Task, nothing, process
-from lugre_steering.pool import WorkerDiedError, in_processes, processors
+from lugre_steering.pool import Progress, WorkerDiedError, in_processes, processors
 
 STORE = "recordings"
-Progress = Callable[[str, int, "int | None"], None]
 
 
 def run(

@@ -19,7 +19,6 @@ BRIDGE_S = 0.5
 BINS = 24
 
 
-
 def contribution(problem: Problem, result: Fit, index: int) -> Array:
     """Torque (n,) that one effect of a fit adds to the prediction, everything else as fitted."""
     without = [effect for i, effect in enumerate(result.effects) if i != index]
