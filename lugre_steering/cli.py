@@ -241,7 +241,7 @@ def replay(
     Writes a bag with the output topics beside the inputs, a page, a picture and a summary."""
     from lugre_steering.bag.find import find
     from lugre_steering.estimator import Options
-    from lugre_steering.live.table import read_options
+    from lugre_steering.estimator.node_parameters import read_options
     from lugre_steering.replay.result import facts, gate
     from lugre_steering.replay.run import replay as run
     from lugre_steering.replay.table import show_replay
@@ -492,12 +492,12 @@ def fleet(
     from lugre_steering.fleet.command import show_fleet
     from lugre_steering.fleet.result import facts, gate
     from lugre_steering.fleet.run import run
-    from lugre_steering.fleet.work import Options
+    from lugre_steering.fleet.work import FleetOptions
 
     wanted, found = gate(fail_on or ()), find(bags, out)
     with progress_bar() as progress:
         done = run(
-            found.bags, vehicle, out, options=Options(diagnose, seed), jobs=jobs, scheduler=scheduler, skipped=found.skipped,
+            found.bags, vehicle, out, options=FleetOptions(diagnose, seed), jobs=jobs, scheduler=scheduler, skipped=found.skipped,
             progress=progress,
         )  # fmt: skip
     if as_json:
@@ -545,7 +545,7 @@ def watch(
 
     need_ros("watch")
     from lugre_steering.live.watch import watch as run
-    from lugre_steering.live_view import showing
+    from lugre_steering.watch.view import showing
 
     with showing(output()) as show:
         run(show, node_name, float("inf") if seconds is None else seconds)

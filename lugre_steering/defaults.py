@@ -75,11 +75,11 @@ class Option:
         return kind
 
 
-Options = Mapping[str, Mapping[str, Option]]
+CommandOptions = Mapping[str, Mapping[str, Option]]
 """Options of each command by the name as it is typed, without its dashes."""
 
 
-def of_commands(saved: Mapping[str, Any], options: Options) -> dict[str, dict[str, Any]]:
+def of_commands(saved: Mapping[str, Any], options: CommandOptions) -> dict[str, dict[str, Any]]:
     """Defaults of each command by the name of its parameter."""
     for key in saved:
         if not _meant(key, options):
@@ -94,7 +94,7 @@ def of_commands(saved: Mapping[str, Any], options: Options) -> dict[str, dict[st
     }
 
 
-def checked(key: str, value: str, options: Options) -> Any:
+def checked(key: str, value: str, options: CommandOptions) -> Any:
     """A default as it is kept: one that its option takes; a path that is there in full, as commands run anywhere."""
     meant = _meant(key, options)
     if not meant or not value:
@@ -110,7 +110,7 @@ def checked(key: str, value: str, options: Options) -> Any:
     return [kept] if meant[0].several else kept
 
 
-def _meant(key: str, options: Options) -> list[Option]:
+def _meant(key: str, options: CommandOptions) -> list[Option]:
     """The options of a key: of all commands, or of the one that it names."""
     command, _, name = key.rpartition(".")
     return [of_one[name] for each, of_one in options.items() if command in ("", each) and name in of_one]

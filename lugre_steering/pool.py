@@ -20,6 +20,8 @@ from typing import TypeVar
 
 from lugre_steering.errors import LugreSteeringError
 
+Progress = Callable[[str, int, "int | None"], None]
+"""Called with the name of a piece of work, what is done of it, and what there is in all (None where not known)."""
 T = TypeVar("T")
 R = TypeVar("R")
 

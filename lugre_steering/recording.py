@@ -29,6 +29,7 @@ from lugre_steering.errors import DataError
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 RATE_LIMIT = 100.0  # rad/s, far beyond any steering: such a rate counts as not given
 
@@ -207,6 +208,8 @@ def _numbers(values: ArrayLike, label: str) -> Array:
 
 NODE = "steering_torque_estimator"
 """Name of the live node, in whose namespace its results are published and recorded."""
+COMMAND = "steering/command"
+"""Topic of planned angles, live and recorded."""
 TRUTH = "synthetic_truth"
 """Name in whose namespace simulated recordings keep what a sensor cannot know."""
 

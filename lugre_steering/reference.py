@@ -18,11 +18,12 @@ from typing import Any
 
 import typer.main
 
+from lugre_steering.chain.compose import HOOKS
 from lugre_steering.cli import app
 from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.live.table import OPTION_TABLE, TABLE, Parameter
+from lugre_steering.estimator.node_parameters import NODE_TABLE, OPTION_TABLE, NodeParameter
 from lugre_steering.schema import meanings_of, section_in, unit_of
 from lugre_steering.vehicle.plausible import KEYS
 from lugre_steering.vehicle.sections import Vehicle
@@ -31,7 +32,7 @@ ASKED = re.compile(r"^<!-- reference: (\w+) -->$", re.MULTILINE)
 
 
 @dataclasses.dataclass(frozen=True)
-class Key:
+class FileKey:
     """One key of a section of the vehicle file, as the page shows it."""
 
     name: str
@@ -42,30 +43,30 @@ class Key:
 
 
 @dataclasses.dataclass(frozen=True)
-class Section:
+class FileSection:
     """A mapping of the vehicle file: where it stands ('' for the file itself), what it is, its keys."""
 
     path: str
     meaning: str
-    keys: tuple[Key, ...]
+    keys: tuple[FileKey, ...]
 
 
-def sections(cls: type = Vehicle, path: str = "") -> Iterator[Section]:
+def sections(cls: type = Vehicle, path: str = "") -> Iterator[FileSection]:
     """The vehicle file's sections from the top down; ``NAME`` stands for a name of one's own, ``[]`` for each of a list."""
     hints, meanings = typing.get_type_hints(cls), meanings_of(cls)
     fields = dataclasses.fields(cls)
     keys = tuple(_key(item, meanings.get(item.name, ""), path) for item in fields)
-    yield Section(path, inspect.getdoc(cls) or "", keys)
+    yield FileSection(path, inspect.getdoc(cls) or "", keys)
     for item in fields:
         if (inner := section_in(hints[item.name])) is not None:
             ending = {tuple: "[]", dict: ".NAME"}.get(typing.get_origin(hints[item.name]), "")
             yield from sections(inner, f"{path}.{item.name}{ending}".removeprefix("."))
 
 
-def _key(item: dataclasses.Field[Any], meaning: str, path: str) -> Key:
+def _key(item: dataclasses.Field[Any], meaning: str, path: str) -> FileKey:
     key = f"{path}.{item.name}".removeprefix(".")
     usual = next((f"; usual {u.low:g} to {u.high:g}" for u in KEYS if u.key == key), "")
-    return Key(item.name, unit_of(item.name), _range(item.metadata) + usual, _default(item), meaning)
+    return FileKey(item.name, unit_of(item.name), _range(item.metadata) + usual, _default(item), meaning)
 
 
 def _range(metadata: Mapping[str, Any]) -> str:
@@ -112,10 +113,10 @@ def vehicle_keys() -> str:
 
 def node_parameters() -> str:
     """Every parameter of the live node."""
-    return table(("parameter", "default", "range", "at run time", "meaning"), [_parameter(p) for p in (*TABLE, *OPTION_TABLE)])
+    return table(("parameter", "default", "range", "at run time", "meaning"), [_parameter(p) for p in (*NODE_TABLE, *OPTION_TABLE)])
 
 
-def _parameter(p: Parameter) -> tuple[str, ...]:
+def _parameter(p: NodeParameter) -> tuple[str, ...]:
     default = str(p.default).lower() if isinstance(p.default, bool) else str(p.default)
     ranged = isinstance(p.default, (int, float)) and not isinstance(p.default, bool)
     span = ", ".join(p.choices) or (f"{p.low:g} to {p.high:g}" if ranged else "")
@@ -127,6 +128,12 @@ def effects() -> str:
     titles = {e.id: e.title + ("" if e.observable else f" (never named: needs {e.not_recorded})") for e in CATALOGUE.values()}
     rows = [(f"`{e.id}`", titles[e.id], e.stage, ", ".join(f"`{p.name}` [{p.unit}]" for p in e.parameters)) for e in CATALOGUE.values()]
     return table(("id", "physics", "stage", "parameters"), rows)
+
+
+def hooks() -> str:
+    """Where in the chain an effect may act."""
+    rows = [(f"`{name}`", hook.does.replace("``", "`"), _listed(hook.given) or "-") for name, hook in HOOKS.items()]
+    return table(("hook", "a law there gives", "and may read, beside what the hooks above it know"), rows)
 
 
 def law_parts() -> str:
@@ -158,7 +165,7 @@ def _option(parameter: Any) -> tuple[str, str]:
 
 
 TABLES: Mapping[str, Callable[[], str]] = {
-    "vehicle": vehicle_keys, "laws": law_parts, "parameters": node_parameters, "effects": effects, "commands": commands,
+    "vehicle": vehicle_keys, "laws": law_parts, "parameters": node_parameters, "effects": effects, "hooks": hooks, "commands": commands,
 }  # fmt: skip
 
 

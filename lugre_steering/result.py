@@ -34,14 +34,14 @@ class Result:
         return as_json(self.json)
 
 
-class Named(Protocol):
+class HasName(Protocol):
     """What has the name of a bag."""
 
     @property
     def name(self) -> str: ...
 
 
-N = TypeVar("N", bound=Named)
+N = TypeVar("N", bound=HasName)
 
 
 def of_bag(parts: Sequence[N], bag: int | str) -> N:

@@ -18,7 +18,7 @@ from lugre_steering.vehicle import Vehicle
 _MASS = {("m", "N"): "kg"}
 """Unit of force over acceleration where it has a name of its own; kg m2 for joints."""
 
-COORDINATES = {
+COORDINATE_UNITS = {
     "steering angle": "rad", "|steering angle|": "rad", "steering rate": "rad/s", "steering acceleration": "rad/s2",
     "angle since reversal": "rad", "accumulated slip": "rad", "dwell": "s", "direction": "1", "time": "s",
     "torque": "N m", "torque rate": "N m/s", "pressure sum": "Pa", "rubber temperature": "degC",

@@ -14,7 +14,7 @@ import pytest
 
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options
-from lugre_steering.live.state_file import read_state, write_state
+from lugre_steering.estimator.state_file import read_state, write_state
 from lugre_steering.vehicle import Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")

@@ -30,13 +30,13 @@ from lugre_steering.fleet.result import Fleet
 from lugre_steering.fleet.run import run
 from lugre_steering.fleet.tables import KINDS
 from lugre_steering.fleet.vehicles import member_of, read_members
-from lugre_steering.fleet.work import Options, Task, process
+from lugre_steering.fleet.work import FleetOptions, Task, process
 from lugre_steering.resources import config_folder
 from lugre_steering.schemas import schema_of
 
 VEHICLE = config_folder() / "test_vehicle.yaml"
 BAGS = Path(__file__).parents[1] / "bags"
-QUICK = Options(diagnose=False)
+QUICK = FleetOptions(diagnose=False)
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])}
 
 

@@ -20,7 +20,7 @@ from lugre_steering.cli import app
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import import_table, load_map, read_table
 from lugre_steering.importing.channels import outliers
-from lugre_steering.importing.map import UNITS, Csv, to_si
+from lugre_steering.importing.map import READABLE_UNITS, Csv, to_si
 from lugre_steering.vehicle import load
 
 VEHICLE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
@@ -67,7 +67,7 @@ def test_a_unit_is_what_its_definition_says(unit: str, one: float) -> None:
 
 def test_every_unit_is_tested_above() -> None:
     marks = test_a_unit_is_what_its_definition_says.pytestmark[0].args[1]
-    assert {unit for unit, _ in marks} == set(UNITS)
+    assert {unit for unit, _ in marks} == set(READABLE_UNITS)
 
 
 def test_csv_with_two_clocks_units_rate_and_an_epoch(tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
+from lugre_steering.estimator.node_parameters import ParameterError, read_options
 from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
-from lugre_steering.live.table import ParameterError, read_options
 from lugre_steering.recording import Kind
 from lugre_steering.replay.run import replay
 from lugre_steering.vehicle import Vehicle, load

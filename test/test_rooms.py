@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -35,31 +36,55 @@ def imports(file: Path) -> Iterator[str]:
 
 
 @cache
-def arrows(folders: bool) -> dict[str, set[str]]:
-    """Who imports whom; the front door of the package offers what lies behind it and is imported by nobody."""
-    found: dict[str, set[str]] = defaultdict(set)
-    for module, file in MODULES.items():
-        if module == PACKAGE.name:
-            continue
-        for other in imports(file):
-            assert other != PACKAGE.name, f"{module}: imports the package itself"
-            a, b = (name.split(".")[1] if folders else name for name in (module, other))
-            if a != b:
-                found[a].add(b)
+def imported() -> dict[str, set[str]]:
+    """Who imports whom, by module, but for the front door of the package: it offers what lies behind it."""
+    return {module: set(imports(file)) - {module} for module, file in MODULES.items() if module != PACKAGE.name}
+
+
+@cache
+def neighbours() -> dict[str, dict[str, set[str]]]:
+    """For each folder who imports whom of what lies in it: files, and folders as one with all that is in them."""
+    found: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for module, others in imported().items():
+        for other in others:
+            shared = [a for a, b in takewhile(lambda pair: pair[0] == pair[1], zip(module.split("."), other.split("."), strict=False))]
+            rest = module.split(".")[len(shared) :], other.split(".")[len(shared) :]
+            if all(rest):  # otherwise one is the front door of a folder that the other lies in
+                found[".".join(shared)][rest[0][0]].add(rest[1][0])
     return found
 
 
-@pytest.mark.parametrize("folders", [True, False], ids=["folders", "files"])
-def test_arrows_point_one_way(folders: bool) -> None:
+@pytest.mark.parametrize("where", ["files", *sorted(neighbours())])
+def test_arrows_point_one_way(where: str) -> None:
     try:
-        tuple(TopologicalSorter(arrows(folders)).static_order())
+        tuple(TopologicalSorter(imported() if where == "files" else neighbours()[where]).static_order())
     except CycleError as error:
-        pytest.fail(f"in a circle: {' <- '.join(error.args[1])}")
+        pytest.fail(f"{where}: in a circle: {' <- '.join(error.args[1])}")
+
+
+def test_nothing_imports_the_front_door() -> None:
+    assert [module for module, others in imported().items() if PACKAGE.name in others] == []
+
+
+def test_rooms_are_those_of_the_table_and_data_flow_down_it() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("## Rooms")[2].partition("## ")[0]
+    rows = [re.findall(r"`(\w+)/`", line.split("|")[1]) for line in text.splitlines() if line.startswith("| `")]
+    row = {room: number for number, rooms in enumerate(rows) for room in rooms}
+    assert sorted(row) == sorted(folder.parent.name for folder in PACKAGE.glob("*/__init__.py"))
+    against = [f"{a} -> {b}" for a, others in neighbours()[PACKAGE.name].items() for b in others if row.get(a, 99) < row.get(b, -1)]
+    assert against == []
+
+
+def test_live_is_ros_only() -> None:
+    live = {module: file for module, file in MODULES.items() if module.startswith(f"{PACKAGE.name}.live.")}
+    without = [module for module, file in live.items() if not re.search(r"rclpy|_msgs", file.read_text(encoding="utf-8"))]
+    assert without == []
 
 
 def test_the_chain_knows_no_vehicle_file_and_the_report_no_program() -> None:
-    assert arrows(folders=True)["chain"] <= {"errors", "recording"}
-    assert arrows(folders=True)["report"] <= {"errors", "files", "provenance", "recording", "units", "vehicle"}
+    arrows = neighbours()[PACKAGE.name]
+    assert arrows["chain"] <= {"errors", "recording"}
+    assert arrows["report"] <= {"errors", "files", "provenance", "recording", "units", "vehicle"}
 
 
 @cache

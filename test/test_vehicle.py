@@ -25,7 +25,7 @@ from typer.testing import CliRunner
 from lugre_steering.cli import app
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import ImplausibleWarning, LugreSteeringError, VehicleFileError
-from lugre_steering.live.table import read_options
+from lugre_steering.estimator.node_parameters import read_options
 from lugre_steering.schema import Reader
 from lugre_steering.sheet.derived import derive
 from lugre_steering.simulate.manoeuvres import from_yaml

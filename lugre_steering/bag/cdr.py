@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lugre_steering.bag.messages import Bytes
-from lugre_steering.recording import Array, IntArray
+from lugre_steering.recording import Array, IntArray, Mask
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"
@@ -130,9 +130,9 @@ def _column(rows: Bytes, at: int, dtype: str) -> NDArray[np.generic]:
 class Decoded:
     """Columns of n messages for j joints (1 for types without joints)."""
 
-    valid: NDArray[np.bool_]  # (n,) the message is well-formed
+    valid: Mask  # (n,) the message is well-formed
     stamp_ns: IntArray  # (n,)
-    carried: NDArray[np.bool_]  # (j, n) the message speaks of this joint
+    carried: Mask  # (j, n) the message speaks of this joint
     value: Array  # (j, n) NaN where it gives no value
     rate: Array  # (j, n)
 

@@ -40,14 +40,14 @@ class Skipped:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundBag:
     """Paths of recordings, each once, and what was left out."""
 
     bags: tuple[Path, ...]
     skipped: tuple[Skipped, ...] = ()
 
 
-def find(given: Sequence[Path], out: Path | None = None) -> Found:
+def find(given: Sequence[Path], out: Path | None = None) -> FoundBag:
     """The recordings that ``given`` means: bags as they are, folders with all that is in them, patterns (``**`` too).
 
     Left out: results of a replay that lie in a folder, and whatever is in ``out``. ``BagError`` for what is not there, for a
@@ -73,7 +73,7 @@ def find(given: Sequence[Path], out: Path | None = None) -> Found:
     bags = list({bag.resolve(): bag for bag in reversed(bags)}.values())[::-1]
     if out is not None:
         _refuse_among(bags, out)
-    return Found(tuple(bags), tuple(skipped))
+    return FoundBag(tuple(bags), tuple(skipped))
 
 
 def is_recording(path: Path) -> bool:

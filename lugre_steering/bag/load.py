@@ -23,6 +23,7 @@ from lugre_steering.recording import (
     Finding,
     IntArray,
     Kind,
+    Mask,
     Recording,
     Signal,
     unused_name,
@@ -218,7 +219,7 @@ def _usable(
     reasons: Counter[str] = Counter()
     use: IntArray = np.arange(len(stamp))
 
-    def reject(reason: str, bad: NDArray[np.bool_]) -> None:
+    def reject(reason: str, bad: Mask) -> None:
         nonlocal use
         if bad.any():
             reasons[reason] += int(bad.sum())
@@ -250,11 +251,11 @@ def confirmed(stamp: IntArray) -> IntArray:
     return np.asarray(np.minimum(stamp, following))
 
 
-def _late(stamp: IntArray) -> NDArray[np.bool_]:
+def _late(stamp: IntArray) -> Mask:
     return np.asarray(stamp < np.maximum.accumulate(stamp))
 
 
-def _doubled(stamp: IntArray) -> NDArray[np.bool_]:
+def _doubled(stamp: IntArray) -> Mask:
     """Which messages came after a clock was set back by less than ``LATE_NS``, between stamps that were there already.
 
     Late ones fill holes, or are few or mixed among others; these run on, one after the other.

@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lugre_steering.bag.compression import MESSAGE_LIMIT
+from lugre_steering.recording import Mask
 
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
 STATISTICS, SUMMARY_OFFSET, DATA_END = 11, 14, 15
@@ -48,7 +48,7 @@ class Record(NamedTuple):
     after: int
 
 
-def records(read: Read, at: int, end: int, known: NDArray[np.bool_]) -> Iterator[Record]:
+def records(read: Read, at: int, end: int, known: Mask) -> Iterator[Record]:
     """Every record from ``at`` to ``end`` that can be believed, and a ``GAP`` for each damaged stretch between them.
 
     ``known[channel]`` tells which channels messages may be of; only those are searched for. The last record may be torn.
@@ -95,7 +95,7 @@ def _header(read: Read, at: int, end: int) -> Record | None:
 class _Search:
     """Finds where records follow on each other again."""
 
-    def __init__(self, read: Read, end: int, known: NDArray[np.bool_]) -> None:
+    def __init__(self, read: Read, end: int, known: Mask) -> None:
         self._read, self._end, self._known, self._tries = read, end, known, _TRIES
 
     def after(self, at: int) -> int:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lugre_steering.bag.compression import MESSAGE_LIMIT, ZSTD_MAGIC, Allowance, TooLargeError, expand
 from lugre_steering.errors import BagError
-from lugre_steering.recording import IntArray
+from lugre_steering.recording import IntArray, Mask
 
 Bytes = NDArray[np.uint8]
 
@@ -48,7 +48,7 @@ class Messages:
     def __len__(self) -> int:
         return len(self.log_ns)
 
-    def take(self, which: slice | IntArray | NDArray[np.bool_]) -> Messages:
+    def take(self, which: slice | IntArray | Mask) -> Messages:
         """The selected messages over the same bytes."""
         return Messages(self.connection[which], self.log_ns[which], self.start[which], self.length[which], self.data)
 

@@ -85,7 +85,7 @@ class Controller:
         from sensor_msgs.msg import JointState
         from trajectory_msgs.msg import JointTrajectory
 
-        self._rclpy, self._topics = rclpy, vehicle.topics
+        self._topics = vehicle.topics
         self._context = rclpy.Context()
         rclpy.init(context=self._context, args=[])
         self.node = rclpy.create_node("controller", context=self._context)

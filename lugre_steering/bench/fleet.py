@@ -17,7 +17,7 @@ from typing import Any
 
 from lugre_steering.bench.replay import VEHICLE
 from lugre_steering.fleet.run import run as run_fleet
-from lugre_steering.fleet.work import Options
+from lugre_steering.fleet.work import FleetOptions
 from lugre_steering.pool import in_processes, processors
 from lugre_steering.serialise import as_json
 from lugre_steering.simulate.command import load_vehicle, run_manoeuvre
@@ -50,7 +50,7 @@ def measure(bags: Sequence[Path], workers: int, diagnose: bool) -> dict[str, Any
     """One fleet from nothing to its report, and again with all of it known."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
-        options = Options(diagnose=diagnose)
+        options = FleetOptions(diagnose=diagnose)
         starting = start_s(workers)
         begun = time.perf_counter()
         fleet = run_fleet(bags, VEHICLE, out, options=options, jobs=workers)
@@ -92,7 +92,7 @@ def run(argv: Sequence[str]) -> None:
     counts = sorted({1, 2, processors()} & set(range(1, processors() + 1)))
     with tempfile.TemporaryDirectory() as folder:
         bags = recordings(Path(folder), options.recordings)
-        run_fleet(bags[:1], VEHICLE, Path(folder) / "warm", options=Options(diagnose=options.diagnose), jobs=1)
+        run_fleet(bags[:1], VEHICLE, Path(folder) / "warm", options=FleetOptions(diagnose=options.diagnose), jobs=1)
         rows = [measure(bags, workers, options.diagnose) for workers in counts]
     result = {"diagnose": options.diagnose, "measured": rows, "hundred_thousand": estimate(rows[-1])}
     if options.json:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lugre_steering.bench import fuzz_text
-from lugre_steering.live.table import read_options
+from lugre_steering.estimator.node_parameters import read_options
 
 _FILE = "estimator_parameters.yaml"
 

@@ -83,12 +83,12 @@ def echo(vehicle_file: str, executor: str, size: int, results: Connection) -> No
     from rclpy.signals import SignalHandlerOptions
     from sensor_msgs.msg import FluidPressure, JointState
 
-    from lugre_steering.live.health import Window
+    from lugre_steering.live.health import Latencies
 
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("bench_echo")
     out, publisher = WrenchStamped(), node.create_publisher(WrenchStamped, "echo", QoSProfile(depth=50))
-    latency, own, heard = Window(size), Window(size), [0]
+    latency, own, heard = Latencies(size), Latencies(size), [0]
 
     def keep(_: Any) -> None:
         heard[0] += 1

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lugre_steering.recording import NODE, Array, Kind
-from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.simulate.plant import run
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 
 PERIOD_S = 0.01
 STROKE_S = 7.0

@@ -66,8 +66,6 @@ MISFIT = 1.5
 WORTH_SAYING = 0.1
 """Relative shift per relative error of a sheet value below which it goes without saying."""
 
-Progress = Callable[[str], None]
-
 
 ADVICE = {
     "friction_level": "varied-rates",
@@ -142,7 +140,7 @@ def calibrate_recordings(
     calibrations: Sequence[SheetValue] | None = None,
     *,
     priors: bool = True,
-    progress: Progress = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Calibrated:
     """Fit ``vehicle`` to the sound samples of recordings in memory.
 
@@ -177,7 +175,7 @@ def _summed_up(
     found: Sequence[BagFinding],
     first: str,
     priors: bool,
-    progress: Progress,
+    progress: Callable[[str], None],
 ) -> result.Calibration:
     """What the fit came to; ``first`` is what its statement begins with."""
     progress("judging on held-out stretches")

@@ -35,7 +35,6 @@ STEP_REMAINDER = 0.25
 """Share of the time step's error that may be left after it was taken out."""
 
 
-
 @dataclass(frozen=True)
 class Estimate:
     """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles and weather), then
@@ -85,11 +84,9 @@ def estimate(
     problem: Problem, effects: Effects = (), *, priors: bool = True, seed: int = 0, draws: int = DRAWS
 ) -> Estimate:
     """Fit all valid samples, learn the noise, fit again with it, and work out the covariance; ``effects`` are fitted as well."""
-    valid = problem.valid.astype(float)
-    weight = valid / np.concatenate([run.sigma for run in problem.runs])
-    first = fit(problem, weight, effects, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    first = fit(problem, problem.sensor_weight, effects, linearisations=LINEARISATIONS, robust=True, priors=priors)
     noise = noise_model(problem, first.x, first.effects, repeated_motion(problem, draws, seed), seed=seed)
-    weight = valid / noise.sigma
+    weight = problem.valid / noise.sigma
     step = step_error(problem, first.x, first.effects)
     refined = copy.copy(problem)
     refined.measured = problem.measured - step  # the same as adding the error to every prediction

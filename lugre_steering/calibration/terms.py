@@ -11,10 +11,10 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.calibration.estimate import DRAWS, Estimate
 from lugre_steering.calibration.result import FittedKey
-from lugre_steering.diagnosis.search.rig import carried
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.problem import Effects, Problem, is_rig
+from lugre_steering.fitting.rig import carried
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
 EDGE = 0.01
@@ -25,10 +25,9 @@ def terms_of(problem: Problem, seed: int = 0) -> Effects:
     """The terms and where their fit may begin; none for a vehicle, or for what the vehicle file has."""
     if not is_rig(problem.vehicle):
         return ()
-    valid = problem.valid.astype(float)
-    first = fit(problem, valid / np.concatenate([run.sigma for run in problem.runs]), robust=True)
+    first = fit(problem, problem.sensor_weight, robust=True)
     noise = noise_model(problem, first.x, (), repeated_motion(problem, DRAWS, seed), seed=seed)
-    weight = valid / noise.sigma
+    weight = problem.valid / noise.sigma
     found = carried(problem, noise, weight, fit(problem, weight, start=first.x))
     return found[-1][0].effects if found else ()
 

@@ -25,6 +25,8 @@ from numba.core import caching, dispatcher
 _SEAL = hashlib.sha256
 _SEAL_BYTES = _SEAL().digest_size
 _told: set[str] = set()
+_listener: Callable[[str], None] | None = None
+COMPILING = "compiling the model, once for this computer and these effects; this takes up to a minute"
 LONGEST_COMPILE_S = 180.0
 
 
@@ -114,8 +116,8 @@ class _KeptCode(caching.FunctionCache):
                 kept = super().load_overload(sig, target_context)
             if kept is not None:
                 self._end(sig)
-            if kept is None and sys.stderr.isatty():  # somebody waits and wonders
-                _tell("compiling the model, once for this computer and these effects; this takes up to a minute")
+            if kept is None:
+                _tell_waiting()
             return kept
         except Exception:  # unpickling what another version has sealed may raise anything
             _tell(f"the code kept in {_folder()} is damaged or cannot be read: it is compiled anew")
@@ -174,6 +176,23 @@ def _check(path: str) -> None:
         return
     if len(content) <= _SEAL_BYTES or _SEAL(content[:-_SEAL_BYTES]).digest() != content[-_SEAL_BYTES:]:
         raise _DamagedError(f"{path}: damaged")
+
+
+def tell_compiling(listener: Callable[[str], None]) -> None:
+    """Tell ``listener`` when code is compiled because none is kept, once from now on."""
+    global _listener
+    _listener = listener
+    _told.discard(COMPILING)
+
+
+def _tell_waiting() -> None:
+    """Somebody may wait and wonder: at a terminal, or before a log."""
+    if _listener is None:
+        if sys.stderr.isatty():
+            _tell(COMPILING)
+    elif COMPILING not in _told:
+        _told.add(COMPILING)
+        _listener(COMPILING)
 
 
 def _tell(text: str) -> None:

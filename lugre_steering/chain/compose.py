@@ -26,7 +26,7 @@ from lugre_steering.chain.layout import BASELINE_FIELDS, STATE_FIELDS
 from lugre_steering.chain.template import SENSED, STEP, WIND_UP
 from lugre_steering.errors import EffectError
 
-Law = Callable[..., Any]
+LawFunction = Callable[..., Any]
 
 
 class Parametric(Protocol):
@@ -46,7 +46,7 @@ class Physics(Protocol):
     @property
     def memory(self) -> Mapping[str, float | str | tuple[float, ...]]: ...
     @property
-    def hooks(self) -> Mapping[str, Law]: ...
+    def hooks(self) -> Mapping[str, LawFunction]: ...
     @property
     def tables(self) -> Mapping[str, int]: ...
     @property
@@ -119,15 +119,9 @@ class Composition:
     lines: np.dtype[np.void]
     starts: Mapping[str, float | str]
     """Memory that does not begin at zero: its field of the state, and a number or the baseline parameter that it begins with."""
-    step: Law
-    arm_factor: Law
-    line_error: Law
-
-    @property
-    def effect_fields(self) -> tuple[str, ...]:
-        """Parameters of the effects in the record of a track."""
-        assert self.parameters.names is not None
-        return self.parameters.names[len(BASELINE_FIELDS) : -1]
+    step: LawFunction
+    arm_factor: LawFunction
+    line_error: LawFunction
 
 
 _made: dict[str, Composition] = {}
@@ -207,11 +201,11 @@ def check(effect: Physics) -> None:
         raise EffectError(f"effect '{effect.id}': {', '.join(idle)}: no law reads it; expected an argument of that name")
 
 
-def _arguments(function: Law) -> tuple[str, ...]:
+def _arguments(function: LawFunction) -> tuple[str, ...]:
     return tuple(inspect.signature(getattr(function, "py_func", function)).parameters)
 
 
-def _source(function: Law) -> str:
+def _source(function: LawFunction) -> str:
     plain = getattr(function, "py_func", function)
     if written := getattr(plain, "__source__", None):
         return str(written)

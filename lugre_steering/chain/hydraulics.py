@@ -9,14 +9,6 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.chain.compiled import law
-from lugre_steering.recording import Array
-
-
-def cylinder_length(theta: Array, chassis_m: tuple[float, ...], knuckle_m: tuple[float, ...]) -> Array:
-    """Pin-to-pin length [m] (n,) of a cylinder whose knuckle pivot turned by ``theta`` [rad] about the hinge."""
-    x = knuckle_m[0] * np.cos(theta) - knuckle_m[1] * np.sin(theta)
-    y = knuckle_m[0] * np.sin(theta) + knuckle_m[1] * np.cos(theta)
-    return np.hypot(x - chassis_m[0], y - chassis_m[1])
 
 
 @law

@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.recording import Array, Finding, IntArray
+from lugre_steering.recording import Array, Finding, IntArray, Mask
 
 THRESHOLD = 6.0
 """In robust standard deviations of what is left after a running median."""
@@ -61,7 +60,7 @@ class Bursts:
             "a disturbance from outside, not a law of the motion"
         )
 
-    def covers(self, time: Array) -> NDArray[np.bool_]:
+    def covers(self, time: Array) -> Mask:
         """Samples (n,) inside a burst or its margin."""
         inside = np.zeros(time.size, bool)
         for start, end in self.intervals:

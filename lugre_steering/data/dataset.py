@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lugre_steering.data.sensing import Sensing, sensed
+from lugre_steering.data.sensing import SensorNoise, sensed
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.data.stamps import evened
 from lugre_steering.errors import DataError
-from lugre_steering.recording import Array, Kind, Recording, Signal
-from lugre_steering.simulate.actuation import line_pressures, total_gains
+from lugre_steering.recording import Array, Kind, Mask, Recording, Signal
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.size import angle_unit
 
@@ -48,14 +48,14 @@ class Run:
     side_slope: Array
     measured: Array
     sigma: Array
-    valid: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    valid: Mask
     air: tuple[tuple[float, float], ...] = ()
     """Instants [s] from which the recorded air has another temperature [degC]; before the first, that of the vehicle file."""
     angle_unit: float = 1.0
     """Size of the machine's travel, in which the rate is given below which it counts as standing."""
     first_air: float | None = None
     """Recorded air temperature [degC] at the start; None where none was recorded."""
-    angle: Sensing = field(default_factory=lambda: Sensing(0.0, 0.0))
+    angle: SensorNoise = field(default_factory=lambda: SensorNoise(0.0, 0.0))
     """The worst angle sensor as one sample of this clock shows it [rad]."""
     rounding: Array = field(default_factory=lambda: np.zeros(0))
     """Step of each pressure sensor [Pa] (lines,) that its noise does not dither; 0 elsewhere, empty if none has one."""
@@ -96,7 +96,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     time, valid = _clock(recording.name, present)
     seen = {name: _on_clock(time, signal, sensed(signal)) for name, signal in present.items()}
     worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
-    angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else Sensing(vehicle.sensors.angle_sigma, 0.0)
+    angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else SensorNoise(vehicle.sensors.angle_sigma, 0.0)
     theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), angle.sigma()) for side in vehicle.sides])
     omega, alpha = motion(time, theta)
     rounding = np.zeros(0)
@@ -180,7 +180,7 @@ def ideal_run(vehicle: Vehicle, name: str, time: Array, theta: Array, rates: tup
     )  # fmt: skip
 
 
-def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, Mask]:
     """Uniform clock over the span that all channels share, at the slowest channel's rate; false where any has a gap."""
     spacing = {key: float(np.median(np.diff(signal.time_s))) for key, signal in signals.items()}
     step = max(*spacing.values(), 1.0 / MAX_RATE_HZ)
@@ -201,10 +201,10 @@ def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, np.ndarray[tup
     return time, valid
 
 
-def _on_clock(time: Array, signal: Signal, sensor: Sensing) -> Sensing:
+def _on_clock(time: Array, signal: Signal, sensor: SensorNoise) -> SensorNoise:
     """What a sample of the clock has of a sensor's noise: less where several samples are averaged."""
     averaged = _averaged(time, signal)
-    return sensor if sensor.coarse else Sensing(sensor.sigma(averaged), 0.0)
+    return sensor if sensor.coarse else SensorNoise(sensor.sigma(averaged), 0.0)
 
 
 def _averaged(time: Array, signal: Signal) -> int:

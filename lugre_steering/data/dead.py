@@ -19,8 +19,8 @@ from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.data.sensing import white_noise
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
-from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.model import build_model
 
 MEAN_S = 0.25
@@ -45,7 +45,7 @@ HELD = 0.2
 """Share of a recording in which an angle sensor may stand at an end of its range."""
 
 
-Topics = dict[tuple[Kind, str], str]
+TopicNames = dict[tuple[Kind, str], str]
 
 
 def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
@@ -87,7 +87,7 @@ def _signals(recording: Recording, vehicle: Vehicle) -> Iterator[tuple[Kind, str
             yield Kind.PRESSURE, line, recording.pressure[line]
 
 
-def _noise_alone(recording: Recording, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+def _noise_alone(recording: Recording, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """All angles, or all pressures, hold more white noise than anything else."""
     for kind, what in ((Kind.ANGLE, "angle"), (Kind.PRESSURE, "pressure")):
         shown = [(name, signal) for of, name, signal in _signals(recording, vehicle) if of is kind and signal.time_s.size >= 100]
@@ -108,7 +108,7 @@ def _moved(recording: Recording, vehicle: Vehicle, kind: Kind) -> bool:
     return all(own) or any(others)
 
 
-def _rough(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+def _rough(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """Angles too noisy to follow a bristle; a rig's stiffness is a guess, by which nothing is judged."""
     if vehicle.contact is not None:
         return
@@ -129,7 +129,7 @@ def _travel(run: Run, values: Array) -> float:
     return float(np.ptp(smooth)) if smooth.size else 0.0
 
 
-def _frozen(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+def _frozen(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """One angle that stays while the other turns."""
     record = build_model(vehicle).parameters[0][0]
     spans = [float(np.ptp(theta)) for theta in run.theta]
@@ -159,7 +159,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def _copied(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+def _copied(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """Both angles alike where the steering geometry makes them differ."""
     both = _geometry(run, vehicle)
     if both is None:
@@ -174,7 +174,7 @@ def _copied(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _zeros(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+def _zeros(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """Zeros of the angles so far off that the steering geometry shows it."""
     both = _geometry(run, vehicle)
     if both is None:
@@ -193,7 +193,7 @@ def _zeros(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
             yield _finding("angle_zero", topics[Kind.ANGLE, side], statement)
 
 
-def _constant(run: Run, vehicle: Vehicle, topics: Topics) -> Iterator[Finding]:
+def _constant(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """Circuits of which no line moves though the tracks turned against friction."""
     if vehicle.hydraulics is None:
         return

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
@@ -24,11 +23,10 @@ from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.sensing import FOURTH, worse_than_said
 from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring, span
-from lugre_steering.recording import Array, Channel, Finding, Kind, Recording, Signal
+from lugre_steering.recording import Array, Channel, Finding, Kind, Mask, Recording, Signal
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import build_model
 
-Mask = NDArray[np.bool_]
 Intervals = tuple[tuple[float, float], ...]
 
 STUCK_S = 1.0

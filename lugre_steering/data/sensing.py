@@ -28,7 +28,7 @@ STEPS_SEEN = 0.9
 
 
 @dataclass(frozen=True)
-class Sensing:
+class SensorNoise:
     """``noise`` standard deviation of the white part of one sample (rounding included where noise dithers it), ``resolution`` its
     step (0: none seen), both in the channel's unit."""
 
@@ -91,6 +91,6 @@ def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -
     return "; ".join(said) or None
 
 
-def sensed(signal: Signal) -> Sensing:
+def sensed(signal: Signal) -> SensorNoise:
     """Steps and noise of a channel."""
-    return Sensing(white_noise(signal), resolution(signal.value))
+    return SensorNoise(white_noise(signal), resolution(signal.value))

@@ -18,11 +18,11 @@ from rich.text import Text
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.data.dataset import Run, ideal_run
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.fingerprint import candidates
 from lugre_steering.effects import registry
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.files import output_folder
+from lugre_steering.fitting.fingerprint import candidates
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.report import words

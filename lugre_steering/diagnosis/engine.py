@@ -16,8 +16,8 @@ from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.diagnosis.case import Case, by_bag
 from lugre_steering.diagnosis.conclude.conclusion import conclude
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_out import left_out
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import Diagnosis
@@ -41,8 +41,6 @@ MISPLACED_RAD = 0.05
 WORTH_A_SHEET = 0.5
 """Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
-Progress = Callable[[str], None]
-
 
 def diagnose(
     bags: Sequence[Path],
@@ -50,7 +48,7 @@ def diagnose(
     *,
     seed: int = 1,
     material: float = MATERIAL_SHARE,
-    progress: Progress = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Read and diagnose bags of one vehicle together; two of one name get numbers."""
     recordings = read_recordings(bags, vehicle.channels, progress)
@@ -63,7 +61,7 @@ def diagnose_recordings(
     *,
     seed: int = 1,
     material: float = MATERIAL_SHARE,
-    progress: Progress = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Diagnose recordings of one vehicle together; effects that the vehicle file already has stay in the baseline."""
     if not recordings:
@@ -92,7 +90,7 @@ def diagnose_recordings(
 
 
 def _searched(
-    case: Case, pieces: Sequence[Recording], clocks: Synchronised, seed: int, progress: Progress
+    case: Case, pieces: Sequence[Recording], clocks: Synchronised, seed: int, progress: Callable[[str], None]
 ) -> tuple[Finished, Synchronised] | Diagnosis:
     """The finished search and the clocks that it was made with; or the answer where the sheet or the recordings do not allow one."""
     problem, samples = clocks.problem, int(split(clocks.problem).fit.sum())

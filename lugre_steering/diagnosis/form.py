@@ -17,6 +17,7 @@ from lugre_steering.chain.lag import lagged
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.refine import given_law
 from lugre_steering.effects import laws
+from lugre_steering.fitting.clocks import still_apart
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
@@ -34,8 +35,7 @@ WARMTH, WARMTH_K = 0.05, 20.0
 RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
 """Share of the torque that follows so many seconds late: the loss factor of treads."""
 RELAXATION = "its relaxation"
-LATE_S, LATE = 0.015, "the clocks of its sensors"
-"""How far pressures and angles may still be apart once their clocks are set, which is done beside a law of another form."""
+LATE = "the clocks of its sensors"
 SMALL = 0.2
 """Share of a freedom by which its effect on the torque is found: small enough to be linear."""
 
@@ -69,14 +69,7 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
     words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
     freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
-    return freer.bent([clocks(problem, base)]), words
-
-
-def clocks(problem: Problem, torque: Array) -> Array:
-    """Columns (n, bags): what a torque (n,) changes by if the sensors of a bag are LATE_S apart, whatever the friction is like."""
-    parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)
-    changes = np.concatenate([np.gradient(part, run.time) for run, part in parts])
-    return np.column_stack([LATE_S * changes * (problem.bag == bag) for bag in range(len(problem.runs))])
+    return freer.bent([still_apart(problem, base)]), words
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:

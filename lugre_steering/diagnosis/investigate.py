@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.search.search import search
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array, IntArray
 
 NULL_DRAWS = 16
@@ -77,8 +77,7 @@ def _unbent(problem: Problem, weight: Array, baseline: Fit) -> Fit:
 
 def recalibrate(problem: Problem, repeated: Sequence[Sequence[Run]], seed: int) -> tuple[Noise, Split, Fit]:
     """Baseline fitted with sheet noise first, then with the noise measured at that fit, on the split that suits its errors."""
-    sheet = np.concatenate([run.sigma for run in problem.runs])
-    weight = np.where(split(problem).fit, 1.0 / sheet, 0.0)
+    weight = np.where(split(problem).fit, 1.0 / problem.sigma, 0.0)
     starts = [fit(problem, weight, linearisations=25, robust=robust, tolerance=TRIAL_TOLERANCE) for robust in (False, True)]
     first = min((fit(problem, weight, start=start, linearisations=10) for start in starts), key=lambda f: f.cost)
     noise = noise_model(problem, first.x, (), repeated, seed=seed)

@@ -51,7 +51,7 @@ def law_fields(entry: LawEntry) -> dict[str, float | Array]:
     return laws.record(entry.channel, entry.coordinate, entry.memory, entry.memory_size, span, f, seen=(low, high))
 
 
-STAGES: Mapping[str, str] = {
+STAGE_OF: Mapping[str, str] = {
     "friction_level": "contact", "presliding_stiffness": "contact", "conservative_torque": "parallel_torque", "inertia": "parallel_torque",
 }  # fmt: skip
 """Where in the chain a channel belongs; all others with losses and sensors."""
@@ -67,7 +67,7 @@ def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
     constants = law_fields(entry)
     del constants["size"]
     return laws.law_effect(
-        identity, title, constants, stage=STAGES.get(entry.channel, "measurement"), source=source, trace=entry.title or title,
+        identity, title, constants, stage=STAGE_OF.get(entry.channel, "measurement"), source=source, trace=entry.title or title,
         equation=f"{entry.channel} x {entry.form} of {entry.coordinate}", coordinate=TOLD_BY.get(entry.coordinate, "time"),
         counts_from_start=entry.coordinate in ("time", "slip", "work"),
     )  # fmt: skip

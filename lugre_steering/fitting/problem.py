@@ -199,6 +199,8 @@ class Problem:
         self.calibrations = tuple(calibrations_for(vehicle) if calibrations is None else calibrations)
         self.measured = np.concatenate([run.measured for run in runs])
         self.valid = np.concatenate([run.valid for run in runs])
+        self.sigma = np.concatenate([run.sigma for run in runs])
+        """Standard deviation (n,) of the measured torque [N m] by the sensors alone, as the vehicle file and the recording say."""
         self.bag = np.concatenate([np.full(run.time.size, i) for i, run in enumerate(runs)])
         self.edges = np.concatenate([[0], np.cumsum([run.time.size for run in runs])])
         self.bends = np.zeros((self.measured.size, 0)) if bends is None else bends
@@ -213,6 +215,11 @@ class Problem:
         self.standing = standing_effects(vehicle)
         self._last_bending: tuple[bytes | None, Array] = None, np.zeros(self.measured.size)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
+
+    @property
+    def sensor_weight(self) -> Array:
+        """One over ``sigma`` (n,) [1/(N m)] where samples are valid, 0 elsewhere: before a fit has shown the noise."""
+        return np.asarray(self.valid / self.sigma)
 
     @property
     def nuisances(self) -> int:

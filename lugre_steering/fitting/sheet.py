@@ -187,7 +187,7 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     """
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
-    named = fit(thin, _weight(thin), [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
+    named = fit(thin, thin.sensor_weight, [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
     least = FORETOLD * EXPLAINED
     levels = _levels(thin) if _foretold(thin, baseline) > least else ()
     found = sorted((tried.suspect for tried in _off((*levels, *_geometries(thin, baseline, least)))), key=lambda item: item.cost)
@@ -202,7 +202,7 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
 
 def _foretold(problem: Problem, baseline: Fit) -> float:
     """Share of what is left beyond noise that levels without any prior would explain, to first order."""
-    weight = _weight(problem)
+    weight = problem.sensor_weight
     left = (problem.measured - baseline.prediction) * weight
     columns = np.column_stack([baseline.jacobian, baseline.prediction * weight])
     along = np.linalg.qr(normalised(columns))[0].T @ left
@@ -258,12 +258,8 @@ def _every(run: Run, stride: int) -> Run:
     )  # fmt: skip
 
 
-def _weight(problem: Problem) -> Array:
-    return np.asarray(problem.valid / np.concatenate([run.sigma for run in problem.runs]))
-
-
 def _fitted(problem: Problem, start: Array | None = None, effects: Sequence[tuple[Candidate, Values]] = ()) -> Fit:
-    return fit(problem, _weight(problem), effects, start, robust=True, linearisations=25 if effects else 15, tolerance=1e-4)
+    return fit(problem, problem.sensor_weight, effects, start, robust=True, linearisations=25 if effects else 15, tolerance=1e-4)
 
 
 def _surprise(problem: Problem, result: Fit, freed: Sequence[str] = ()) -> float:
@@ -385,7 +381,7 @@ def _better(
 ) -> tuple[float, float]:
     """The factor on one entry that explains most of what is left, by how it changes the measured torque, and which share of what is
     left beyond noise it would explain."""
-    weight = _weight(trial)
+    weight = trial.sensor_weight
     turned = (_changed(problem, change(factor * 1.02)).measured - trial.measured) * weight / 0.02
     basis = result.basis()
     own = turned - basis @ (basis.T @ turned)
@@ -399,7 +395,7 @@ def _better(
 
 def _could_be_better(problem: Problem, trial: Problem, baseline: Fit) -> bool:
     """Whether, whatever is recalibrated, to first order less is left in a changed measured torque than the baseline leaves."""
-    weight, basis = _weight(trial), baseline.basis()
+    weight, basis = trial.sensor_weight, baseline.basis()
     before, after = ((each.measured - baseline.prediction) * weight for each in (problem, trial))
     own = after - basis @ (basis.T @ after)
     shown, seen = (float(np.sum(each.measured[each.valid] ** 2)) for each in (trial, problem))

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.recording import Array
-
-Mask = NDArray[np.bool_]
+from lugre_steering.recording import Array, Mask
 
 BLOCK_S = 8.0
 SPARED_S = 1.0

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from lugre_steering.bag.find import Skipped
 from lugre_steering.fleet.changes import Difference
 from lugre_steering.fleet.claims import Claim, Outlier, Shared
-from lugre_steering.fleet.work import Options
+from lugre_steering.fleet.work import FleetOptions
 from lugre_steering.gate import Facts, Gate
 from lugre_steering.result import Result
 
@@ -51,7 +51,7 @@ class Fleet(Result):
     finished: bool
     version: str
     date: str
-    options: Options
+    options: FleetOptions
     vehicles: tuple[VehicleSummary, ...]
     recordings: int
     examined: int

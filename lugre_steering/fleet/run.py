@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -25,11 +25,10 @@ from lugre_steering.fleet.result import PAGE, RECORD, SCHEMA, Fleet, VehicleSumm
 from lugre_steering.fleet.store import Store
 from lugre_steering.fleet.tables import KINDS, need_parquet, rows, write_tables
 from lugre_steering.fleet.vehicles import Member, member_of, read_members
-from lugre_steering.fleet.work import Options, Record, Task, nothing, process
-from lugre_steering.pool import WorkerDiedError, in_processes, processors
+from lugre_steering.fleet.work import FleetOptions, Record, Task, nothing, process
+from lugre_steering.pool import Progress, WorkerDiedError, in_processes, processors
 
 STORE = "recordings"
-Progress = Callable[[str, int, "int | None"], None]
 
 
 def run(
@@ -37,7 +36,7 @@ def run(
     vehicles: Path,
     out: Path,
     *,
-    options: Options | None = None,
+    options: FleetOptions | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
     skipped: Sequence[Skipped] = (),
@@ -50,7 +49,7 @@ def run(
     ``skipped``: what has been left out before; ``version``: that of the program, under which records are kept.
     """
     need_parquet()
-    options, version, begun = options or Options(), version or code_version(), time.perf_counter()
+    options, version, begun = options or FleetOptions(), version or code_version(), time.perf_counter()
     members = read_members(vehicles)
     jobs = jobs or processors()
     with output_folder(out):
@@ -114,7 +113,7 @@ def _work(tasks: Sequence[Task], jobs: int, scheduler: str | None) -> Iterator[R
 
 
 def _summary(
-    records: Sequence[Record], members: Sequence[Member], skipped: Sequence[Skipped], options: Options, version: str,
+    records: Sequence[Record], members: Sequence[Member], skipped: Sequence[Skipped], options: FleetOptions, version: str,
     found: Sequence[Claim] = (), *, earlier: dict[str, Record] | None = None, workers: int = 0, seconds: float = 0.0,
 ) -> Fleet:  # fmt: skip
     """What all records came to; without ``earlier``, that a run has begun."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lugre_steering.diagnosis.investigate import NULL_DRAWS, recalibrate
-from lugre_steering.diagnosis.search.fingerprint import candidates, signature
+from lugre_steering.fitting.fingerprint import candidates, signature
 from lugre_steering.fitting.noise import repeated_motion
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array

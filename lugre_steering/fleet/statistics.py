@@ -7,10 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize, stats
 
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, Mask
 
 CONFIDENCE = 0.95
 LEAST_CHANGE, LEAST_TREND = 6, 8
@@ -129,7 +129,7 @@ def trend(x: ArrayLike, y: ArrayLike) -> Trend | None:
     return Trend(float(np.median(rise[run != 0.0] / run[run != 0.0])), 1.0 if np.isnan(p) else p)
 
 
-def outliers(value: Array) -> NDArray[np.bool_]:
+def outliers(value: Array) -> Mask:
     """Which of the values (n,) lie far from the others; none of fewer than five."""
     distance = np.abs(value - np.median(value))
     middle = float(np.median(distance))

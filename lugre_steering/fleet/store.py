@@ -10,13 +10,13 @@ from pathlib import Path
 
 from lugre_steering.files import read_record
 from lugre_steering.fleet.content import key_of
-from lugre_steering.fleet.work import SCHEMA, Options, Record, unchanged
+from lugre_steering.fleet.work import SCHEMA, FleetOptions, Record, unchanged
 
 
 class Store:
     """All records in a folder; ``version``: of the program that asks."""
 
-    def __init__(self, folder: Path, version: str, options: Options) -> None:
+    def __init__(self, folder: Path, version: str, options: FleetOptions) -> None:
         self.folder, self.version, self.options = folder, version, options
         self._of_bag: dict[str, list[Record]] = {}
         for record in self._read():

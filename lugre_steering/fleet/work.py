@@ -40,7 +40,7 @@ measured torque [N m]; ``verdict``, ``effects``, ``estimates``: of the diagnosis
 
 
 @dataclass(frozen=True)
-class Options:
+class FleetOptions:
     """What decides about a result beside bag, vehicle and program."""
 
     diagnose: bool = True
@@ -57,7 +57,7 @@ class Task:
     vehicle_file: Path
     store: Path
     version: str
-    options: Options
+    options: FleetOptions
     physics: Mapping[str, str]
 
 
@@ -144,7 +144,7 @@ def _examined(task: Task, vehicle: Vehicle) -> Record:
     return record | _diagnosed(recording, quality, vehicle, task.options) if task.options.diagnose else record
 
 
-def _diagnosed(recording: Recording, quality: Quality, vehicle: Vehicle, options: Options) -> Record:
+def _diagnosed(recording: Recording, quality: Quality, vehicle: Vehicle, options: FleetOptions) -> Record:
     """What a diagnosis of the recording alone says, and how much of each effect it shows."""
     try:
         found = diagnose_recordings([recording], vehicle, seed=options.seed)

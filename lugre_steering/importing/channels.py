@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.expression import ExpressionError
 from lugre_steering.importing.evaluate import Columns, evaluate, same_length, times, unit_of
 from lugre_steering.importing.map import ImportMap
 from lugre_steering.importing.table import Table
-from lugre_steering.recording import Array, IntArray
+from lugre_steering.recording import Array, IntArray, Mask
 
 GAP_FACTOR = 5.0
 """A pause of so many median sampling intervals counts as a gap."""
@@ -32,7 +31,7 @@ class Imported:
     unit: str
     time_s: Array
     value: Array
-    rows: NDArray[np.bool_]
+    rows: Mask
     missing: int
     outside: int
     rate: Array | None = None

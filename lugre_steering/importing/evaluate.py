@@ -11,7 +11,17 @@ import numpy as np
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.expression import ExpressionError, parse
-from lugre_steering.importing.map import UNITS, Arm, Chamber, Clock, CylinderForce, ImportMap, Pivots, Source, to_si
+from lugre_steering.importing.map import (
+    READABLE_UNITS,
+    Arm,
+    Chamber,
+    Clock,
+    CylinderForce,
+    ImportMap,
+    Pivots,
+    Source,
+    to_si,
+)
 from lugre_steering.importing.table import Table
 from lugre_steering.recording import Array
 
@@ -139,7 +149,7 @@ def unit_of(source: Source) -> str:
     if source.pivots is not None:
         return "rad"
     assert source.unit is not None
-    return _SI[UNITS[source.unit][0]]
+    return _SI[READABLE_UNITS[source.unit][0]]
 
 
 _SI: Mapping[str, str] = {

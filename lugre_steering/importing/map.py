@@ -17,7 +17,7 @@ from lugre_steering.vehicle.check import TOPIC
 
 SCHEMA = "lugre_steering/import/1"
 
-UNITS: Mapping[str, tuple[str, float, float]] = {
+READABLE_UNITS: Mapping[str, tuple[str, float, float]] = {
     "s": ("time", 1.0, 0.0), "ms": ("time", 1e-3, 0.0), "us": ("time", 1e-6, 0.0), "ns": ("time", 1e-9, 0.0),
     "min": ("time", 60.0, 0.0),
     "rad": ("angle", 1.0, 0.0), "mrad": ("angle", 1e-3, 0.0), "deg": ("angle", 0.017453292519943295, 0.0),
@@ -58,7 +58,7 @@ _DIMENSIONS = {
 
 def to_si(value: Array, unit: str) -> Array:
     """``value`` (n,) in ``unit`` -> SI (temperatures: degC)."""
-    _, factor, constant = UNITS[unit]
+    _, factor, constant = READABLE_UNITS[unit]
     return value * factor + constant
 
 
@@ -277,7 +277,7 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
         angle = f"angle/{rest}"
         if angle not in found.channels or found.clock(angle) != found.clock(name):
             raise reader.fail(key, name, f"{angle} beside it, on the same time column (both go into one message)")
-        dimension = UNITS.get(found.channels[angle].unit or "", ("angle",))[0]  # pivots: no unit, an angle
+        dimension = READABLE_UNITS.get(found.channels[angle].unit or "", ("angle",))[0]  # pivots: no unit, an angle
         _check_unit(reader, f"{key}.unit", source.unit, ("speed",) if dimension == "length" else ("angular speed",))
 
 
@@ -312,6 +312,6 @@ def _check_pivots(reader: Reader, key: str, kind: str, source: Source, pivots: P
 
 
 def _check_unit(reader: Reader, key: str, unit: str | None, dimensions: tuple[str, ...]) -> None:
-    fitting = [name for name, (dimension, _, _) in UNITS.items() if dimension in dimensions]
+    fitting = [name for name, (dimension, _, _) in READABLE_UNITS.items() if dimension in dimensions]
     if unit not in fitting:
         raise reader.fail(key, unit, f"one of {', '.join(fitting)}")

@@ -15,9 +15,9 @@ import yaml
 
 from lugre_steering.errors import LugreSteeringError, MapFileError
 from lugre_steering.importing.channels import read_channels
-from lugre_steering.importing.map import SCHEMA, UNITS, Csv, load_map
+from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Csv, load_map
 from lugre_steering.importing.plausible import DEGREES, check_units
-from lugre_steering.importing.read import KINDS, read_table
+from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.table import Table
 from lugre_steering.importing.words import tells, unit_in
@@ -42,7 +42,7 @@ class Guess:
 def propose(file: Path, map_file: Path) -> dict[str, Any]:
     """Write a map for ``file``; returns what was guessed, what was not used, and whether the map works."""
     options, reasons = Csv(), list[str]()
-    if file.is_file() and file.suffix.lower() not in KINDS:
+    if file.is_file() and file.suffix.lower() not in FORMATS:
         options, reasons = sniff(file)
         options, more = _allowances(file, options)
         reasons += more
@@ -120,11 +120,11 @@ def _clock(table: Table, name: str, named: bool) -> Guess:
 
 
 def _rate(step: float, unit: str) -> str:
-    return f"{1.0 / (step * UNITS[unit][1]):.4g} samples per second"
+    return f"{1.0 / (step * READABLE_UNITS[unit][1]):.4g} samples per second"
 
 
 def _unix(table: Table, clock: Guess) -> bool:
-    seconds = np.nanmedian(table.columns[clock.column]) * UNITS[clock.unit][1]
+    seconds = np.nanmedian(table.columns[clock.column]) * READABLE_UNITS[clock.unit][1]
     return bool(seconds > _UNIX[-1][0])
 
 
@@ -174,7 +174,7 @@ def _kind(table: Table, name: str) -> str | None:
     for kind in ("rate", "torque", "pressure", "angle"):
         if tells(name, kind):
             return kind
-    dimension = UNITS[unit][0] if (unit := _stated(table, name, None)) else None
+    dimension = READABLE_UNITS[unit][0] if (unit := _stated(table, name, None)) else None
     by_unit = {"angle": "angle", "angular speed": "rate", "pressure": "pressure", "torque": "torque", "force": "torque"}
     return by_unit.get(dimension or "")
 
@@ -203,7 +203,7 @@ def _stated(table: Table, name: str, dimensions: tuple[str, ...] | None) -> str 
     """The unit that the file gives, by a row of units or in the name."""
     for text, whole in ((table.units.get(name, ""), True), (name, False)):
         unit = unit_in(text, whole)
-        if unit is not None and (dimensions is None or UNITS[unit][0] in dimensions):
+        if unit is not None and (dimensions is None or READABLE_UNITS[unit][0] in dimensions):
             return unit
     return None
 
@@ -249,7 +249,7 @@ def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
         return plain, f"GUESSED, as the angle is in {angle.unit}"
     known = np.isfinite(time) & np.isfinite(value) & np.isfinite(rate)
     turned = value[known] - value[known].mean()
-    seconds = time[known] * (UNITS[_clock(table, angle.time, True).unit][1])
+    seconds = time[known] * (READABLE_UNITS[_clock(table, angle.time, True).unit][1])
     summed = np.concatenate([[0.0], np.cumsum(0.5 * (rate[known][1:] + rate[known][:-1]) * np.diff(seconds))])
     summed -= summed.mean()
     ratio = abs(float(summed @ turned) / float(turned @ turned)) if turned.any() else 0.0

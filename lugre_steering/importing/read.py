@@ -14,12 +14,12 @@ from lugre_steering.importing.structured import read_json
 from lugre_steering.importing.table import Table
 from lugre_steering.importing.text import read_text
 
-Kind = tuple[str, Callable[[Path], Table]]
+Format = tuple[str, Callable[[Path], Table]]
 
-_JSON: Kind = ("JSON", read_json)
-_PARQUET: Kind = ("Parquet", read_parquet)
-_HDF5: Kind = ("HDF5", read_hdf5)
-KINDS: Mapping[str, Kind] = {
+_JSON: Format = ("JSON", read_json)
+_PARQUET: Format = ("Parquet", read_parquet)
+_HDF5: Format = ("HDF5", read_hdf5)
+FORMATS: Mapping[str, Format] = {
     ".mat": ("MATLAB", read_mat), ".npz": ("npz", read_npz), ".parquet": _PARQUET, ".pq": _PARQUET, ".h5": _HDF5,
     ".hdf5": _HDF5, ".json": _JSON, ".jsonl": _JSON, ".ndjson": _JSON,
 }  # fmt: skip
@@ -30,12 +30,12 @@ def read_table(file: Path, options: Csv | None = None) -> Table:
     """All columns of numbers of a file; ``options`` count for CSV only."""
     if not file.is_file():
         raise MapFileError(f"{file}: no such file")
-    if file.suffix.lower() not in KINDS:
+    if file.suffix.lower() not in FORMATS:
         try:
             return read_text(file, options or Csv())
         except (OSError, UnicodeError) as error:
             raise MapFileError(f"{file}: cannot be read: {error}") from error
-    name, read = KINDS[file.suffix.lower()]
+    name, read = FORMATS[file.suffix.lower()]
     try:
         return read(file)
     except MapFileError:

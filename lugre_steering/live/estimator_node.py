@@ -21,10 +21,10 @@ from std_srvs.srv import Trigger
 
 from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.estimator.state_file import read_state, write_state
 from lugre_steering.live.console import Console
 from lugre_steering.live.parameters import changed, declare
 from lugre_steering.live.session import TICK_S, Session
-from lugre_steering.live.state_file import read_state, write_state
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
 
@@ -50,7 +50,6 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._began_ns = self._reported_ns = self._saved_ns = time.monotonic_ns()
         self._news_ns = 0
         self._reports = 0
-        self._namesakes = 0
         self._console = Console(self.get_logger())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Steady, so that health is reported while simulated time stands still.
@@ -79,7 +78,6 @@ class SteeringTorqueEstimator(LifecycleNode):
         begin = time.monotonic()
         try:
             vehicle = self._load(self.settings.vehicle_file)
-            self.get_logger().info("loading compiled code (the first start compiles it, which takes up to a minute)")
             self.session = Session(self, self.settings, vehicle, self.guarded, self._latency_window)
         except LugreSteeringError as error:
             self._refusal = error

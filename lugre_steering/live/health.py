@@ -29,7 +29,7 @@ RECENT = 5000
 """Latencies that percentiles are taken of, so that they cost the same however many are kept."""
 
 
-class Window:
+class Latencies:
     """The latest values of a duration [ns], in a ring of fixed size."""
 
     def __init__(self, size: int) -> None:
@@ -71,8 +71,8 @@ class Health:
         self.arrivals = [0] * len(self._kinds)
         self.arrived_ns = [0] * len(self._kinds)  # ROS time of the last message
         self.behind_ns = [0] * len(self._kinds)  # ROS time minus stamp of the last message
-        self.arrival_to_publish = Window(window)
-        self.stamp_to_publish = Window(window)
+        self.arrival_to_publish = Latencies(window)
+        self.stamp_to_publish = Latencies(window)
         self.callbacks = 0
         self.estimates = 0
         self.residuals = 0

@@ -22,10 +22,9 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.live.health import Health
-from lugre_steering.recording import Array, IntArray, Kind
+from lugre_steering.recording import COMMAND, Array, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
 
-COMMAND = "steering/command"
 PLAN_SHARE = 0.1
 PLAN_BURST_S = 0.02
 """Of the time so much, at most, goes into plans, and so much at once: what comes beyond is left out, and the next one is heard."""

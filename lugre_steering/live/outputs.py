@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64MultiArray
 
 from lugre_steering.chain.step import Records
-from lugre_steering.live.commands import CommandRamp, Fade
+from lugre_steering.estimator.commands import CommandRamp, Fade
 from lugre_steering.live.parameters import Settings
 from lugre_steering.vehicle import Vehicle
 

@@ -14,10 +14,17 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.parameter import Parameter as Change
+from rclpy.parameter import NodeParameter as Change
 
 from lugre_steering.estimator import Options
-from lugre_steering.live.table import BY_ROS, OPTION_TABLE, QOS, TABLE, Parameter, ParameterError
+from lugre_steering.estimator.node_parameters import (
+    BY_ROS,
+    NODE_TABLE,
+    OPTION_TABLE,
+    QOS,
+    NodeParameter,
+    ParameterError,
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Settings:
     options: Options
 
 
-def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+def _descriptor(parameter: NodeParameter) -> ParameterDescriptor:
     text = f"{parameter.description} ({parameter.expected})"
     descriptor = ParameterDescriptor(description=text, read_only=parameter.fixed)
     if isinstance(parameter.default, float):
@@ -53,7 +60,7 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     return descriptor
 
 
-def _value(node: Node, parameter: Parameter) -> Any:
+def _value(node: Node, parameter: NodeParameter) -> Any:
     try:
         return node.declare_parameter(parameter.name, parameter.default, _descriptor(parameter)).value
     except ParameterException as error:
@@ -62,7 +69,7 @@ def _value(node: Node, parameter: Parameter) -> Any:
 
 def declare(node: Node) -> Settings:
     """Declare every parameter on the node and read it."""
-    values = {parameter.name: _value(node, parameter) for parameter in (*TABLE, *OPTION_TABLE)}
+    values = {parameter.name: _value(node, parameter) for parameter in (*NODE_TABLE, *OPTION_TABLE)}
     unknown = sorted(name for name in set(node._parameter_overrides) - {*values, *BY_ROS} if not name.startswith(QOS))
     if unknown:  # not refused: a file may set parameters of several nodes at once
         node.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
@@ -71,10 +78,10 @@ def declare(node: Node) -> Settings:
 
 def settings_of(values: Mapping[str, Any]) -> Settings:
     """Settings from the values of all parameters; ``ParameterError`` says which of them cannot be."""
-    for parameter in TABLE:
+    for parameter in NODE_TABLE:
         if parameter.choices and values[parameter.name] not in parameter.choices:
             raise ParameterError(f"parameter '{parameter.name}': got '{values[parameter.name]}', expected {parameter.expected}")
-    given = {parameter.name: values[parameter.name] for parameter in TABLE}
+    given = {parameter.name: values[parameter.name] for parameter in NODE_TABLE}
     if not given["vehicle_file"]:
         raise ParameterError("parameter 'vehicle_file': got nothing, expected a vehicle file (--ros-args -p vehicle_file:=PATH)")
     given["vehicle_file"] = Path(given["vehicle_file"])
@@ -88,5 +95,5 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
 
 def changed(node: Node, changes: Sequence[Change]) -> Settings:
     """The settings as they would be after some changes; ``ParameterError`` if they cannot be."""
-    values = {parameter.name: node.get_parameter(parameter.name).value for parameter in (*TABLE, *OPTION_TABLE)}
+    values = {parameter.name: node.get_parameter(parameter.name).value for parameter in (*NODE_TABLE, *OPTION_TABLE)}
     return settings_of(values | {change.name: change.value for change in changes if change.name in values})

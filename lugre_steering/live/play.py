@@ -7,7 +7,6 @@ from __future__ import annotations
 import importlib
 import time
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from rclpy.qos import QoSProfile
 
 from lugre_steering.bag import Bag, Messages
 from lugre_steering.errors import BagError
+from lugre_steering.pool import Progress
 from lugre_steering.recording import NODE
 
 NAME = "lugre_steering_play"
@@ -26,8 +26,6 @@ DEPTH = 200
 SECOND_NS = 1_000_000_000
 NAP_S = 0.002
 """Earlier than this, a message is as good as due: no clock wakes up more exactly."""
-
-Progress = Callable[[str, int, "int | None"], None]
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
+from lugre_steering.chain.cache import tell_compiling
 from lugre_steering.chain.step import Records
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.doubt import INPUTS
@@ -24,7 +25,7 @@ from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.watch import detector
 from lugre_steering.watch.detector import Watch
-from lugre_steering.watch.window import Samples, write_window
+from lugre_steering.watch.window import SampleRing, write_window
 
 LEAVE_S = 2.0
 """No longer does the last ramp to zero take: who stops the node waits a few seconds before he kills it."""
@@ -43,12 +44,13 @@ class Session:
         latency_window: int,
     ) -> None:
         self.settings, self.vehicle, self.active = settings, vehicle, False
+        tell_compiling(node.get_logger().info)
         warm_up(vehicle, settings.options)
         self.estimator = Estimator(vehicle, settings.options, lean=True)
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
         self.outputs = Outputs(node, vehicle, settings)
         self.watch = Watch(vehicle)
-        self.samples = Samples() if settings.watch_folder is not None else None
+        self.samples = SampleRing() if settings.watch_folder is not None else None
         self.alarm = False  # the watch has just found that the model no longer matches
         self._node = node
         self._torque_ns = 0  # stamp of the newest torque
@@ -92,6 +94,7 @@ class Session:
 
     def reload(self, vehicle: Vehicle) -> None:
         """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
+        tell_compiling(self._node.get_logger().info)
         self.estimator = self.estimator.continued(vehicle)
         self.vehicle = vehicle
         self.watch = Watch(vehicle)

@@ -17,15 +17,15 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState, Temperature
 
-from lugre_steering.live.seen import Seen
 from lugre_steering.recording import NODE
+from lugre_steering.watch.seen import Arrived
 
 WRENCHES = {"torque": "torque", "cylinder_torque": "cylinder torque", "residual": "residual"}
 
 
-def watch(show: Callable[[Seen], None], name: str = NODE, seconds: float = math.inf) -> None:
+def watch(show: Callable[[Arrived], None], name: str = NODE, seconds: float = math.inf) -> None:
     """Listen to the node ``name`` (with its namespace, if any) for ``seconds``, or until interrupted, and ``show`` what has come."""
-    seen = Seen(name)
+    seen = Arrived(name)
     rclpy.init(args=[])
     try:
         node = Node("lugre_steering_watch")
@@ -42,7 +42,7 @@ def watch(show: Callable[[Seen], None], name: str = NODE, seconds: float = math.
         rclpy.try_shutdown()
 
 
-def _subscribe(node: Node, name: str, seen: Seen) -> None:
+def _subscribe(node: Node, name: str, seen: Arrived) -> None:
     """Every output, and its health."""
 
     def listen(message: type, topic: str, take: Callable[[Any], None]) -> None:

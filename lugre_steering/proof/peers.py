@@ -108,7 +108,7 @@ def compare(bags: Sequence[Path], vehicle_file: Path) -> dict[str, dict[str, Any
     runs = [prepare(read_recording(bag, vehicle.channels), vehicle) for bag in bags]
     problem = Problem(vehicle, runs)
     roles = split(problem)
-    weight = np.where(roles.fit, 1.0 / np.concatenate([run.sigma for run in runs]), 0.0)
+    weight = np.where(roles.fit, 1.0 / problem.sigma, 0.0)
     start = fit(problem, weight, robust=True, linearisations=25)
     baseline = fit(problem, weight, start=start.x, linearisations=15)
     parts = [slice(a, b) for a, b in zip(problem.edges, problem.edges[1:], strict=False)]

@@ -119,11 +119,11 @@ def page_lines(board: Row) -> list[str]:
             limit = f"{'at most' if target['most'] else 'at least'} {target['target']:g}"
             lines.append(f"| {target['what']} | {told(target['score'])} | {limit}: {target['status']} |")
         lines += [f"| {what} | {told(score)} | |" for what, score in details(part).items()]
-        lines += [*_readme_peers(part["peers"]), *_readme_effects(part["effects"])]
+        lines += [*_page_peers(part["peers"]), *_page_effects(part["effects"])]
     return lines
 
 
-def _readme_peers(peers: Row) -> list[str]:
+def _page_peers(peers: Row) -> list[str]:
     rows = [
         f"| {name} | {median(peer['removed'])} | {share(peer['false_alarms'])} | {share(peer['named'])} | {median(peer['seconds'])} |"
         for name, peer in peers.items()
@@ -132,7 +132,7 @@ def _readme_peers(peers: Row) -> list[str]:
     return head + rows if rows else []
 
 
-def _readme_effects(effects: Row) -> list[str]:
+def _page_effects(effects: Row) -> list[str]:
     """Effects that fell short anywhere but at the lowest ratio."""
     cells = [*(f"{ratio:g}" for ratio in RATIOS), *DISGUISES]
     short = {

@@ -11,7 +11,7 @@ import math
 import os
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -36,9 +36,19 @@ from lugre_steering.estimator import Estimator, Options
 from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.files import is_ours, new_folder, output_folder, read_record, read_text, write_record
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
-from lugre_steering.pool import WorkerDiedError, in_processes
+from lugre_steering.pool import Progress, WorkerDiedError, in_processes
 from lugre_steering.provenance import Provenance
-from lugre_steering.recording import AIR_LIMIT_DEGC, NODE, Channel, Finding, IntArray, Kind, Recording, unused_name
+from lugre_steering.recording import (
+    AIR_LIMIT_DEGC,
+    COMMAND,
+    NODE,
+    Channel,
+    Finding,
+    IntArray,
+    Kind,
+    Recording,
+    unused_name,
+)
 from lugre_steering.replay.page import write_page
 from lugre_steering.replay.result import RECORD, SCHEMA, InputCounts, Replay, ReplayedBag, Series
 from lugre_steering.report.available import no_pictures
@@ -46,15 +56,11 @@ from lugre_steering.vehicle import Vehicle, load
 
 PREFIX = f"/{NODE}"
 FRAME = "base_link"
-COMMAND = "steering/command"
 AIR = "air"
 """In place of an initial temperature: that of the first recorded air."""
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rate", "angle_jump")
 """Counters of the estimator about samples that it did use."""
-
-Progress = Callable[[str, int, "int | None"], None]
-"""Called with the name of a bag, messages done, and messages in all (None where not known)."""
 
 
 def replay(

@@ -45,11 +45,11 @@ def torque_axis(vehicle: Vehicle, *values: Array) -> Axis:
 
 
 def coordinate_axis(vehicle: Vehicle, name: str) -> Axis:
-    """A coordinate of ``units.COORDINATES``, or its name in this vehicle's words, in its words and units; angles in degrees."""
-    name = {units.words(vehicle, key): key for key in units.COORDINATES}.get(name, name)
+    """A coordinate of ``units.COORDINATE_UNITS``, or its name in this vehicle's words, in its words and units; angles in degrees."""
+    name = {units.words(vehicle, key): key for key in units.COORDINATE_UNITS}.get(name, name)
     if name == "torque":
         return Axis(units.words(vehicle, name), f"k{vehicle.coordinate.force_unit}", 1e-3)
-    unit, scale = units.label(vehicle, units.COORDINATES.get(name, "")), 1.0
+    unit, scale = units.label(vehicle, units.COORDINATE_UNITS.get(name, "")), 1.0
     for plain, handy, factor in _HANDIER:
         if re.match(rf"{plain}(?!\w)|{plain}/", unit):
             unit, scale = handy + unit[len(plain) :], factor

@@ -5,24 +5,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.step import Records, new_state, run_side, torque_side
 from lugre_steering.effects.entry import Effect
-from lugre_steering.estimator import Estimator
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
-from lugre_steering.vehicle import EffectEntry, Vehicle, load
+from lugre_steering.vehicle import load
 from lugre_steering.vehicle.model import build_model
 
 UNIT = re.compile(r"(1|[0-9]|N|m|rad|deg|s|K|W|J|Pa|kg|degC|[/^() ])+")
 NOTICED = 1e-6
 """Change of the torque, as a share of its amplitude, from which a parameter acts."""
 
-Motion = tuple[Array, Array, Array, Array]
+Driven = tuple[Array, Array, Array, Array]
 
 
 def broken(effect: Effect) -> list[str]:
@@ -53,14 +52,14 @@ class _Bench:
             p[field] = number
         return p
 
-    def torque(self, p: Records, motion: Motion | None = None) -> Array:
+    def torque(self, p: Records, motion: Driven | None = None) -> Array:
         return torque_side(p, self.rubber, *(motion or self.motion))
 
     def change(self, a: Array, b: Array) -> float:
         return float(np.sqrt(np.mean((a - b) ** 2)) / np.abs(self.plain).max())
 
 
-def _cycles() -> Motion:
+def _cycles() -> Driven:
     """Time, angle, rate, acceleration (n,): two cycles of 25 deg at 6 deg/s with rests at the limits, then reversals of 3 deg."""
     corners = np.radians([0.0, 25.0, 25.0, -25.0, -25.0, 25.0, 25.0, -25.0, -25.0, 0.0, 0.0])
     at = np.cumsum(np.concatenate([[1.0], np.maximum(np.abs(np.diff(corners)) / np.radians(6.0), 2.0)]))
@@ -140,19 +139,3 @@ def _passive(bench: _Bench) -> Iterator[str]:
     work = float(np.sum(bench.torque(bench.parameters())[1:][once[1:]] * np.diff(theta)[once[1:]]))
     if work < 0.0:
         yield f"passive: a whole cycle gives {-work:.3g} J back"
-
-
-def differs_live(vehicle: Vehicle, effect: Effect) -> float:
-    """Largest difference between one sample at a time and a block of them, as a share of the torque; 0 in a sound estimator."""
-    values = {p.name: p.typical for p in effect.parameters}
-    entry = EffectEntry(effect.id, values)
-    time, theta, *_ = _cycles()
-    stamps = (time * 1e9).astype(np.int64) + 1_000_000_000
-    channel = np.tile(np.arange(len(vehicle.sides)), time.size)
-    block = Estimator(vehicle.replace(effects=(entry,)))
-    single = Estimator(vehicle.replace(effects=(entry,)))
-    rows = (channel, np.repeat(stamps, len(vehicle.sides)), np.repeat(theta, len(vehicle.sides)))
-    whole, _ = block.push_block(*rows, np.full(channel.size, np.nan))
-    push: Callable[..., tuple[Records, Records]] = single.push
-    alone = np.concatenate([push(int(c), int(s), float(v))[0]["total"].copy() for c, s, v in zip(*rows, strict=True)])
-    return float(np.abs(whole["total"] - alone).max() / np.abs(whole["total"]).max())

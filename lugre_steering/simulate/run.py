@@ -11,10 +11,10 @@ import numpy as np
 
 from lugre_steering.recording import Array, Channel, Kind, Signal
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.actuation import line_pressures, total_gains
 from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.simulate.sensors import Sensing, sense_angle, sense_pressure, sense_torque
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.sensors import true_angle
 
 AIR_RATE_HZ = 1.0

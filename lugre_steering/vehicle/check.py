@@ -14,7 +14,7 @@ from lugre_steering.vehicle.loads import load_moment
 from lugre_steering.vehicle.rubber import known_range
 from lugre_steering.vehicle.sections import SIDES, DmaTable, Hydraulics, MasterCurve, Rubber, Vehicle
 
-UNITS = {"rad": "N m", "m": "N"}
+FORCE_UNITS = {"rad": "N m", "m": "N"}
 """Units of the coordinate, each with that of its force: the program counts in these, so others would only mislabel."""
 TOPIC = re.compile(r"(~?/)?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 """Topic names that ROS accepts."""
@@ -66,10 +66,10 @@ def _check_sensors(vehicle: Vehicle, reader: Reader) -> None:
         raise fail("sensors.angle_from", sensors.angle_from, expected)
     if sensors.pressure_reference not in ("gauge", "absolute"):
         raise fail("sensors.pressure_reference", sensors.pressure_reference, "gauge or absolute")
-    if coordinate.unit not in UNITS:
-        raise fail("coordinate.unit", coordinate.unit, " or ".join(UNITS))
-    if coordinate.force_unit != UNITS[coordinate.unit]:
-        expected = f"'{UNITS[coordinate.unit]}', as the coordinate is in {coordinate.unit}"
+    if coordinate.unit not in FORCE_UNITS:
+        raise fail("coordinate.unit", coordinate.unit, " or ".join(FORCE_UNITS))
+    if coordinate.force_unit != FORCE_UNITS[coordinate.unit]:
+        expected = f"'{FORCE_UNITS[coordinate.unit]}', as the coordinate is in {coordinate.unit}"
         raise fail("coordinate.force_unit", coordinate.force_unit, expected)
 
 

@@ -110,11 +110,6 @@ class Watch:
         self.scores: list[tuple[float, ...]] = []
         """Scores of the manoeuvres that have come since somebody took them."""
 
-    @property
-    def learning(self) -> bool:
-        """Whether the usual is still unknown."""
-        return int(self._state[0]["count"]) < LEARN
-
     def turned(self, angle: float) -> None:
         """The mean steering angle [rad] is there now."""
         if math.isnan(self._angle):

@@ -24,7 +24,7 @@ LARGEST_BYTES = 64 * CAPACITY
 SAMPLE = np.dtype([("channel", np.int64), ("stamp_ns", np.int64), ("value", np.float64), ("rate", np.float64)])
 
 
-class Samples:
+class SampleRing:
     """The latest ``CAPACITY`` samples of all channels, in a ring."""
 
     def __init__(self) -> None:

@@ -104,6 +104,16 @@ def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
     assert sorted(process.communicate(timeout=60.0)[0] for process in started) == ["0\n", "1\n", "1\n"]
 
 
+@pytest.mark.usefixtures("folder")
+def test_compiling_is_told_once_and_loading_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(cache, "_listener", None)
+    cache.tell_compiling(told.append)
+    assert [start(), len(told)] == [0, 1]
+    cache.tell_compiling(told.append)
+    assert [start(), len(told)] == [1, 1]
+
+
 def test_a_disk_that_is_full_costs_the_cache_only(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

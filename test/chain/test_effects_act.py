@@ -17,7 +17,7 @@ from lugre_steering.chain.step import Records, new_state, run_side, torque_side
 from lugre_steering.effects.registry import CATALOGUE, composed
 from lugre_steering.recording import Array
 
-EFFECT_FIELDS = composed().effect_fields
+EFFECT_FIELDS = (composed().parameters.names or ())[len(BASELINE_FIELDS) : -1]
 STEPWISE = {*HOOKS} - {*SENSOR_HOOKS} | {"angle"}
 CHAIN_EFFECTS = sorted(e.id for e in CATALOGUE.values() if e.hooks.keys() & STEPWISE)
 CHAIN_FIELDS = [f for f in EFFECT_FIELDS if any(f.startswith(f"{effect}_") for effect in CHAIN_EFFECTS)]

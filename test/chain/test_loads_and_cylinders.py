@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from chain_support import vehicle
 
-from lugre_steering.chain.hydraulics import cylinder_length, moment_arm
+from lugre_steering.chain.hydraulics import moment_arm
+from lugre_steering.recording import Array
 from lugre_steering.vehicle import Axle, Levers, Rollers, Track
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.loads import load_moment, roller_loads, roller_radii, vertical_load
@@ -49,6 +50,13 @@ def test_shares_radii_and_moment() -> None:
     np.testing.assert_allclose(roller_loads(AXLE, t), [11_500.0, 34_500.0])
     np.testing.assert_allclose(roller_radii(t), [0.5, 0.5])
     assert load_moment(AXLE, t) == pytest.approx(23_000.0)
+
+
+def cylinder_length(theta: Array, chassis_m: tuple[float, ...], knuckle_m: tuple[float, ...]) -> Array:
+    """Pin-to-pin length [m] (n,) of a cylinder whose knuckle pivot turned by ``theta`` [rad] about the hinge."""
+    x = knuckle_m[0] * np.cos(theta) - knuckle_m[1] * np.sin(theta)
+    y = knuckle_m[0] * np.sin(theta) + knuckle_m[1] * np.cos(theta)
+    return np.hypot(x - chassis_m[0], y - chassis_m[1])
 
 
 def test_moment_arm_is_the_derivative_of_the_length() -> None:

@@ -9,10 +9,9 @@ import math
 import numpy as np
 import pytest
 from chain_support import vehicle
+from contact_integral import Road, friction_coefficient, power_spectrum, ratio_validity
 from scipy.integrate import quad
 from scipy.special import erf
-
-from lugre_steering.vehicle.persson import Road, friction_coefficient, power_spectrum, ratio_validity
 
 ROAD = Road(hurst=0.7, roll_off_1_m=1000.0, cut_off_1_m=2e5, rms_height_m=3e-4)
 

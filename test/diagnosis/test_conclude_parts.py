@@ -12,15 +12,15 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits, unlisted
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.statement import at_end
-from lugre_steering.diagnosis.conclude.verify import rmse
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect
-from lugre_steering.diagnosis.search import fingerprint, locate
-from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.search import Search
+from lugre_steering.diagnosis.verify import rmse
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.fitting import split
+from lugre_steering.fitting import fingerprint, split
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Candidate, Problem

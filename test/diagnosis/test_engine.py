@@ -19,11 +19,11 @@ from small_problem import effect, small_problem, weight
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis import engine
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
-from lugre_steering.diagnosis.search import fingerprint
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import BagError
+from lugre_steering.fitting import fingerprint
 from lugre_steering.fitting.fit import fit
 from lugre_steering.proof.simulator import Concealed
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep

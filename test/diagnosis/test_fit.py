@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import least_squares, lsq_linear
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.search import onset
-from lugre_steering.diagnosis.search.fingerprint import score_columns, screen
+from lugre_steering.fitting import onset
+from lugre_steering.fitting.fingerprint import score_columns, screen
 from lugre_steering.fitting.fit import Fit, bounded_minimum, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import split

@@ -13,8 +13,8 @@ from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
-from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 
 NOTHING = small_problem(33.0)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.late import begun_late
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
 from lugre_steering.diagnosis.laws.refine import closed_forms, free_law, with_law

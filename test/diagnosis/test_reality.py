@@ -21,9 +21,9 @@ from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
 from lugre_steering.data.quality import inspect
 from lugre_steering.data.sensing import sensed
 from lugre_steering.data.stamps import evened
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit

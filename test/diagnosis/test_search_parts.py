@@ -10,11 +10,12 @@ import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.diagnosis.conclude import experiment, limits
-from lugre_steering.diagnosis.search import compare, fingerprint, foreign, search, trial
-from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.diagnosis.search import compare, foreign, search
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.effects.relief_saturation import CEILINGS
-from lugre_steering.fitting import noise, split
+from lugre_steering.fitting import fingerprint, noise, split, trial
+from lugre_steering.fitting.doubt import doubt
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.fitting.sheet import thinned
@@ -183,7 +184,7 @@ def test_errors_count_by_how_long_they_last(problem: Problem) -> None:
             error[i] = phi * error[i - 1] + rng.standard_normal() * (1.0 - phi**2) ** 0.5
         seen = with_torque(problem, result.prediction)
         seen.measured = result.prediction + 2.0 * error * SIGMA
-        doubts.append(compare.doubt(seen, result, weight(problem)))
+        doubts.append(doubt(seen, result, weight(problem)))
     # The tail below the least correlation that counts is left out: 5 % of the sum.
     assert np.mean(doubts) == pytest.approx(4.0 * (1.0 + phi) / (1.0 - phi), rel=0.15)
 
@@ -202,7 +203,7 @@ def test_errors_of_recordings_at_several_rates_last_as_long_as_they_do(problem: 
                 error[i] = keeps * error[i - 1] + rng.standard_normal() * (1.0 - keeps**2) ** 0.5
             parts.append(2.0 * error)
         mixed.measured = result.prediction + np.concatenate(parts)
-        doubts.append(compare.doubt(mixed, result, used))
+        doubts.append(doubt(mixed, result, used))
     samples_per_s = used.size / sum(run.time[-1] - run.time[0] for run in mixed.runs)
     assert np.mean(doubts) == pytest.approx(4.0 * 2.0 * tau * samples_per_s, rel=0.15)
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.stands import _tested
-from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Found, Search
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.split import split

@@ -19,9 +19,9 @@ from lugre_steering.chain.step import torque_side
 from lugre_steering.effects import registry
 from lugre_steering.effects.own import read_effects
 from lugre_steering.errors import EffectError
+from lugre_steering.estimator import Estimator
 from lugre_steering.resources import config_folder
-from lugre_steering.simulate.contract import differs_live
-from lugre_steering.vehicle import load
+from lugre_steering.vehicle import EffectEntry, load
 from lugre_steering.vehicle.model import build_model
 
 OWN = config_folder() / "own_physics"
@@ -138,7 +138,7 @@ def test_own_python_runs_as_it_stands_now(tmp_path: Path) -> None:
 import numpy as np, sys
 from lugre_steering.chain.step import torque_side
 from lugre_steering.effects import registry
-from lugre_steering.vehicle import load
+from lugre_steering.vehicle import EffectEntry, load
 from lugre_steering.vehicle.model import build_model
 
 registry.add_files([sys.argv[1]])
@@ -188,7 +188,15 @@ def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, 
 @pytest.mark.usefixtures("catalogue")
 def test_physics_of_users_runs_live_as_in_replay() -> None:
     registry.add_files([RIPPLE])
-    assert differs_live(load(SHEET), registry.effect("chain_ripple")) == 0.0
+    entry = EffectEntry("chain_ripple", {p.name: p.typical for p in registry.effect("chain_ripple").parameters})
+    vehicle = load(SHEET).replace(effects=(entry,))
+    time = np.repeat(np.arange(1500) * 0.01, 2)
+    channel, stamp, angle = np.tile([0, 1], 1500), (time * 1e9).astype(np.int64) + 1_000_000_000, 0.4 * np.sin(0.6 * time)
+    whole, _ = Estimator(vehicle).push_block(channel, stamp, angle, np.full(time.size, np.nan))
+    live = Estimator(vehicle)
+    alone = [live.push(int(c), int(s), float(a))[0]["total"].copy() for c, s, a in zip(channel, stamp, angle, strict=True)]
+    assert whole["total"].size > 1400
+    assert np.array_equal(np.concatenate(alone), whole["total"])
 
 
 def test_a_package_is_known_once_installed(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from lugre_steering.live.commands import CommandRamp, Fade
+from lugre_steering.estimator.commands import CommandRamp, Fade
 
 MS = 1_000_000
 

@@ -9,12 +9,12 @@ import math
 import numpy as np
 import pytest
 
-from lugre_steering.live.health import RECENT, Window
+from lugre_steering.live.health import RECENT, Latencies
 
 
 @pytest.mark.parametrize(("size", "added"), [(100, 30), (100, 250), (4 * RECENT, 3 * RECENT), (4 * RECENT, 9 * RECENT)])
 def test_percentiles_are_of_the_latest_values(size: int, added: int) -> None:
-    window, values = Window(size), np.random.default_rng(2).integers(1, 10**9, added)
+    window, values = Latencies(size), np.random.default_rng(2).integers(1, 10**9, added)
     assert all(math.isnan(value) for value in window.percentiles_ms(50.0, 99.0))
     for value in values:
         window.add(int(value))

@@ -17,15 +17,15 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
-from lugre_steering.live.seen import Seen
-from lugre_steering.live_view import BARS, spark, view
 from lugre_steering.node import arguments_of
+from lugre_steering.watch.seen import Arrived
+from lugre_steering.watch.view import BARS, spark, view
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 VEHICLE = PACKAGE_ROOT / "config" / "test_vehicle.yaml"
 
 
-def text_of(state: Seen, now_s: float, width: int = 80) -> str:
+def text_of(state: Arrived, now_s: float, width: int = 80) -> str:
     console = Console(width=width, no_color=True)
     with console.capture() as capture:
         console.print(view(state, now_s))
@@ -33,7 +33,7 @@ def text_of(state: Seen, now_s: float, width: int = 80) -> str:
 
 
 def test_the_view_shows_numbers_their_last_minute_and_health() -> None:
-    state = Seen("/a/steering_torque_estimator")
+    state = Arrived("/a/steering_torque_estimator")
     assert "nothing has come yet" in text_of(state, 5.0)
     for k in range(100):
         state.add("torque", "N m", 0.5 * k, -48_200.0 + 900.0 * k)

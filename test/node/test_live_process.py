@@ -18,7 +18,7 @@ from live_harness import PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
-from lugre_steering.live.table import OPTION_TABLE, TABLE
+from lugre_steering.estimator.node_parameters import NODE_TABLE, OPTION_TABLE
 
 FIXED = {"autostart", "effects_files", "executor", "frame_id", "input_depth", "publish_commands", "watch_folder"}
 CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"
@@ -130,7 +130,7 @@ def test_parameters_are_described_and_ranged() -> None:
 
 def test_the_shipped_parameters_are_the_defaults() -> None:
     shipped = yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"]
-    declared = {p.name: p.default for p in (*TABLE, *OPTION_TABLE) if p.name != "vehicle_file"}
+    declared = {p.name: p.default for p in (*NODE_TABLE, *OPTION_TABLE) if p.name != "vehicle_file"}
     assert shipped == declared
 
 

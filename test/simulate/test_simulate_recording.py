@@ -23,11 +23,11 @@ from lugre_steering.errors import BagError, DataError, LugreSteeringError
 from lugre_steering.recording import Kind
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate import manoeuvres, plant
-from lugre_steering.simulate.actuation import RETURN_PRESSURE_PA, line_pressures, total_gains
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
 from lugre_steering.vehicle import TorqueSensor, Vehicle
+from lugre_steering.vehicle.actuation import RETURN_PRESSURE_PA, line_pressures, total_gains
 
 VEHICLE = vehicle_file.load(config_folder() / "test_vehicle.yaml")
 SHORT = Manoeuvre("short", "", (Hold(1.0), Sweep(12.0, 8.0, 1.0), Sweep(-5.0, 8.0, 1.0)))

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import NamedEffect
 from lugre_steering.effects.registry import ORIGINS
 from lugre_steering.fitting.apply import apply_calibration, seen_range

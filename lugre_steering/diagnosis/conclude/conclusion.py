@@ -8,20 +8,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from lugre_steering.diagnosis.conclude import limits, verify
+from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.conclude import limits
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.stands import Stands, standing
 from lugre_steering.diagnosis.conclude.statement import statement
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, BagTrace, Diagnosis, Errors, Limit, NamedEffect
-from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle

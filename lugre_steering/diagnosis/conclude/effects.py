@@ -10,16 +10,16 @@ from typing import cast
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.conclude import verify
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.compare import tied
 from lugre_steering.diagnosis.search.search import Found
-from lugre_steering.diagnosis.search.trial import Trial, cost
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate
 from lugre_steering.fitting.split import BLOCK_S, CLUSTER_S
+from lugre_steering.fitting.trial import Trial, cost
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
@@ -147,5 +147,5 @@ def _where(done: Finished, candidate: Candidate, part: Array) -> list[Place]:
             low_size, high_size = locate.active_range(axes["|steering angle|"], piece)
             if low_size > BOTH_SIDES * high_size:
                 axis, low, high = "|steering angle|", low_size, high_size
-        entries.append(Place(run.name, tuple(spans), axis, (low, high), done.unit(units.COORDINATES[axis])))
+        entries.append(Place(run.name, tuple(spans), axis, (low, high), done.unit(units.COORDINATE_UNITS[axis])))
     return entries

@@ -8,15 +8,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.conclude.verify import rmse
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import BagTrace, Evidence, NamedEffect
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.fingerprint import Score
 from lugre_steering.diagnosis.search.propose import FALSE_DISCOVERY_RATE
-from lugre_steering.diagnosis.search.trial import Trial, cost
+from lugre_steering.diagnosis.verify import rmse
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.trial import Trial, cost
 
 
 def evidence(done: Finished, effects: Sequence[NamedEffect]) -> tuple[Evidence, ...]:

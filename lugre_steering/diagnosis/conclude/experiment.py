@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.data.dataset import Run, ideal_run
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws
 from lugre_steering.diagnosis.laws.refine import Law
 from lugre_steering.diagnosis.laws.write import law_words

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import Experiment, NamedEffect
 from lugre_steering.report import words
 

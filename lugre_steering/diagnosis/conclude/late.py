@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lugre_steering.diagnosis.conclude.finished import Finished
-from lugre_steering.diagnosis.search import onset
-from lugre_steering.diagnosis.search.compare import SURE, doubt
-from lugre_steering.diagnosis.search.trial import RETIMED
+from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.search.compare import SURE
+from lugre_steering.fitting import onset
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.trial import RETIMED
 from lugre_steering.recording import Array
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.stamps import with_even_stamps
-from lugre_steering.diagnosis.conclude import verify
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import earlier
 from lugre_steering.fitting.fit import fit

@@ -12,13 +12,13 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import unlisted
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.loudness import FORM_LEFT, beyond_calibration, form_energy, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.foreign import Pattern
-from lugre_steering.diagnosis.search.trial import cost
 from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 
 FORETELLS = 0.1
@@ -134,5 +134,5 @@ def _where(
             spans, piece = locate.intervals(run.time, shape[part]), shape[part]
         if spans:
             between = locate.active_range(values[axis], piece)
-            entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATES[axis])))
+            entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATE_UNITS[axis])))
     return entries

@@ -10,8 +10,8 @@ from functools import partial
 import numpy as np
 
 from lugre_steering.diagnosis.search.compare import needed as least_needed
-from lugre_steering.diagnosis.search.fingerprint import Score, candidates, signature
 from lugre_steering.effects.entry import Parameter
+from lugre_steering.fitting.fingerprint import Score, candidates, signature
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from lugre_steering.diagnosis.conclude import verify
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
 from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names, room_for_laws
 from lugre_steering.diagnosis.result import Verdict

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from lugre_steering.diagnosis.conclude import headline
-from lugre_steering.diagnosis.conclude.finished import Finished
 from lugre_steering.diagnosis.conclude.left_over import LeftOver
-from lugre_steering.diagnosis.conclude.verify import Judged
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import Experiment, NamedEffect, Verdict
+from lugre_steering.diagnosis.verify import Judged
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.problem import STATIC, resized
 from lugre_steering.report import words

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.diagnosis.conclude import verify
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar

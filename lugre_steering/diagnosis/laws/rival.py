@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lugre_steering.diagnosis.conclude.finished import Finished
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
 from lugre_steering.diagnosis.loudness import excess
-from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, doubt, left, settled
+from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, settled
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array

@@ -17,7 +17,7 @@ from lugre_steering.report import words
 from lugre_steering.report.markup import code, pairs, table, text
 from lugre_steering.report.page import Charts
 
-STAGES = {
+STAGE_WORDS = {
     "motion": "what the contact really does against the measured angle",
     "contact": "friction of rubber on the ground",
     "thermal": "where the friction heat goes",
@@ -66,7 +66,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], charts: Charts) -> 
         said = f"Residual along the telling coordinate of {entry.title}, with its fitted law, before and after"
         drawn = charts.place(plots.residual_chart(diagnosis, effect), said)
     facts = pairs([
-        ("where in the chain", text(STAGES.get(effect["stage"], effect["stage"]))),
+        ("where in the chain", text(STAGE_WORDS.get(effect["stage"], effect["stage"]))),
         ("law", code(units.law(vehicle, entry.equation))),
         ("source", text(entry.source)),
         ("how it shows", text(entry.trace)),

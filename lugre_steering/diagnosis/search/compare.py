@@ -17,18 +17,17 @@ import numpy as np
 from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, form_energy
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial, cost, rank
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import TYPICAL, Problem
 from lugre_steering.fitting.split import Split
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, cost, rank
 from lugre_steering.recording import Array
 
 SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
-MEMORY_S, FORGOTTEN = 3.0, 0.05
-"""Longest memory of errors looked for, and the correlation at which it has ended."""
 ROUNDS, ALIKE = 3, 0.1
 """Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -43,31 +42,6 @@ HALF = 0.5
 """Share of the best one's energy that a rival must take; and of their own that names must still take beside a pattern to stand."""
 MARGIN = 0.1
 """Share of what names take that a pattern must take more: a name wins a draw."""
-
-
-def doubt(problem: Problem, result: Fit, weight: Array) -> float:
-    """Energy, in noise variances, that counts as one independent error: their mean square times the samples that they last.
-
-    How long they last is one time for all recordings, in steps of the slowest; a faster one has more samples in it.
-    """
-    error = (problem.measured - result.prediction) * weight
-    used = (weight > 0.0).astype(float)
-    steps = [float(run.time[1] - run.time[0]) for run in problem.runs]
-    slowest = max(steps)
-    longest = 1 + round(MEMORY_S / slowest)
-    together, pairs, seconds = np.zeros(longest), np.zeros(longest), 0.0
-    for step, a, b in zip(steps, problem.edges[:-1], problem.edges[1:], strict=True):
-        stride = round(slowest / step)
-        seconds += step * float(used[a:b].sum())
-        for lag in range(min(longest, 1 + (b - a - 1) // stride)):
-            apart = lag * stride
-            together[lag] += float(error[a : b - apart] @ error[a + apart : b])
-            pairs[lag] += float(used[a : b - apart] @ used[a + apart : b])
-    covariance = together / np.maximum(pairs, 1.0)
-    correlation = covariance / max(covariance[0], 1e-300)
-    ended = np.flatnonzero(correlation < FORGOTTEN)
-    lasting_s = slowest * (1.0 + 2.0 * float(correlation[1 : ended[0] if ended.size else longest].sum()))
-    return float(max(covariance[0], 1.0) * lasting_s * pairs[0] / max(seconds, 1e-300))
 
 
 def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | None = None) -> tuple[Problem, Fit]:

@@ -41,7 +41,7 @@ class Pattern:
         return float(np.sum(((problem.measured - self.beside.prediction - self.torque) * weight) ** 2))
 
 
-Columns = Callable[[float], Array]
+ColumnsOf = Callable[[float], Array]
 Text = Callable[[float, Array], str]
 
 
@@ -50,9 +50,9 @@ class _Family:
     """Columns (n, k) for one shape value, the values to try, and words for a fitted pattern."""
 
     grid: Sequence[float]
-    columns: Columns
+    columns: ColumnsOf
     text: Text
-    more: Columns | None = None
+    more: ColumnsOf | None = None
     """Columns of the full pattern, once the shape is known; the same as ``columns`` if None."""
 
 

@@ -19,7 +19,6 @@ BRIDGE_S = 0.5
 BINS = 24
 
 
-
 def contribution(problem: Problem, result: Fit, index: int) -> Array:
     """Torque (n,) that one effect of a fit adds to the prediction, everything else as fitted."""
     without = [effect for i, effect in enumerate(result.effects) if i != index]
@@ -45,7 +44,7 @@ def intervals(time: Array, part: Array) -> tuple[tuple[float, float], ...]:
 
 
 def coordinates(run: Run, torque: Array, temperature: Array | None = None) -> dict[str, Array]:
-    """State-space coordinates (n,) of one run, by the names of ``units.COORDINATES``."""
+    """State-space coordinates (n,) of one run, by the names of ``units.COORDINATE_UNITS``."""
     mean_rate = run.omega.mean(axis=0)
     dt = run.time[1] - run.time[0]
     moving = np.abs(mean_rate) > 1e-3 * run.angle_unit

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search.fingerprint import Score
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial, ranked, refine, timed, worth_of
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Round, Trial, is_timed, ranked, refine, worth_of
 from lugre_steering.recording import Array
 
 SHORTLIST, SHORT = 7, 0.08
@@ -56,7 +56,7 @@ def proposed(
     trials = ranked(trials, before)
     trials[: PROMISING[0]] = [tried.begun_late(trial) for trial in trials[: PROMISING[0]]]
     trials = ranked(trials, before)
-    if trials and timed(trials[0]):
+    if trials and is_timed(trials[0]):
         trials = ranked([tried.begun_late(trial) for trial in trials], before)
     close = sum(trial.cost < trials[0].cost + CLOSE * (before - trials[0].cost) for trial in trials)
     promising = int(np.clip(close, *PROMISING))

@@ -13,17 +13,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.diagnosis.form import clocks
-from lugre_steering.diagnosis.search import flexible, rig
+from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import clearest, foreign, left, needed, settled, simplest, tied, worlds
-from lugre_steering.diagnosis.search.fingerprint import Score, screen
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Round, Trial
+from lugre_steering.fitting import rig
+from lugre_steering.fitting.clocks import still_apart
+from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.split import Split
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Round, Trial
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -195,7 +196,7 @@ def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given:
     shapes = [flexible.bends(problem, current, i) for i in range(given, len(current.effects))]
     columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
     if plain.bends.shape[1]:
-        columns.append(clocks(problem, current.prediction))
+        columns.append(still_apart(problem, current.prediction))
     freed = plain.bent(columns)
     x = np.append(current.x[: plain.nuisances], np.zeros(freed.nuisances - plain.nuisances))
     return settled(freed, weight, fit(freed, weight, current.effects, x))

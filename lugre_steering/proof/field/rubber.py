@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-FREQUENCY_HZ = 10.0
 LOWEST_DEGC, HIGHEST_DEGC, STEP_K = -80.0, 140.0, 0.25
 
 

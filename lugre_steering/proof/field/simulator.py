@@ -112,7 +112,6 @@ class Bag:
     pressures: tuple[Samples, ...]
     time: Array
     clean_angles: Array
-    clean_pressures: Array
     torque: Array
     torque_without: Array
     effect_torque: dict[str, Array]
@@ -344,6 +343,6 @@ def _bag(setting: Setting, drive: Drive, hidden: Sequence[Hidden], rng: np.rando
     angles, seen = sense(time, measured[:, cut] + setting.zero_rad, clean, setting.dirt, rng)
     coarse = time[::every]
     return Bag(
-        drive.name, angles, seen, coarse, measured[:, cut][:, ::every], clean[:, ::every], torque, plain, added,
+        drive.name, angles, seen, coarse, measured[:, cut][:, ::every], torque, plain, added,
         {name: active_intervals(coarse, part) for name, part in added.items()},
     )  # fmt: skip

@@ -9,7 +9,6 @@ import numpy as np
 
 from lugre_steering.recording import Array, Kind
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.actuation import total_gains
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, motion_of
 from lugre_steering.simulate.paper.bench import (
     PUBLISHED_EXTREMES_NM,
@@ -24,6 +23,7 @@ from lugre_steering.simulate.paper.bench import (
 )
 from lugre_steering.simulate.paper.outcome import Check, Curve, Outcome, Panel
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
+from lugre_steering.vehicle.actuation import total_gains
 from lugre_steering.vehicle.cylinders import gauge_offset
 from lugre_steering.vehicle.tables import limit_device
 

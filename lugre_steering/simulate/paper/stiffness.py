@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, Mask
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import STEP_S, Motion
 from lugre_steering.simulate.paper.bench import Bench
@@ -43,7 +42,7 @@ class _Loaded:
     time: Array
     torque: Array
     angle: Array
-    held: NDArray[np.bool_]
+    held: Mask
     break_away: float
     true: float
 

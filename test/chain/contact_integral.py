@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Friction of rubber sliding on a self-affine rough road: the full contact integral, for offline use.
+"""Friction of rubber sliding on a self-affine rough road: the full contact integral, to judge the ratio form of the chain by.
 
 Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, with the contact-area correction S(q) of B. N. J. Persson,
 J. Phys.: Condens. Matter 18 (2006) 7789. The compiled chain uses the ratio form E''/|E| instead, the limit of one

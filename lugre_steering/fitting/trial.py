@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.diagnosis.search import onset
-from lugre_steering.diagnosis.search.fingerprint import Score
+from lugre_steering.fitting import onset
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.recording import Array
@@ -169,7 +169,7 @@ def ranked(trials: Sequence[Trial], before: float) -> list[Trial]:
     return sorted(trials, key=lambda trial: rank(trial, before))
 
 
-def timed(trial: Trial) -> bool:
+def is_timed(trial: Trial) -> bool:
     """Whether what a trial found begins or ends within the recordings."""
     return bool(trial.candidate.since) or any(trial.fit.effects[-1][1].get(edge) for edge in ("time_start", "time_end"))
 

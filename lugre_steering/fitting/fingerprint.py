@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search import onset
 from lugre_steering.effects.entry import Effect, Seen
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS
+from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, is_rig, resized
 from lugre_steering.recording import Array

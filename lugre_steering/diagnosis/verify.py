@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from lugre_steering.diagnosis.search import onset
+from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.split import CYCLE, Mask, Split, split
-from lugre_steering.recording import Array, IntArray
+from lugre_steering.fitting.split import CYCLE, Split, split
+from lugre_steering.recording import Array, IntArray, Mask
 
 RESAMPLES = 2000
 ENOUGH = 5
@@ -22,7 +22,7 @@ NORMAL = float(stats.norm.ppf(0.975))
 """Half width of a 95 % interval in standard deviations."""
 
 
-def rmse(problem: Problem, result: Fit, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+def rmse(problem: Problem, result: Fit, mask: Mask) -> float:
     """Root mean square error [N m] over the samples of a mask; NaN without samples."""
     error = (problem.measured - result.prediction)[mask]
     return float(np.sqrt(np.mean(error**2))) if error.size else float("nan")

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.search.compare import doubt
-from lugre_steering.diagnosis.search.fingerprint import Score, candidates, screen
-from lugre_steering.diagnosis.search.trial import TRIAL_TOLERANCE, Trial, cost, refine
+from lugre_steering.fitting.doubt import doubt
+from lugre_steering.fitting.fingerprint import Score, candidates, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Candidate, Problem, Values
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, cost, refine
 from lugre_steering.recording import Array
 
 LEAST, SHARE, SURE = 0.05, 0.02, 0.3

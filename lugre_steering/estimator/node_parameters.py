@@ -26,7 +26,7 @@ class ParameterError(LugreSteeringError):
 
 
 @dataclass(frozen=True)
-class Parameter:
+class NodeParameter:
     """One parameter of the node."""
 
     name: str
@@ -49,33 +49,33 @@ class Parameter:
         return f"a number with a decimal point from {self.low:g} to {self.high:g}"
 
 
-TABLE = (
-    Parameter("vehicle_file", "", "vehicle file (YAML); required. A change is taken over by the service ~/reload"),
-    Parameter("effects_files", "", "files with physics of your own (.yaml or .py), separated by ':'", fixed=True),
-    Parameter("autostart", True, "configure and activate the node at start; false leaves that to a lifecycle manager", fixed=True),
-    Parameter(
+NODE_TABLE = (
+    NodeParameter("vehicle_file", "", "vehicle file (YAML); required. A change is taken over by the service ~/reload"),
+    NodeParameter("effects_files", "", "files with physics of your own (.yaml or .py), separated by ':'", fixed=True),
+    NodeParameter("autostart", True, "configure and activate the node at start; false leaves that to a lifecycle manager", fixed=True),
+    NodeParameter(
         "executor",
         "events",
         "rclpy executor; only events keeps the order of arrival across topics under load",
         choices=EXECUTORS,
         fixed=True,
     ),
-    Parameter("frame_id", "base_link", "frame of the published torques (z up)", fixed=True),
-    Parameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000, fixed=True),
-    Parameter("angle_timeout_s", 0.15, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
-    Parameter("pressure_timeout_s", 0.15, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
-    Parameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)", fixed=True),
-    Parameter(
+    NodeParameter("frame_id", "base_link", "frame of the published torques (z up)", fixed=True),
+    NodeParameter("input_depth", 200, "queue depth of each input subscription", 1, 10_000, fixed=True),
+    NodeParameter("angle_timeout_s", 0.15, "an angle this old is stale: ERROR, no feed-forward commands [s]", 0.005, 60.0),
+    NodeParameter("pressure_timeout_s", 0.15, "a pressure or torque sensor silent for this long is stale [s]", 0.005, 60.0),
+    NodeParameter("publish_commands", False, "publish ~/feed_forward/commands (Float64MultiArray)", fixed=True),
+    NodeParameter(
         "when_stale",
         "silent",
         "the feed-forward when inputs are stale: silent at once, or led to zero over withdrawal_ramp_s and then silent",
         choices=WHEN_STALE,
     ),
-    Parameter("watch_folder", "", "folder for windows in which the model did not match (and ~/mark); empty: none", fixed=True),
-    Parameter("watch_before_s", 120.0, "such a window begins so long before [s]", 1.0, 3600.0),
-    Parameter("state_file", "", "file in which temperatures and bristles survive a restart; empty: they do not"),
-    Parameter("state_period_s", 10.0, "time between two writings of state_file [s]", 0.1, 3600.0),
-    Parameter("state_max_age_s", 86400.0, "an older state_file is not used [s]", 0.0, 1e8),
+    NodeParameter("watch_folder", "", "folder for windows in which the model did not match (and ~/mark); empty: none", fixed=True),
+    NodeParameter("watch_before_s", 120.0, "such a window begins so long before [s]", 1.0, 3600.0),
+    NodeParameter("state_file", "", "file in which temperatures and bristles survive a restart; empty: they do not"),
+    NodeParameter("state_period_s", 10.0, "time between two writings of state_file [s]", 0.1, 3600.0),
+    NodeParameter("state_max_age_s", 86400.0, "an older state_file is not used [s]", 0.0, 1e8),
 )
 _MEANINGS = {
     "pair_tolerance_s": "left and right stamps this close, or by half a sampling period up to 25 ms, are one instant [s]",
@@ -91,7 +91,7 @@ _MEANINGS = {
     "feed_forward_horizon_s": "the feed-forward is the torque needed this far ahead, along steering/command if it comes [s]",
 }
 OPTION_TABLE = tuple(
-    Parameter(item.name, getattr(Options(), item.name), _MEANINGS[item.name], item.metadata["low"], item.metadata["high"])
+    NodeParameter(item.name, getattr(Options(), item.name), _MEANINGS[item.name], item.metadata["low"], item.metadata["high"])
     for item in fields(Options)
 )
 
@@ -112,7 +112,7 @@ def read_options(file: Path) -> Options:
     if len(named) > 1:
         raise reader.fail("(top level)", len(named), f"one section of the node '{NODE}', not {' and '.join(named)}")
     names = {parameter.name for parameter in OPTION_TABLE}
-    others = {parameter.name for parameter in TABLE} | set(BY_ROS)
+    others = {parameter.name for parameter in NODE_TABLE} | set(BY_ROS)
     values: dict[str, object] = {}
     for key in own:
         section = sections[key]

@@ -16,8 +16,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from lugre_steering.live.seen import SHOWN_S, Line, Seen
 from lugre_steering.report.words import number
+from lugre_steering.watch.seen import SHOWN_S, Arrived, Line
 
 LEVELS = ("ok", "warning", "error", "stale")
 COLOURS = ("green", "yellow", "red", "magenta")
@@ -35,7 +35,7 @@ def spark(values: Sequence[float], bars: str = BARS) -> str:
     return "".join(" " if math.isnan(v) else bars[round((v - low) / span * top) if span else top // 2] for v in values)
 
 
-def view(seen: Seen, now_s: float, ascii_only: bool = False) -> Panel:
+def view(seen: Arrived, now_s: float, ascii_only: bool = False) -> Panel:
     """One screen."""
     numbers = Table(box=None, pad_edge=False)
     for column in ("", "now", "unit", f"last {SHOWN_S:.0f} s", "from", "to"):
@@ -70,11 +70,11 @@ def _health(health: Mapping[str, tuple[int, str]]) -> Table:
 
 
 @contextmanager
-def showing(console: Console) -> Iterator[Callable[[Seen], None]]:
+def showing(console: Console) -> Iterator[Callable[[Arrived], None]]:
     """Call it as often as wanted: a terminal shows the newest screen in place, a pipe gets the last one in the end."""
     ascii_only = not console.encoding.startswith("utf")
     if not console.is_terminal:
-        last: deque[Seen] = deque(maxlen=1)
+        last: deque[Arrived] = deque(maxlen=1)
         yield last.append
         for seen in last:
             console.print(view(seen, time.monotonic(), ascii_only))
@@ -82,7 +82,7 @@ def showing(console: Console) -> Iterator[Callable[[Seen], None]]:
     with Live(console=console, auto_refresh=False) as live:
         shown = -math.inf
 
-        def show(seen: Seen) -> None:
+        def show(seen: Arrived) -> None:
             nonlocal shown
             now_s = time.monotonic()
             if now_s - shown > REFRESH_S:

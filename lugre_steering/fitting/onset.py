@@ -13,8 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.split import Mask
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, Mask
 
 INSTANTS = 16
 """Instants tried in each recording before the best is refined."""

@@ -37,7 +37,7 @@ class Line:
 
 
 @dataclass
-class Seen:
+class Arrived:
     """All that has come: lines by name, health by component as level and message, and when the last message came [s]."""
 
     node: str
