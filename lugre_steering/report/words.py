@@ -113,6 +113,11 @@ def estimate(value: float | None, ends: Sequence[float | None] | None) -> tuple[
     return texts[0], " … ".join(texts[1:])
 
 
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """'1 recording', '2 recordings'."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
 def percent(share: float | None) -> str:
     if share is None or not math.isfinite(share):
         return "-"
