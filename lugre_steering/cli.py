@@ -503,7 +503,7 @@ def fleet(
     if as_json:
         print_json(done.json)
     else:
-        show_fleet(output(), done.json, out)
+        show_fleet(output(), done, out)
         print(f"results in {out}, report: {out / 'report.html'}")
     leave_if(wanted.failures(facts(done.json)))
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from lugre_steering.bag.find import Skipped
+from lugre_steering.counted import counted
 from lugre_steering.fleet.changes import Difference
 from lugre_steering.fleet.claims import ACTING, Claim, Outlier, Shared
 from lugre_steering.fleet.work import Options
 from lugre_steering.gate import Facts, Gate
 from lugre_steering.provenance import Provenance
-from lugre_steering.report import words
 from lugre_steering.result import Result
-from lugre_steering.serialise import ADDED
+from lugre_steering.serialise import ADDED, IN_MEMORY
+from lugre_steering.vehicle import Vehicle
 
 SCHEMA: Final = "lugre_steering/fleet/1"
 RECORD, PAGE = "fleet.json", "report.html"
@@ -39,6 +40,7 @@ class VehicleSummary:
     last: str | None
     median_rmse_Nm: float | None
     verdicts: Mapping[str, int]
+    vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
 
 
 @dataclass(frozen=True)
@@ -96,9 +98,9 @@ def facts(result: Mapping[str, Any]) -> Facts:
     acting = (claim for claim in result["claims"] if claim["kind"] in ACTING)
     effects = sorted({f"{claim['effect']} on {claim['vehicle'] or 'all vehicles'}" for claim in acting})
     return {
-        "quarantine": f"{words.counted(len(result['quarantine']), 'recording')} in quarantine" if result["quarantine"] else None,
+        "quarantine": f"{counted(len(result['quarantine']), 'recording')} in quarantine" if result["quarantine"] else None,
         "effect": ", ".join(effects) or None,
-        "outlier": words.counted(len(result["outliers"]), "outlier") if result["outliers"] else None,
-        "change": f"{words.counted(len(result['changes']), 'difference')} to {result['other_version']}" if result["changes"] else None,
+        "outlier": counted(len(result["outliers"]), "outlier") if result["outliers"] else None,
+        "change": f"{counted(len(result['changes']), 'difference')} to {result['other_version']}" if result["changes"] else None,
         "rmse": max((one["median_rmse_Nm"] for one in result["vehicles"] if one["median_rmse_Nm"] is not None), default=None),
     }

@@ -208,4 +208,5 @@ def _vehicle(member: Member, records: Sequence[Record]) -> VehicleSummary:
         last=own[-1]["recorded"] if own else None,
         median_rmse_Nm=float(np.median(errors)) if errors else None,
         verdicts=dict(Counter(record["verdict"] for record in own if record["verdict"] is not None)),
+        vehicle=member.vehicle,
     )

@@ -113,17 +113,12 @@ def estimate(value: float | None, ends: Sequence[float | None] | None) -> tuple[
     return texts[0], " … ".join(texts[1:])
 
 
-def counted(count: int, noun: str, plural: str = "") -> str:
-    """'1 recording', '2 recordings'."""
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"
-
-
 def percent(share: float | None) -> str:
     if share is None or not math.isfinite(share):
         return "-"
     size = abs(100.0 * share)
     if size < 0.05:
-        return "0 %"
+        return "less than 0.1 %" if share > 0.0 else "0 %"
     return f"{100.0 * share:.1f} %" if size < 10.0 else f"{100.0 * share:.0f} %"
 
 
