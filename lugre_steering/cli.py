@@ -22,6 +22,7 @@ from rich.markup import escape
 from rich.progress import Progress, TaskID
 
 from lugre_steering import defaults, serialise
+from lugre_steering.counted import counted
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
 from lugre_steering.terminal import forgive_letters
 from lugre_steering.version import __version__
@@ -530,7 +531,7 @@ def play(
         done = run(bag, rate=rate, loop=loop, recorded_stamps=recorded_stamps, progress=progress)
     for topic, reason in done.left_out.items():
         print(f"lugre-steering: not published: {topic}: {reason}", file=sys.stderr)
-    print_json(done) if as_json else print(f"{done.messages.total()} messages on {len(done.messages)} topics")
+    print_json(done) if as_json else print(f"{counted(done.messages.total(), 'message')} on {counted(len(done.messages), 'topic')}")
 
 
 @command()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lugre_steering.bag.reader import Bag, Block, shortened
+from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import (
     AIR_LIMIT_DEGC,
@@ -109,7 +110,7 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
             # Both joints may come in one message, which is lost once.
             rejected[topics[channel]] = rejected.get(topics[channel], Counter()) | Counter(reasons)
             if reordered:
-                statement = f"{reordered} messages were recorded out of order and put back in order"
+                statement = f"{counted(reordered, 'message was', 'messages were')} recorded out of order and put back in order"
                 findings.append(Finding("out_of_order", topics[channel], statement))
             if len(use):
                 clean[channel] = stamp[use], value[use], rate[use] if columns.rated else rate

@@ -248,6 +248,6 @@ def _reading(fleet: Fleet) -> str:
         "stand. What was looked for in vain counts.</p>\n"
         "<p>Joint evidence adds up how much of an effect each recording shows, with sign and error, whether or not it is enough to be "
         "named there. Where all hint at something and most name nothing, the recordings that say most are diagnosed together. Effects are "
-        "taken one at a time in joint evidence, so what is there shows in its rivals too: what leads is the finding, others that fit are no "
-        "second one. The torque of joint evidence is that of its value, in proportion.</p>\n"
+        "taken one at a time in joint evidence, so what is there shows in its rivals too: what leads is the finding, others that fit are "
+        "no second one. The torque of joint evidence is that of its value, in proportion.</p>\n"
     )

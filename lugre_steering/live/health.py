@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from lugre_steering.counted import counted
 from lugre_steering.online import NOTABLE_SHARE, is_large, sheet_words
 from lugre_steering.recording import NODE, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
@@ -225,7 +226,7 @@ class Health:
                 troubles.append(f"{label} stamps are not close to the clock{hint}")
                 level = max(level, WARN)
         if self.namesakes:
-            troubles.append(f"{self.namesakes} other node{'s' * (self.namesakes > 1)} of this name: their outputs mix with these")
+            troubles.append(f"{counted(self.namesakes, 'other node')} of this name: their outputs mix with these")
             level = max(level, WARN)
         return self._status("inputs", level, "; ".join(troubles) or "all inputs arrive", values)
 
