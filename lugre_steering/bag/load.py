@@ -37,6 +37,8 @@ LIMITS = {
 }
 SET_BACK_RUN = 5  # messages in a row between others: no mere lateness
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
+REMEDY = "leave the bag out if another machine made it, else give its topics and joints their names under 'topics' of the vehicle file"
+"""What to do about a bag that has nothing of what the vehicle file names."""
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 
 _Samples = tuple[IntArray, Array, Array]  # stamp, value, rate of what is usable; no rates where none is given
@@ -131,8 +133,9 @@ def _nothing_usable(
     counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
     left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
     damage = f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
+    remedy = "" if left_out or damage else f"; {REMEDY}"
     return BagError(
-        f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}"
+        f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}{remedy}"
     )
 
 
