@@ -144,6 +144,6 @@ def _refuse_among(bags: Sequence[Path], out: Path) -> None:
     for bag in bags:
         if bag.exists() and out.resolve() in (bag.resolve(), bag.resolve().parent):
             raise BagError(
-                f"--out {out}: is where the recording {bag.name} lies, and results would be mixed with recordings; expected a folder "
-                f"without recordings, such as {out}_results"
+                f"--out {out}: is where the recording {bag.name} lies, and results would be mixed with recordings; choose another --out, "
+                f"such as {out}_results"
             )
