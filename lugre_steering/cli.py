@@ -85,7 +85,7 @@ VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="recordings at a time, each in a process of its own")]
 Threads = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="threads of the computation [all processors]")]
-FailOn = Annotated[list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so (any wrong word tells all); repeatable")]
+FailOn = Annotated[list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so; 'list' shows what can be asked; repeatable")]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
 
 OwnEffects = Annotated[
@@ -573,7 +573,7 @@ def node(
 
 @command()
 def effects(
-    effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
+    effect_id: Annotated[str, typer.Argument(metavar="ID", help="explain this effect; all are listed if left out")] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,
     check: Annotated[bool, typer.Option("--check", help="try what every effect owes the chain (exit code 1 if it fails)")] = False,
     add: Annotated[Path | None, typer.Option(help="keep a law of this vehicle file under the name --id")] = None,

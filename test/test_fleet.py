@@ -31,7 +31,7 @@ from typer.testing import CliRunner
 import lugre_steering
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
-from lugre_steering.diagnosis.conclude.headline import CHECKS
+from lugre_steering.diagnosis.conclude.headline import CHECKS, inside
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError, VehicleFileError
 from lugre_steering.fleet.command import show_fleet
@@ -307,7 +307,7 @@ def test_the_page_begins_with_what_an_engineer_acts_on(tmp_path: Path, monkeypat
     assert found.do == CHECKS["measurement"]
     page = (tmp_path / "out" / "report.html").read_text().replace("\u00a0", " ")
     first = page[page.index("<body") : page.index("<section")]
-    for words in ("model of 1 of 2 vehicles", CATALOGUE["pressure_offset"].title, CATALOGUE["backlash"].title, found.size, found.do):
+    for words in ("model of 1 of 2 vehicles", CATALOGUE["pressure_offset"].title, f"or {inside(CATALOGUE['backlash'].title)}", found.size, found.do):
         assert words in first
     assert not {name for name in CATALOGUE if "_" in name and name in re.sub("<script.*", "", page, flags=re.DOTALL)}
     assert "'bags/seven 1'" in page.replace("&#x27;", "'")  # the command to look closer, as a shell takes it

@@ -66,11 +66,11 @@ def _verdict(fleet: Fleet) -> tuple[Tone, str, str]:
     found = told(fleet)
     if found:
         having = {one.vehicle for one in found}
-        of = ALL if ALL in having else f"{len(having)} of {counted(len(fleet.vehicles), 'vehicle')}"
+        of = ALL if ALL in having else f"{len(having)} of {len(fleet.vehicles)} vehicles"
         most = found[0]
         where = f" on {most.vehicle}" if len(fleet.vehicles) > 1 else ""
         largest = f"{'The largest: ' if len(found) > 1 else ''}{most.what}{where}, {most.size}, since {most.since}."
-        return "found", f"Physics is missing from the model of {of}", largest
+        return "found", "Physics is missing from the model" + (f" of {of}" if len(fleet.vehicles) > 1 else ""), largest
     sound = [vehicle for vehicle in fleet.vehicles if vehicle.recordings]
     if not sound:
         return "unsure", "No recording tells anything", "All of them are in quarantine; the reasons stand below."
@@ -100,9 +100,9 @@ def _closer(fleet: Fleet) -> str:
     found = commands(fleet)
     if not found:
         return ""
-    rows = [(text(vehicle), code(command)) for vehicle, command in found.items()]
     said = "<p>The diagnosis of one vehicle says where and when it acts, and writes a vehicle file that has it.</p>\n"
-    return said + _limited(("vehicle", "command"), rows, (), "claims.parquet")
+    rows = [f'<h3>{text(vehicle)}</h3><p class="formula">{text(command)}</p>\n' for vehicle, command in list(found.items())[:MOST_ROWS]]
+    return said + "".join(rows)
 
 
 def _limited(header: Sequence[str], rows: Sequence[Row | Sequence[str]], numeric: Sequence[int], file: str) -> str:

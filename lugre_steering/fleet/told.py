@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from lugre_steering import units
 from lugre_steering.counted import counted
-from lugre_steering.diagnosis.conclude.headline import CHECKS
+from lugre_steering.diagnosis.conclude import headline
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fleet.claims import ACTING, MOST_TOGETHER, Claim
 from lugre_steering.fleet.result import Fleet
@@ -56,7 +56,7 @@ def title(fleet: Fleet, claim: Claim) -> str:
     names = [claim.effect.partition("[")[0], *(name for name in claim.rivals.split(", ") if name)]
     own, *others = [units.title(vehicle, CATALOGUE[name]) if name in CATALOGUE else name for name in names]
     line = claim.effect[len(names[0]) :].strip("[]").replace("_", " ")
-    return own + (f" ({line})" if line else "") + (f", or {' or '.join(others)}" if others else "")
+    return own + (f" ({line})" if line else "") + (f", or {' or '.join(map(headline.inside, others))}" if others else "")
 
 
 def size(fleet: Fleet, claim: Claim) -> str:
@@ -87,7 +87,7 @@ def _sheet(fleet: Fleet, name: str) -> Vehicle:
 
 def _told(fleet: Fleet, group: Sequence[Claim]) -> Told:
     shown, effect = best(group), CATALOGUE.get(group[0].effect.partition("[")[0])
-    check = CHECKS.get(effect.stage, LOOK) if effect is not None else LOOK
+    check = headline.CHECKS.get(effect.stage, LOOK) if effect is not None else LOOK
     return Told(
         shown.vehicle or ALL, title(fleet, shown), size(fleet, shown), _since(fleet, group), _seen(fleet, group), check, tuple(group)
     )

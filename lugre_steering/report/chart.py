@@ -19,6 +19,9 @@ import numpy as np
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
+DOT_ROOM = 0.03
+"""Share of the x range left free on either side of points, which would be cut in halves at its ends."""
+
 
 @dataclass(frozen=True)
 class Series:
@@ -85,8 +88,10 @@ class Chart:
             for s in self.spans
             if s.at
         ]
+        low, high = min(ends, default=0.0), max(ends, default=1.0)
+        aside = DOT_ROOM * (high - low) * any(series.dots and series.x is not None for panel in self.panels for series in panel.series)
         since = {} if self.since is None else {"since": round(1e3 * self.since.timestamp())}
-        return {"label": self.label, "range": [min(ends, default=0.0), max(ends, default=1.0)], **since,
+        return {"label": self.label, "range": [low - aside, high + aside], **since,
                 "panels": [panel.plain() for panel in self.panels], "spans": spans}  # fmt: skip
 
 
