@@ -85,7 +85,9 @@ VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="recordings at a time, each in a process of its own")]
 Threads = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="threads of the computation [all processors]")]
-FailOn = Annotated[list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so; 'list' shows what can be asked; repeatable")]
+FailOn = Annotated[
+    list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so; 'list' tells what can be asked; repeatable")
+]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
 
 OwnEffects = Annotated[
@@ -261,7 +263,7 @@ def replay(
         print_json(result)
     else:
         show_replay(output(), result)
-        print(f"results in {out}")
+        print(f"results in {out}, for people in {'NAME' if len(result['bags']) > 1 else result['bags'][0]['name']}.html")
     leave_if(wanted.failures(facts(result)))
 
 

@@ -303,11 +303,12 @@ def test_the_page_begins_with_what_an_engineer_acts_on(tmp_path: Path, monkeypat
     assert asked == [("seven", 5)]
     (found,) = told(fleet)
     assert (found.vehicle, found.size, found.since) == ("seven", "up to 12.3 kN m (12 % of the torque)", "2026-03-01, the first recording")
-    assert found.seen == "5 recordings diagnosed together; alone in 0 of 8 recordings"
+    assert found.seen == "5 recordings diagnosed together, 0 of 8 recordings alone"
     assert found.do == CHECKS["measurement"]
     page = (tmp_path / "out" / "report.html").read_text().replace("\u00a0", " ")
     first = page[page.index("<body") : page.index("<section")]
-    for words in ("model of 1 of 2 vehicles", CATALOGUE["pressure_offset"].title, f"or {inside(CATALOGUE['backlash'].title)}", found.size, found.do):
+    rival = f"or {inside(CATALOGUE['backlash'].title)}"
+    for words in ("model of 1 of 2 vehicles", CATALOGUE["pressure_offset"].title, rival, found.size, found.do):
         assert words in first
     assert not {name for name in CATALOGUE if "_" in name and name in re.sub("<script.*", "", page, flags=re.DOTALL)}
     assert "'bags/seven 1'" in page.replace("&#x27;", "'")  # the command to look closer, as a shell takes it

@@ -59,6 +59,14 @@ def test_five_recordings_that_agree_are_enough() -> None:
     assert combined([4.2, -5.9, 5.1, -4.4, 5.6], [1.0] * 5).p_value > 0.5
 
 
+def test_recordings_that_differ_hint_at_what_they_do_not_prove() -> None:
+    """Viscous friction of five manoeuvres, as simulated: 750 with more than the errors between them."""
+    whole = combined([1320.0, 579.0, 106.0, 706.0, 612.0], [210.0, 26.0, 110.0, 34.0, 81.0])
+    assert whole.hint_p < 1e-8
+    assert whole.p_value > 1e-3
+    assert combined([320.0, -79.0, 106.0, -70.0, 12.0], [210.0, 26.0, 110.0, 34.0, 81.0]).hint_p > 0.1
+
+
 def test_what_every_estimate_has_wrong_alike_is_no_evidence() -> None:
     sd = np.ones(400)
     assert combined(0.6 * sd, sd, floor=0.0).p_value < 1e-12
@@ -172,9 +180,9 @@ def test_what_several_recordings_show_together_leads_and_is_looked_at_where_hard
     rows = [record("A", d, {"slope_bias": rng.normal(4.0), "backlash": rng.normal(5.0)}) for d in range(1, 9)]
     for day, row in enumerate(rows):
         row["estimates"] = [{**one, "sd": 1.0 + 0.1 * (day not in (1, 2, 4, 6, 7))} for one in row["estimates"]]
-    (chosen,) = worth_pooling(rows, claims(rows)).values()
+    (chosen,) = worth_pooling(rows).values()
     assert [row["bag"] for row in chosen] == [f"bags/A {day}" for day in (2, 3, 5, 7, 8)]  # which say most
-    assert not worth_pooling(rows[:2], claims(rows[:2]))
+    assert not worth_pooling(rows[:2])
     size = {"slope": {"value": 4.0, "ci95": [3.0, 5.0], "unit": "N m"}}
     effect = {"id": "slope_bias", "p_value": 1e-12, "parameters": size, "indistinguishable_from": [], "largest_Nm": 120.0,
               "largest_share": 0.04}  # fmt: skip
@@ -183,7 +191,9 @@ def test_what_several_recordings_show_together_leads_and_is_looked_at_where_hard
     assert [(claim.kind, claim.effect, claim.recordings, claim.largest_Nm) for claim in leading] == [("together", "slope_bias", 2, 120.0)]
     for row in rows:
         row["effects"] = [effect]  # named in each: nothing more is to be learnt
-    assert not worth_pooling(rows, claims(rows))
+    assert not worth_pooling(rows)
+    differing = [{**row, "effects": [{**effect, "id": f"other_{day}"}]} for day, row in enumerate(rows)]
+    assert worth_pooling(differing)  # each names something else
     assert [claim.effect for claim in claims(rows) if claim.leads] == ["slope_bias"]
 
 

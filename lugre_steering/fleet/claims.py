@@ -9,7 +9,7 @@ said to fit as well.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -28,8 +28,8 @@ BUDGET = 0.05
 _NO_VALUE: Mapping[str, Any] = {"value": None, "ci95": (None, None), "unit": ""}
 LEAST_JOINT = 3
 """Recordings of a vehicle that joint evidence takes, and vehicles for that of all of them."""
-HINT, MOST_TOGETHER = 0.5, 5
-"""q-value of joint evidence that is worth a diagnosis of several recordings together, and of how many."""
+MOST_TOGETHER = 5
+"""Recordings of a vehicle that are diagnosed as one."""
 DAY_S = 86_400.0
 
 Kind = Literal["recording", "together", "joint", "fleet", "since", "trend over time", "trend over air temperature"]
@@ -274,19 +274,24 @@ def _with_leaders(found: Sequence[Claim]) -> list[Claim]:
     ]
 
 
-def worth_pooling(records: Sequence[Record], found: Sequence[Claim]) -> dict[str, list[Record]]:
-    """Recordings to be diagnosed together, by vehicle: where all hint jointly at something, and most of them alone name nothing.
+def worth_pooling(records: Sequence[Record]) -> dict[str, list[Record]]:
+    """Recordings to be diagnosed together, by vehicle: where all hint jointly at something, and most of them alone do not name the same.
 
-    Those that say most about it, whatever they say: choosing those that show most of it would be no fair trial.
+    A diagnosis decides, so they may differ by more than their errors here. Those are taken that say most about it, whatever they say:
+    choosing those that show most of it would be no fair trial.
     """
     chosen: dict[str, list[Record]] = {}
-    hints = {claim.vehicle: claim for claim in reversed(found) if claim.kind == "joint" and claim.q_value <= HINT}
     for vehicle, rows in by_vehicle(records).items():
-        if vehicle in hints and 2 * sum(bool(record["effects"]) for record in rows) < len(rows):
-            told = _estimates(rows)[hints[vehicle].effect, 0]
-            sure = sorted(range(len(told)), key=lambda i: told[i][1]["sd"])[:MOST_TOGETHER]
-            chosen[vehicle] = [told[i][0] for i in sorted(sure)]
-    return {vehicle: rows for vehicle, rows in chosen.items() if rows}
+        estimates = _estimates(rows)
+        whole = {(effect, shape): one for effect, shapes in _jointly(estimates).items() for shape, one in shapes.items()}
+        named = Counter(effect["id"] for record in rows for effect in record["effects"])
+        if not whole or 2 * max(named.values(), default=0) >= len(rows):
+            continue
+        hint = min(whole, key=lambda key: whole[key].hint_p)
+        if whole[hint].hint_p * len(whole) <= BUDGET:
+            sure = sorted(range(len(estimates[hint])), key=lambda i: estimates[hint][i][1]["sd"])[:MOST_TOGETHER]
+            chosen[vehicle] = [estimates[hint][i][0] for i in sorted(sure)]
+    return chosen
 
 
 def shared(records: Sequence[Record], found: Sequence[Claim]) -> list[Shared]:

@@ -71,9 +71,8 @@ def run(
                 records.append(record)
                 progress("recordings", len(records), len(bags))
             records.sort(key=lambda record: (record["member"], record["recorded"] or "", record["bag"]))
-            found = claims(records, options.seed)
-            together = list(_diagnosed_together(records, members, found, store, jobs, scheduler, progress))
-            found = claims(records, options.seed, together) if together else found
+            together = list(_diagnosed_together(records, members, store, jobs, scheduler, progress))
+            found = claims(records, options.seed, together)
             fleet = _summary(
                 records, members, skipped, options, version, found, earlier=store.earlier(records), together=together, workers=jobs,
                 seconds=time.perf_counter() - begun,
@@ -130,11 +129,10 @@ def _in_parallel(
 
 
 def _diagnosed_together(
-    records: Sequence[Record], members: Sequence[Member], found: Sequence[Claim], store: Store, jobs: int, scheduler: str | None,
-    progress: Progress,
-) -> Iterator[Record]:  # fmt: skip
+    records: Sequence[Record], members: Sequence[Member], store: Store, jobs: int, scheduler: str | None, progress: Progress
+) -> Iterator[Record]:
     """Diagnoses of several recordings of one vehicle, where they are worth it; one whose worker died is tried again by the next run."""
-    chosen = worth_pooling(records, found)
+    chosen = worth_pooling(records)
     tasks = [pooled(member, chosen[member.name], store) for member in members if member.name in chosen]
     kept = [record for record in map(known, tasks) if record is not None]
     yield from kept

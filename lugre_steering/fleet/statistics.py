@@ -35,7 +35,7 @@ OUTLIER = 3.5
 class Combined:
     """Several estimates as one: ``value``, its standard ``error`` and interval, ``p_value`` against none, ``between``: standard
     deviation of what differs beyond the errors, ``alike_p``: chance of such differences where there are none, ``floor``: size up to
-    which there may be nothing."""
+    which there may be nothing, ``hint_p``: the p-value if differences were hardly more than errors."""
 
     value: float
     error: float
@@ -45,6 +45,7 @@ class Combined:
     between: float
     alike_p: float
     floor: float
+    hint_p: float
 
 
 def combined(value: ArrayLike, sd: ArrayLike, sign: int = 0, floor: float | None = None) -> Combined:
@@ -68,10 +69,16 @@ def combined(value: ArrayLike, sd: ArrayLike, sign: int = 0, floor: float | None
     mean, error = _mean(y, s2 + tau2)
     reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, y.size - 1)) * error
     least = OWN_ERROR * float(np.mean(1.0 / s2)) ** -0.5 if floor is None else floor
-    centre, doubt, freedom = (mean, error, y.size - 1) if alike < ALIKE else (*_mean(y, s2), KNOWN + y.size - 1)
-    beyond = ((centre if sign else abs(centre)) - least) / doubt
-    p = min(1.0, (1.0 if sign else 2.0) * float(stats.t.sf(beyond, freedom)))
-    return Combined(mean, error, mean - reach, mean + reach, p, tau2**0.5, alike, least)
+    plain, freedom = float(np.average(y, weights=1.0 / s2)), KNOWN + y.size - 1
+    scale = max(1.0, (differs + freedom) / freedom)  # the scatter, drawn towards the errors that are known
+    hint = _beyond(plain, least, float(np.sqrt(scale / np.sum(1.0 / s2))), freedom, sign)
+    p = _beyond(mean, least, error, y.size - 1, sign) if alike < ALIKE else hint
+    return Combined(mean, error, mean - reach, mean + reach, p, tau2**0.5, alike, least, hint)
+
+
+def _beyond(mean: float, least: float, error: float, freedom: int, sign: int) -> float:
+    """p-value of a mean (of this sign, or of either) against one of size ``least``."""
+    return min(1.0, (1.0 if sign else 2.0) * float(stats.t.sf(((mean if sign else abs(mean)) - least) / error, freedom)))
 
 
 def _mean(y: Array, variance: Array) -> tuple[float, float]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from lugre_steering import units
@@ -18,7 +18,9 @@ from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle
 
 ALL = "all vehicles"
-LOOK = "diagnose it alone for the place where it acts"
+MOST_RIVALS = 2
+"""Other names told in one breath."""
+LOOK = "diagnose this vehicle (the report has the command) for the place where it acts"
 
 
 @dataclass(frozen=True)
@@ -35,28 +37,60 @@ class Told:
 
 
 def told(fleet: Fleet) -> list[Told]:
-    """What leads or is named, the largest torque first; what only fits as well as that is left out."""
-    groups: dict[tuple[str, str], list[Claim]] = {}
+    """What leads or is named, the largest torque first; what only fits as well as that, or is another name of it, is told with it."""
+    of: dict[str, dict[str, list[Claim]]] = {}
     for claim in fleet.claims:
         if claim.kind in ACTING:
-            groups.setdefault((claim.vehicle, claim.effect.partition("[")[0]), []).append(claim)
-    shown = [group for group in groups.values() if any(claim.leads or claim.kind == "recording" for claim in group)]
-    return [_told(fleet, group) for group in sorted(shown, key=lambda group: -(best(group).largest_Nm or 0.0))]
+            of.setdefault(claim.vehicle, {}).setdefault(_id(claim), []).append(claim)
+    findings = [group for effects in of.values() for group in _findings(effects)]
+    return [_told(fleet, group) for group in sorted(findings, key=lambda group: -(best(group).largest_Nm or 0.0))]
+
+
+def _findings(effects: Mapping[str, list[Claim]]) -> list[list[Claim]]:
+    """Claims about one vehicle, by effect, as findings: names that cannot be told apart are one, the surest first."""
+    shown = [group for group in effects.values() if any(claim.leads or claim.kind == "recording" for claim in group)]
+    found: list[list[Claim]] = []
+    for group in sorted(shown, key=lambda group: (not any(c.leads for c in group), -len(group))):
+        same = next((earlier for earlier in found if _alike(earlier, group)), None)
+        if same is None:
+            found.append(list(group))
+        else:
+            same += group
+    return found
+
+
+def _alike(one: Sequence[Claim], other: Sequence[Claim]) -> bool:
+    """Whether two groups may be one thing: their names are rivals, or both fit jointly; and no diagnosis names both."""
+    names, also = ({name for claim in group for name in (_id(claim), *_rivals(claim))} for group in (one, other))
+    by, also_by = ({(c.kind, c.bag) for c in group if c.kind in ("recording", "together")} for group in (one, other))
+    jointly = all(any(claim.kind in ("joint", "fleet") for claim in group) for group in (one, other))
+    return not by & also_by and bool(jointly or names & also)
+
+
+def _id(claim: Claim) -> str:
+    return claim.effect.partition("[")[0]
+
+
+def _rivals(claim: Claim) -> list[str]:
+    return [name for name in claim.rivals.split(", ") if name]
 
 
 def best(group: Sequence[Claim]) -> Claim:
-    """The claim of one effect whose numbers are told: of several recordings together, else the largest of single ones, else joint."""
+    """The claim whose numbers are told: of a diagnosis of several recordings, else the largest of single ones that name what leads, else
+    joint."""
     order = ("together", "recording", "joint", "fleet")
-    return min(group, key=lambda claim: (order.index(claim.kind), -(claim.largest_Nm or 0.0)))
+    return min(group, key=lambda claim: (order.index(claim.kind), _id(claim) != _id(group[0]), -(claim.largest_Nm or 0.0)))
 
 
-def title(fleet: Fleet, claim: Claim) -> str:
-    """What an effect is called on its vehicle, with its line and what it may be as well."""
+def title(fleet: Fleet, claim: Claim, others: Iterable[str] = ()) -> str:
+    """What an effect is called on its vehicle, with its line and what it may be as well: its rivals and ``others``."""
     vehicle = _sheet(fleet, claim.vehicle)
-    names = [claim.effect.partition("[")[0], *(name for name in claim.rivals.split(", ") if name)]
-    own, *others = [units.title(vehicle, CATALOGUE[name]) if name in CATALOGUE else name for name in names]
+    names = list(dict.fromkeys([_id(claim), *_rivals(claim), *others]))
+    own, *rest = [units.title(vehicle, CATALOGUE[name]) if name in CATALOGUE else name for name in names]
     line = claim.effect[len(names[0]) :].strip("[]").replace("_", " ")
-    return own + (f" ({line})" if line else "") + (f", or {' or '.join(map(headline.inside, others))}" if others else "")
+    more = [f"{len(rest) - MOST_RIVALS} more"] if len(rest) > MOST_RIVALS + 1 else []
+    rest = [headline.inside(name) for name in rest[: MOST_RIVALS if more else None]]
+    return own + (f" ({line})" if line else "") + "".join(f", or {name}" for name in [*rest, *more])
 
 
 def size(fleet: Fleet, claim: Claim) -> str:
@@ -86,17 +120,17 @@ def _sheet(fleet: Fleet, name: str) -> Vehicle:
 
 
 def _told(fleet: Fleet, group: Sequence[Claim]) -> Told:
-    shown, effect = best(group), CATALOGUE.get(group[0].effect.partition("[")[0])
+    shown = best(group)
+    effect = CATALOGUE.get(_id(shown))
     check = headline.CHECKS.get(effect.stage, LOOK) if effect is not None else LOOK
-    return Told(
-        shown.vehicle or ALL, title(fleet, shown), size(fleet, shown), _since(fleet, group), _seen(fleet, group), check, tuple(group)
-    )
+    what = title(fleet, shown, map(_id, group))
+    return Told(shown.vehicle or ALL, what, size(fleet, shown), _since(fleet, group), _seen(fleet, group), check, tuple(group))
 
 
 def _since(fleet: Fleet, group: Sequence[Claim]) -> str:
     """The date of a change that stands; else whether it was there from the beginning, else when it was named first."""
-    vehicle, effect = group[0].vehicle, group[0].effect
-    steps = [claim.since for claim in fleet.claims if (claim.kind, claim.vehicle, claim.effect) == ("since", vehicle, effect)]
+    about = {(claim.vehicle, claim.effect) for claim in group}
+    steps = [claim.since for claim in fleet.claims if claim.kind == "since" and (claim.vehicle, claim.effect) in about]
     if steps:
         return day(steps[0])
     from_start = [claim for claim in group if claim.kind != "recording"]
@@ -110,16 +144,17 @@ def day(date: str | None) -> str:
 
 
 def _seen(fleet: Fleet, group: Sequence[Claim]) -> str:
-    named = sum(claim.kind == "recording" for claim in group)
+    """In which recordings, alone and together, and what a diagnosis of several says that does not name it."""
     if group[0].vehicle == "":
-        return f"all vehicles together, {counted(group[0].recordings, 'recording')}; too weak on each"
+        return f"all vehicles together ({counted(group[0].recordings, 'recording')}), too weak on each"
     (vehicle,) = (vehicle for vehicle in fleet.vehicles if vehicle.name == group[0].vehicle)
-    of_all = f"{named} of {counted(vehicle.recordings, 'recording')}"
-    for claim in group:
-        if claim.kind == "together":
-            return f"{claim.recordings} recordings diagnosed together; alone in {of_all}"
-    if named:
-        return of_all
-    asked = any(part.vehicle == vehicle.name and part.verdict != "failed" for part in fleet.together)
-    doubt = "; a diagnosis of some of them together does not name it" if asked else ""
-    return f"{counted(group[0].recordings, 'recording')} together, too weak in each{doubt}"
+    alone = f"{len({claim.bag for claim in group if claim.kind == 'recording'})} of {counted(vehicle.recordings, 'recording')} alone"
+    joint = [claim for claim in group if claim.kind in ("together", "joint")]
+    if not joint:
+        return alone
+    diagnosed = [claim for claim in joint if claim.kind == "together"]
+    if diagnosed:
+        return f"{diagnosed[0].recordings} recordings diagnosed together, {alone}"
+    asked = [part for part in fleet.together if part.vehicle == vehicle.name and part.verdict != "failed"]
+    doubt = f"; a diagnosis of {len(asked[0].bags)} of them together does not name it" if asked else ""
+    return f"{counted(joint[0].recordings, 'recording')} together, {alone}{doubt}"
