@@ -22,6 +22,7 @@ from rich.markup import escape
 from rich.progress import Progress, TaskID
 
 from lugre_steering import defaults, serialise
+from lugre_steering.counted import counted
 from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
 from lugre_steering.terminal import forgive_letters
 from lugre_steering.version import __version__
@@ -84,7 +85,9 @@ VehicleFile = Annotated[Path, typer.Option("--vehicle", help="vehicle file (YAML
 OutFolder = Annotated[Path, typer.Option("--out", help="folder for the results")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="recordings at a time, each in a process of its own")]
 Threads = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="threads of the computation [all processors]")]
-FailOn = Annotated[list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so (any wrong word tells all); repeatable")]
+FailOn = Annotated[
+    list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so; 'list' tells what can be asked; repeatable")
+]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
 
 OwnEffects = Annotated[
@@ -260,7 +263,7 @@ def replay(
         print_json(result)
     else:
         show_replay(output(), result)
-        print(f"results in {out}")
+        print(f"results in {out}, for people in {'NAME' if len(result['bags']) > 1 else result['bags'][0]['name']}.html")
     leave_if(wanted.failures(facts(result)))
 
 
@@ -503,7 +506,7 @@ def fleet(
     if as_json:
         print_json(done.json)
     else:
-        show_fleet(output(), done.json, out)
+        show_fleet(output(), done, out)
         print(f"results in {out}, report: {out / 'report.html'}")
     leave_if(wanted.failures(facts(done.json)))
 
@@ -530,7 +533,7 @@ def play(
         done = run(bag, rate=rate, loop=loop, recorded_stamps=recorded_stamps, progress=progress)
     for topic, reason in done.left_out.items():
         print(f"lugre-steering: not published: {topic}: {reason}", file=sys.stderr)
-    print_json(done) if as_json else print(f"{done.messages.total()} messages on {len(done.messages)} topics")
+    print_json(done) if as_json else print(f"{counted(done.messages.total(), 'message')} on {counted(len(done.messages), 'topic')}")
 
 
 @command()
@@ -572,7 +575,7 @@ def node(
 
 @command()
 def effects(
-    effect_id: Annotated[str, typer.Argument(metavar="[ID]", help="explain this effect")] = "",
+    effect_id: Annotated[str, typer.Argument(metavar="ID", help="explain this effect; all are listed if left out")] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,
     check: Annotated[bool, typer.Option("--check", help="try what every effect owes the chain (exit code 1 if it fails)")] = False,
     add: Annotated[Path | None, typer.Option(help="keep a law of this vehicle file under the name --id")] = None,

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lugre_steering.bag import BagWriter, Part, cdr
-from lugre_steering.bag.find import find
+from lugre_steering.bag.find import find, told_apart
 from lugre_steering.bench.replay import START_NS, write_cycle
 from lugre_steering.cli import app
 from lugre_steering.errors import BagError, DataError
@@ -193,5 +193,16 @@ def test_a_replayed_bag_is_hardly_larger_than_what_is_in_it(tmp_path: Path) -> N
 
 def test_out_in_a_folder_of_bags_is_told(tmp_path: Path) -> None:
     write_cycle(tmp_path / "run", 1.0)
-    with pytest.raises(BagError, match="results would lie among recordings"):
+    with pytest.raises(BagError, match=rf"such as {tmp_path}_results$"):
         find([tmp_path / "run"], tmp_path)
+
+
+def test_recordings_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    assert told_apart(["a/x/run", "b/x/run", "b/other"]) == ["a/x/run", "b/x/run", "other"]
+    assert told_apart(["monday/run", "tuesday/run"]) == ["monday/run", "tuesday/run"]
+    assert told_apart(["run"]) == ["run"]
+    for day in ("monday", "tuesday"):
+        write_cycle(tmp_path / day / "run", 1.0 + (day == "monday"))
+    done = command("replay", tmp_path / "monday", tmp_path / "tuesday", "--vehicle", VEHICLE, "--out", tmp_path / "out")
+    assert "monday/run -> run " in done.stdout
+    assert "tuesday/run -> run_2 " in done.stdout

@@ -67,7 +67,7 @@ def test_text_result_names_the_fit_and_the_folder(bag: Path, tmp_path: Path, her
     assert (done.exit_code, done.stderr) == (0, "")
     assert "RMSE" in done.stdout
     assert f"\n{named.name} " in done.stdout  # whole, at 80 columns
-    assert done.stdout.endswith("results in out\n")
+    assert done.stdout.endswith(f"results in out, for people in {named.name}.html\n")
 
 
 def test_the_version_is_told(tmp_path: Path) -> None:

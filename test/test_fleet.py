@@ -4,35 +4,47 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import io
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from rich.console import Console
 from test_batch import of_another_machine
+from test_fleet_statistics import record
 from typer.testing import CliRunner
 
 import lugre_steering
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
+from lugre_steering.diagnosis.conclude.headline import CHECKS, inside
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError, VehicleFileError
+from lugre_steering.fleet.command import show_fleet
 from lugre_steering.fleet.result import Fleet
 from lugre_steering.fleet.run import run
 from lugre_steering.fleet.tables import KINDS
+from lugre_steering.fleet.together import Together
+from lugre_steering.fleet.told import told
 from lugre_steering.fleet.vehicles import member_of, read_members
 from lugre_steering.fleet.work import FleetOptions, Task, process
 from lugre_steering.resources import config_folder
 from lugre_steering.schemas import schema_of
+from lugre_steering.serialise import as_json
 
 VEHICLE = config_folder() / "test_vehicle.yaml"
 BAGS = Path(__file__).parents[1] / "bags"
@@ -263,6 +275,55 @@ def test_one_is_diagnosed_and_its_physics_stands(tmp_path: Path) -> None:
     assert len(estimates) > 15
     assert all(row["sd"] > 0.0 for row in estimates.values())
     assert "Elastic end stop" in (out / "report.html").read_text()
+
+
+def test_the_page_begins_with_what_an_engineer_acts_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight recordings of each of two vehicles; one has 4 standard deviations of an offset in each, too little for any alone."""
+    rng = np.random.default_rng(1)
+    rows = [
+        {**record(vehicle, day, {"pressure_offset": rng.normal(size), "backlash": rng.normal()}), "effects": [], "recordings": 1,
+         "duration_s": 60.0, "bag_sha256": f"{day:064d}", "files": {f"{vehicle}_{day}.mcap": f"{day:064d}"}, "seconds": 1.0}
+        for vehicle, size in (("seven", 4.5), ("nine", 0.0)) for day in range(1, 9)
+    ]  # fmt: skip
+    asked = []
+
+    def diagnose_together(tasks: Sequence[Together]) -> Iterator[dict]:
+        for task in tasks:
+            asked.append((task.member, len(task.bags)))
+            size = {"offset": {"value": 4.5, "ci95": [4.0, 5.0], "unit": "Pa"}}
+            effect = {"id": "pressure_offset", "p_value": 1e-20, "parameters": size, "indistinguishable_from": ["backlash"],
+                      "largest_Nm": 12345.0, "largest_share": 0.123}  # fmt: skip
+            yield {"member": task.member, "bags": list(task.bags), "recorded": task.recorded, "verdict": "missing_physics",
+                   "statement": "told", "effects": [effect]}  # fmt: skip
+
+    monkeypatch.setattr("lugre_steering.fleet.run._work", lambda *_: iter(rows))
+    monkeypatch.setattr("lugre_steering.fleet.run.in_processes", lambda _, tasks, __: enumerate(diagnose_together(tasks)))
+    (tmp_path / "map.yaml").write_text(as_json({"vehicles": {name: {"file": VEHICLE, "bags": ["*"]} for name in ("seven", "nine")}}))
+    fleet = run([], tmp_path / "map.yaml", tmp_path / "out", jobs=1)
+    assert asked == [("seven", 5)]
+    (found,) = told(fleet)
+    assert (found.vehicle, found.size, found.since) == ("seven", "up to 12.3 kN m (12 % of the torque)", "2026-03-01, the first recording")
+    assert found.seen == "5 recordings diagnosed together, 0 of 8 recordings alone"
+    assert found.do == CHECKS["measurement"]
+    page = (tmp_path / "out" / "report.html").read_text().replace("\u00a0", " ")
+    first = page[page.index("<body") : page.index("<section")]
+    rival = f"or {inside(CATALOGUE['backlash'].title)}"
+    for words in ("model of 1 of 2 vehicles", CATALOGUE["pressure_offset"].title, rival, found.size, found.do):
+        assert words in first
+    assert not {name for name in CATALOGUE if "_" in name and name in re.sub("<script.*", "", page, flags=re.DOTALL)}
+    assert "'bags/seven 1'" in page.replace("&#x27;", "'")  # the command to look closer, as a shell takes it
+    result = json.loads((tmp_path / "out" / "fleet.json").read_text())
+    jsonschema.validate(result, schema_of(Fleet))
+    made = result["provenance"]
+    assert made["options"] == {"diagnose": True, "seed": 1}
+    assert made["vehicle"]["sha256"][str(VEHICLE)] == hashlib.sha256(VEHICLE.read_bytes()).hexdigest()
+    assert made["vehicle"]["sha256"]["map.yaml"] == hashlib.sha256((tmp_path / "map.yaml").read_bytes()).hexdigest()
+    assert {"path": "bags/nine 3", "sha256": {"nine_3.mcap": f"{3:064d}"}} in made["bags"]
+    assert f"{3:064d}" in page
+    console = Console(width=80, file=io.StringIO())
+    show_fleet(console, fleet, tmp_path)
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "12.3 kN m" in text.split("recordings  quarantine")[0]
 
 
 @pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="Dask is not installed")

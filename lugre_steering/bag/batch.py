@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from lugre_steering.bag.find import Skipped
-from lugre_steering.bag.load import distinct, read_recording
+from lugre_steering.bag.load import REMEDY, distinct, read_recording
 from lugre_steering.bag.reader import shortened
 from lugre_steering.errors import BagError
 from lugre_steering.recording import Channel, Kind, Recording
@@ -47,8 +47,8 @@ def missing(recording: Recording, channels: Sequence[Channel]) -> str:
     """What a recording lacks to be one of this machine, in words; empty if it has all angles and some torque."""
     lost = [c.topic for c in channels if c.kind is Kind.ANGLE and c.name not in recording.angle]
     if lost:
-        return f"no recording of this machine: nothing usable on {', '.join(dict.fromkeys(lost))}"
+        return f"no recording of this machine: nothing usable on {', '.join(dict.fromkeys(lost))}; {REMEDY}"
     torque = [c.topic for c in channels if c.kind in (Kind.PRESSURE, Kind.TORQUE)]
     if torque and not recording.pressure and recording.measured_torque is None:
-        return f"no torque to compare with: nothing usable on {', '.join(torque)}"
+        return f"no torque to compare with: nothing usable on {', '.join(torque)}; {REMEDY}"
     return ""

@@ -103,6 +103,16 @@ def custom_data(bag: Path) -> Mapping[str, Any] | None:
     return noted if isinstance(noted, Mapping) else None
 
 
+def told_apart(paths: Sequence[str]) -> list[str]:
+    """Each path by as many of its last parts as tell it from all others: 'run_1', but 'monday/run_1' beside 'tuesday/run_1'."""
+    parts = [Path(path).parts for path in paths]
+    return ["/".join(own[-_telling(own, [other for other in parts if other != own]) :]) for own in parts]
+
+
+def _telling(own: tuple[str, ...], others: Sequence[tuple[str, ...]]) -> int:
+    return next((count for count in range(1, len(own)) if all(other[-count:] != own[-count:] for other in others)), len(own))
+
+
 def _inside(path: Path, out: Path | None) -> Iterator[Path]:
     """Every recording in a folder, however deep, in order of names; hidden folders and links to folders are not entered."""
     if is_recording(path):
@@ -133,4 +143,7 @@ def _refuse_among(bags: Sequence[Path], out: Path) -> None:
     """Results between recordings are hard to find again, and to tell apart."""
     for bag in bags:
         if bag.exists() and out.resolve() in (bag.resolve(), bag.resolve().parent):
-            raise BagError(f"{out}: holds the recording {bag.name}, and results would lie among recordings; choose another --out")
+            raise BagError(
+                f"--out {out}: is where the recording {bag.name} lies, and results would be mixed with recordings; choose another --out, "
+                f"such as {out}_results"
+            )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lugre_steering.bag.reader import Bag, Block, shortened
+from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import (
     AIR_LIMIT_DEGC,
@@ -37,6 +38,8 @@ LIMITS = {
 }
 SET_BACK_RUN = 5  # messages in a row between others: no mere lateness
 LATE_NS = 1_000_000_000  # a message this much behind its topic is late; further behind, the clock was set back
+REMEDY = "leave the bag out if another machine made it, else give its topics and joints their names under 'topics' of the vehicle file"
+"""What to do about a bag that has nothing of what the vehicle file names."""
 STRAY_NS = 86_400 * 1_000_000_000  # a stamp this far from where the log clock puts it is no stamp of this recording
 
 _Samples = tuple[IntArray, Array, Array]  # stamp, value, rate of what is usable; no rates where none is given
@@ -110,7 +113,7 @@ def read_recording(path: str | Path, channels: Sequence[Channel]) -> Recording:
             # Both joints may come in one message, which is lost once.
             rejected[topics[channel]] = rejected.get(topics[channel], Counter()) | Counter(reasons)
             if reordered:
-                statement = f"{reordered} messages were recorded out of order and put back in order"
+                statement = f"{counted(reordered, 'message was', 'messages were')} recorded out of order and put back in order"
                 findings.append(Finding("out_of_order", topics[channel], statement))
             if len(use):
                 clean[channel] = stamp[use], value[use], rate[use] if columns.rated else rate
@@ -131,8 +134,9 @@ def _nothing_usable(
     counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
     left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
     damage = f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
+    remedy = "" if left_out or damage else f"; {REMEDY}"
     return BagError(
-        f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}"
+        f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}{remedy}"
     )
 
 

@@ -34,6 +34,7 @@ from lugre_steering.bag.mcap_records import (
     records,
 )
 from lugre_steering.bag.messages import Connection, Messages, windows
+from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import Finding
 
@@ -183,10 +184,10 @@ class McapFile:
             lost = f"{run.messages - seen} of {run.messages} messages of {where}{since} are lost: {reason}"
             self._report(lost)
         elif not whole or broken:
-            kept = f"; the {seen} messages that can still be told apart were kept" if seen else ""
+            kept = f"; {counted(seen, 'message')} that can still be told apart kept" if seen else ""
             self._report(f"{where} cannot be read in full: {reason}{kept}")
         if foreign:
-            self._report(f"{foreign} messages of {where} are left out: their topic or log time is damaged or missing")
+            self._report(f"{counted(foreign, 'message')} of {where} left out: topic or log time damaged or missing")
         del data
         if len(messages):
             yield messages
@@ -363,7 +364,7 @@ class McapFile:
             for messages in self._load(run):
                 self._runs.append(run._replace(begin_ns=int(messages.log_ns[0])))
                 total, last_ns = total + len(messages), max(last_ns, int(messages.log_ns[-1]))
-        upto = f"; kept {total} messages" + (f" up to t={(last_ns - self.begin_ns) / 1e9:.3f} s" if total else "")
+        upto = f"; kept {counted(total, 'message')}" + (f" up to t={(last_ns - self.begin_ns) / 1e9:.3f} s" if total else "")
         if self._gaps:
             lost = sum(gap.after - gap.at for gap in self._gaps)
             places = "" if len(self._gaps) == 1 else f" in {len(self._gaps)} places"

@@ -22,6 +22,7 @@ from lugre_steering.bag import cdr, mcap, sqlite
 from lugre_steering.bag.compression import ZSTD_MAGIC, Allowance, expand_file
 from lugre_steering.bag.messages import Connection, Messages, inflated, merged, windows
 from lugre_steering.bag.metadata import read_metadata
+from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import NODE, TRUTH, Array, Channel, Finding, IntArray, Kind
 
@@ -211,13 +212,13 @@ class Bag:
             seen.update(dict(enumerate(np.bincount(block.channel, minlength=len(channels)).tolist())))
             yield block
         for topic, count in self.malformed.items():
-            self._say("malformed_messages", f"{count} messages are not valid CDR of their type; left out", topic)
+            self._say("malformed_messages", f"{counted(count, 'message')} left out: no valid CDR of the type", topic)
         for i, channel in enumerate(channels):
             if channel in topics and not seen[i] and channel.joint:
                 self._say("no_data", f"no message speaks of joint {channel.joint!r}", topics[channel])
         for k, count in self._foreign.items():
             if count and len(readers[k]) == 1 and seen[readers[k][0]]:  # a topic that several share has others by right
-                statement = f"{count} messages speak of other joints only, not of {channels[readers[k][0]].joint!r}"
+                statement = f"{counted(count, 'message')} with other joints only, not with {channels[readers[k][0]].joint!r}"
                 self._say("foreign_joint", statement, self.connections[k].topic)
 
     def _decode(self, messages: Messages, channels: Sequence[Channel], readers: Mapping[int, Sequence[int]]) -> Block:

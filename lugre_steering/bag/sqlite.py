@@ -24,6 +24,7 @@ from typing import Any
 from lugre_steering.bag.compression import MESSAGE_LIMIT
 from lugre_steering.bag.messages import Connection, Messages, from_rows
 from lugre_steering.bag.sqlite_pages import leaf_rows
+from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import Finding
 
@@ -222,7 +223,7 @@ class SqliteFile:
                 self._salvage(f"damaged: {_text(error)}", "damaged_bag")
 
         if self._left_out:
-            statement = f"{self._left_out} rows are no messages (topic, log time or content) and are left out"
+            statement = f"{counted(self._left_out, 'row is no message', 'rows are no messages')} (topic, log time or content), left out"
             finding = Finding("damaged_bag", "", f"{self.path.name}: {statement}")
             if finding not in self.findings:  # a bag may be read more than once
                 self.findings.append(finding)
@@ -274,7 +275,7 @@ class SqliteFile:
         upto = f" up to t={(last - first) / 1e9:.3f} s" if count else ""
         copy.set_progress_handler(self._count_steps, _STEPS_APART)
         self._db = copy
-        self.findings.append(Finding(finding, "", f"{self.path.name}: {why}; kept {count} messages{upto}"))
+        self.findings.append(Finding(finding, "", f"{self.path.name}: {why}; kept {counted(count, 'message')}{upto}"))
 
     def _reachable_rows(self) -> Iterator[Row]:
         for number, columns in leaf_rows(self._opened):

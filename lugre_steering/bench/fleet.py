@@ -98,11 +98,11 @@ def run(argv: Sequence[str]) -> None:
     if options.json:
         print(as_json(result))
         return
+    print("| workers | recordings per hour | work on each | overhead | start | all known, again |\n|---|---|---|---|---|---|")
     for row in rows:
         print(
-            f"fleet, {row['workers']} workers: {row['recordings_per_hour']:,.0f} recordings/h of a minute each "
-            f"({row['work_s_per_recording']:.2f} s of work each), overhead {row['overhead']:.1%}, start {row['start_s']:.1f} s; "
-            f"all known again in {row['known_again_s']:.2f} s"
+            f"| {row['workers']} | {row['recordings_per_hour']:,.0f} | {row['work_s_per_recording']:.2f} s | {row['overhead']:.1%} | "
+            f"{row['start_s']:.1f} s | {row['known_again_s']:.2f} s |"
         )
     whole = result["hundred_thousand"]
     print(

@@ -17,6 +17,7 @@ from scipy.ndimage import median_filter
 
 from lugre_steering.data.dataset import Run
 from lugre_steering.recording import Array, Finding, IntArray, Mask
+from lugre_steering.report.words import percent
 
 THRESHOLD = 6.0
 """In robust standard deviations of what is left after a running median."""
@@ -55,7 +56,7 @@ class Bursts:
         longest = max(end - start for start, end in self.intervals)
         series = "" if self.period_s is None else f", every {self.period_s:.2f} s"
         return (
-            f"{len(self.peaks)} short bursts (longest {longest:.2f} s){series} hold {100 * self.share:.0f} % of what "
+            f"{len(self.peaks)} short bursts (longest {longest:.2f} s){series} hold {percent(self.share)} of what "
             "the model leaves over, and do not come again when the joint comes back to the same angle and rate: "
             "a disturbance from outside, not a law of the motion"
         )

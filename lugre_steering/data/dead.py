@@ -19,6 +19,7 @@ from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.data.sensing import white_noise
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.report.words import percent
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.model import build_model
@@ -118,7 +119,7 @@ def _rough(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
         topic = ", ".join(dict.fromkeys(topics[Kind.ANGLE, side] for side in vehicle.sides))
         yield _finding(
             "noisy_sensor", topic,
-            f"noise of {units.distance(vehicle, run.angle.sigma(), degrees='.2g')} per sample is {run.angle.sigma() / presliding:.0%} "
+            f"noise of {units.distance(vehicle, run.angle.sigma(), degrees='.2g')} per sample is {percent(run.angle.sigma() / presliding)} "
             "of what the contact turns before it slides; no friction can be told from it; check the sensor and its cable",
         )  # fmt: skip
 

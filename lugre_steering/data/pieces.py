@@ -9,7 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from lugre_steering.counted import counted
 from lugre_steering.recording import Finding, Recording, Signal
+from lugre_steering.report.words import percent
 
 LONGEST_S = 900.0
 """Duration of all recordings together up to which everything is examined."""
@@ -35,8 +37,8 @@ def in_pieces(recordings: Sequence[Recording]) -> tuple[list[Recording], dict[st
         examined = tuple((start, start + PIECE_S) for start in starts)
         findings[recording.name] = Finding(
             "long_recording", "",
-            f"{duration:.0f} s long: {count} pieces of {PIECE_S:.0f} s, spread over it where the tracks turn most, are examined, "
-            f"{1.0 - count * PIECE_S / duration:.0%} of it is not; what changes over hours is seen between pieces only",
+            f"{duration:.0f} s long; examined: {counted(count, 'piece')} of {PIECE_S:.0f} s, spread over it where the tracks turn most; "
+            f"{percent(1.0 - count * PIECE_S / duration)} of it is not; what changes over hours is seen between pieces only",
             examined,
         )  # fmt: skip
     return used, findings

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from lugre_steering import units
+from lugre_steering.counted import counted
 from lugre_steering.data.dataset import GAP_S
 from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
 from lugre_steering.data.pieces import in_pieces
@@ -24,6 +25,7 @@ from lugre_steering.data.sensing import FOURTH, worse_than_said
 from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring, span
 from lugre_steering.recording import Array, Channel, Finding, Kind, Mask, Recording, Signal
+from lugre_steering.report.words import percent
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import build_model
 
@@ -121,7 +123,7 @@ def _held_long(findings: Sequence[Finding], looks: Mapping[Channel, _Look]) -> I
         )
         duration = float(look.time[-1] - look.time[0])
         if channel.kind is Kind.ANGLE and held > HELD * duration:
-            statement = f"{channel.topic}: shows no angle for {held / duration:.0%} of the recording; check its range and its zero"
+            statement = f"{channel.topic}: shows no angle for {percent(held / duration)} of the recording; check its range and its zero"
             yield Finding("dead_sensor", channel.topic, statement)
 
 
@@ -138,7 +140,7 @@ def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> 
     found = [Finding("sensor_worse_than_sheet", channel.topic, f"{channel.topic}: {said}; taken into account")] if said else []
     lost = _lost(look)
     if lost > LOST:
-        statement = f"{channel.topic}: {lost:.0%} of the messages are lost; what lies between the others is not taken for measured"
+        statement = f"{channel.topic}: {percent(lost)} of the messages are lost; what lies between the others is not taken for measured"
         found.append(Finding("lost_messages", channel.topic, statement))
     return found
 
@@ -189,7 +191,7 @@ def _rejected(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     found = []
     for topic, reasons in recording.rejected.items():
         count = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in reasons.items())
-        statement = f"{topic}: {sum(reasons.values())} messages cannot be used ({count}); look at the driver and its clock"
+        statement = f"{topic}: {counted(sum(reasons.values()), 'message')} cannot be used ({count}); look at the driver and its clock"
         if topic in air and "absurd" in reasons:
             statement += ", and at the unit: degC is expected, kelvin is more by 273.15"
         found.append(Finding("rejected_samples", topic, statement))
@@ -389,7 +391,7 @@ def _examine(
         keep[first : last + 1] = False
     # Where the noise changes, the scatter that spikes are measured by is wrong.
     spikes = [(a, b) for a, b in spikes if not any(first <= b and a <= last for first, last in _widened(look, noisy))]
-    report("spikes", look.intervals(spikes), f"{len(spikes)} isolated outliers, not used; check shielding and connectors")
+    report("spikes", look.intervals(spikes), f"{counted(len(spikes), 'isolated outlier')}, not used; check shielding and connectors")
     at = look.intervals(noisy)
     report(
         "noise_change", at,

@@ -213,7 +213,7 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         ("how it shows", effect.trace),
         ("told by", effect.coordinate),
         ("source", effect.source),
-        ("easily taken for", ", ".join(registry.rivals(effect))),
+        ("easily taken for", "; ".join(f"{CATALOGUE[rival].title} ({rival})" for rival in registry.rivals(effect))),
         ("would need", effect.not_recorded),
     ):
         if text:

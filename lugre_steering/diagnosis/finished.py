@@ -20,6 +20,11 @@ from lugre_steering.recording import Array
 from lugre_steering.report import words
 
 
+def amplitude_of(torque: Array) -> float:
+    """What one of a hundred samples (n,) exceeds [N m]."""
+    return float(np.percentile(np.abs(torque), 99.0))
+
+
 @dataclass(frozen=True)
 class Finished:
     """The problem, its noise, the roles of its samples and what the search found; weights are one over sigma, (n,) [1/(N m)]."""
@@ -68,8 +73,8 @@ class Finished:
 
     @cached_property
     def amplitude(self) -> float:
-        """Of the measured torque [N m]: exceeded in one of a hundred samples."""
-        return float(np.percentile(np.abs(self.problem.measured), 99.0))
+        """Of the measured torque [N m]."""
+        return amplitude_of(self.problem.measured)
 
     def torque(self, value: float) -> str:
         """A torque (or force) in few digits, with its unit."""

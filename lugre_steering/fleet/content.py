@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -41,16 +41,21 @@ def state(bag: Path) -> State:
     return found
 
 
-def digest_of(bag: Path) -> str:
-    """SHA-256 of the bytes of all files of a bag, wherever it lies and whatever the folder is called."""
-    whole = hashlib.sha256()
+def digests_of(bag: Path) -> dict[str, str]:
+    """SHA-256 of each file of a bag, by name."""
+    found = {}
     for file in files_of(bag):
         part = hashlib.sha256()
         with file.open("rb") as stream:
             while piece := stream.read(_STEP):
                 part.update(piece)
-        whole.update(part.digest())
-    return whole.hexdigest()
+        found[file.name] = part.hexdigest()
+    return found
+
+
+def digest_of(digests: Mapping[str, str]) -> str:
+    """One SHA-256 of those of all files of a bag, wherever it lies and whatever the folder is called."""
+    return hashlib.sha256(b"".join(bytes.fromhex(digest) for digest in digests.values())).hexdigest()
 
 
 def foreign() -> dict[str, str]:
@@ -58,8 +63,8 @@ def foreign() -> dict[str, str]:
     return {name: origin.sha256 for name, origin in ORIGINS.items()}
 
 
-def key_of(bag_sha256: str, vehicle_sha256: str, options: Mapping[str, Any]) -> str:
-    """The name under which results of these inputs are kept, those of every version."""
+def key_of(bag_sha256: str | Sequence[str], vehicle_sha256: str, options: Mapping[str, Any]) -> str:
+    """The name under which results of these inputs (one bag, or several together) are kept, those of every version."""
     inputs = [bag_sha256, vehicle_sha256, dict(options), foreign()]
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:40]
 

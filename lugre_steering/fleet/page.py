@@ -5,19 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from datetime import datetime
+from dataclasses import replace
+from datetime import datetime, timezone
+from math import floor
 from pathlib import Path
 
 import numpy as np
 
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.counted import counted
+from lugre_steering.diagnosis.report.head import VERDICTS
 from lugre_steering.files import write_text
-from lugre_steering.fleet.claims import DAY_S, Claim, by_vehicle
+from lugre_steering.fleet.claims import ACTING, DAY_S, Claim, by_vehicle
 from lugre_steering.fleet.result import Fleet
+from lugre_steering.fleet.told import ALL, best, commands, day, size, title, told
 from lugre_steering.fleet.work import Record
 from lugre_steering.report import words
 from lugre_steering.report.chart import Chart, Panel, Series
 from lugre_steering.report.markup import Row, code, facts, table, text
+from lugre_steering.report.origin import made_by
 from lugre_steering.report.page import Charts, Section, Tone, render
 
 MOST_ROWS, MOST_DOTS, MOST_VEHICLES = 200, 1500, 6
@@ -30,63 +35,74 @@ def write_page(fleet: Fleet, records: Sequence[Record], file: Path) -> None:
     charts = Charts()
     tone, title, first = _verdict(fleet)
     sections = [
-        Section("effects", "Effects", "What acts on which vehicle", _effects(fleet)),
-        Section("since", "Since when", "What changed, and when", _since(fleet)),
-        Section("shared", "Shared", "Shared or of one vehicle", _shared(fleet)),
+        Section("closer", "Look closer", "Look closer", _closer(fleet)),
         Section("trends", "Trends", "Error of the model over dates and air temperature", _trends(fleet, records, charts)),
-        Section("outliers", "Outliers", "Recordings unlike the others of their vehicle", _outliers(fleet)),
         Section("vehicles", "Vehicles", "The vehicles", _vehicles(fleet)),
-        Section("changes", "Changes", "What another version of the program said differently", _changes(fleet)),
+        Section("outliers", "Outliers", "Recordings unlike the others of their vehicle", _outliers(fleet)),
         Section("quarantine", "Quarantine", "Recordings that tell nothing", _quarantine(fleet)),
+        Section("effects", "Effects", "All that stands, with its statistics", _effects(fleet)),
+        Section("since", "Changes", "What changed, and when", _since(fleet)),
+        Section("shared", "Shared", "Shared or of one vehicle", _shared(fleet)),
+        Section("versions", "Versions", "What another version of the program said differently", _changes(fleet)),
         Section("reading", "Reading", "How to read this", _reading(fleet)),
+        Section("origin", "Origin", "How this result came about", _origin(fleet)),
     ]
     head = (
-        f'<header id="verdict"><p class="over">vehicles: {len(fleet.vehicles)} &middot; recordings: {fleet.recordings} &middot; '
-        f'{text(fleet.date[:10])}</p>\n<h1>{text(title)}</h1>\n<div class="verdict"><p>{text(first)}</p></div>\n'
-        f"{facts(_numbers(fleet))}</header>"
+        f'<header id="verdict"><p class="over">{text(_scope(fleet))}</p>\n<h1>{text(title)}</h1>\n'
+        f'<div class="verdict"><p>{text(first)}</p></div>\n{_acting(fleet)}{facts(_numbers(fleet))}</header>'
     )
-    maker = f"lugre_steering {fleet.version}, {fleet.date}, options {fleet.options}"
+    maker = f"lugre_steering {fleet.version}, {fleet.date}"
     write_text(render("Fleet report", tone, head, sections, charts, maker), file)
+
+
+def _scope(fleet: Fleet) -> str:
+    dates = sorted({day(date) for vehicle in fleet.vehicles for date in (vehicle.first, vehicle.last) if date is not None})
+    when = f", recorded {dates[0]}" + (f" to {dates[-1]}" if len(dates) > 1 else "") if dates else ""
+    return f"{counted(len(fleet.vehicles), 'vehicle')}, {counted(fleet.recordings, 'recording')}{when}"
 
 
 def _verdict(fleet: Fleet) -> tuple[Tone, str, str]:
     """Tone, headline and first sentence."""
-    having = {claim.vehicle: claim for claim in reversed(fleet.claims) if claim.leads or claim.kind == "recording"}
-    alone = [claim for claim in fleet.claims if claim.leads and not claim.named_in]
-    if having:
-        what = [f"{_title(claim)}{_rivals(claim)} on {vehicle}" for vehicle, claim in sorted(having.items())]
-        more = f", and {len(what) - MOST_VEHICLES} vehicles more" if len(what) > MOST_VEHICLES else ""
-        weak = ", ".join(sorted({_title(claim) for claim in alone}))
-        joint = f" Too weak for any single recording, and seen in all together: {weak}." if weak else ""
-        return "found", "Physics is missing from the model", f"{', '.join(what[:MOST_VEHICLES])}{more}.{joint}"
-    if not any(vehicle.recordings for vehicle in fleet.vehicles):
+    found = told(fleet)
+    if found:
+        having = {one.vehicle for one in found}
+        of = ALL if ALL in having else f"{len(having)} of {len(fleet.vehicles)} vehicles"
+        most = found[0]
+        where = f" on {most.vehicle}" if len(fleet.vehicles) > 1 else ""
+        largest = f"{'The largest: ' if len(found) > 1 else ''}{most.what}{where}, {most.size}, since {most.since}."
+        return "found", "Physics is missing from the model" + (f" of {of}" if len(fleet.vehicles) > 1 else ""), largest
+    sound = [vehicle for vehicle in fleet.vehicles if vehicle.recordings]
+    if not sound:
         return "unsure", "No recording tells anything", "All of them are in quarantine; the reasons stand below."
     if not fleet.options.diagnose:
         return "unsure", "Checked and replayed, not diagnosed", "Nothing was looked for in what the model leaves."
-    none = "No effect stands within the budget of false discoveries, in single recordings or jointly."
-    return "good", "Nothing is missing from the model", none
+    none = "No effect stands, in single recordings or in all together: the model leaves nothing that could be told from chance."
+    return "good", "No missing physics is seen", none
+
+
+def _acting(fleet: Fleet) -> str:
+    """The first table: what an engineer acts on."""
+    rows = [Row([text(cell) for cell in (one.vehicle, one.what, one.size, one.since, one.seen, one.do)], LEADS) for one in told(fleet)]
+    return _limited(("vehicle", "what the model leaves out", "how much", "since", "seen in", "what to do"), rows, (), "claims.parquet")
 
 
 def _numbers(fleet: Fleet) -> list[tuple[str, str, str]]:
     hours = sum(vehicle.hours for vehicle in fleet.vehicles)
     return [
-        ("recordings", str(fleet.recordings - len(fleet.quarantine)), f"{words.number(hours, 3)} h"),
-        ("in quarantine", str(len(fleet.quarantine)), ""),
-        ("claims that stand", str(len(fleet.claims)), f"of {fleet.considered}; at most {fleet.budget:.0%} of them false on average"),
-        ("worked on in this run", str(fleet.examined), f"{fleet.cached} were known"),
+        ("recordings used", str(sum(vehicle.recordings for vehicle in fleet.vehicles)), f"{words.number(hours, 3)} h"),
+        ("in quarantine", str(len(fleet.quarantine)), "reasons below" if fleet.quarantine else ""),
+        ("worked on in this run", str(fleet.examined), f"{fleet.cached} known from earlier runs"),
     ]
 
 
-def _title(claim: Claim) -> str:
-    name = claim.effect.partition("[")[0]
-    line = claim.effect[len(name) :].strip("[]")
-    return (CATALOGUE[name].title if name in CATALOGUE else name) + (f" ({line})" if line else "")
-
-
-def _rivals(claim: Claim) -> str:
-    """What it may be as well."""
-    names = [CATALOGUE[name].title if name in CATALOGUE else name for name in claim.rivals.split(", ") if name]
-    return f" (or, not to be told apart: {', '.join(names)})" if names else ""
+def _closer(fleet: Fleet) -> str:
+    """The commands that examine one vehicle."""
+    found = commands(fleet)
+    if not found:
+        return ""
+    said = "<p>The diagnosis of one vehicle says where and when it acts, and writes a vehicle file that has it.</p>\n"
+    rows = [f'<h3>{text(vehicle)}</h3><p class="formula">{text(command)}</p>\n' for vehicle, command in list(found.items())[:MOST_ROWS]]
+    return said + "".join(rows)
 
 
 def _limited(header: Sequence[str], rows: Sequence[Row | Sequence[str]], numeric: Sequence[int], file: str) -> str:
@@ -98,32 +114,25 @@ def _limited(header: Sequence[str], rows: Sequence[Row | Sequence[str]], numeric
 
 
 def _effects(fleet: Fleet) -> str:
-    """A row for every effect of every vehicle: those that lead or are named first."""
-    total = {vehicle.name: vehicle.recordings for vehicle in fleet.vehicles}
+    """A row for every effect of every vehicle that stands: those that lead or are named first."""
+    groups: dict[tuple[str, str], list[Claim]] = {}
+    for claim in fleet.claims:
+        if claim.kind in ACTING:
+            groups.setdefault((claim.vehicle, claim.effect), []).append(claim)
     rows: list[Row | Sequence[str]] = []
-    for (vehicle, effect), claims in sorted(_acting(fleet).items(), key=lambda item: (item[0][0], _rank(item[1]))):
-        named = [claim for claim in claims if claim.kind == "recording"]
-        shown = next((claim for claim in claims if claim.kind == "joint"), named[0] if named else claims[0])
-        first = min((claim.since or "" for claim in named), default="")[:10] or "-"
+    for (vehicle, _), claims in sorted(groups.items(), key=lambda item: (item[0][0], _rank(item[1]))):
+        shown = best(claims)
         value, ends = words.estimate(shown.value, None if shown.low is None else (shown.low, shown.high))
-        size = f"{code(shown.parameter)} {text(value)} {text(shown.unit)}"
-        leads, role = any(claim.leads for claim in claims), "fits too" if not named else "named"
+        of_value = f"{shown.parameter.replace('_', ' ')} {value} {'' if shown.unit == '1' else shown.unit}"
+        leads, named = any(claim.leads for claim in claims), any(claim.kind == "recording" for claim in claims)
         cells = (
-            text(vehicle), f"{text(_title(shown) + _rivals(shown))} ({code(effect)})", "leads" if leads else role,
-            f"{len(named)} of {total[vehicle]}", text(first), size, text(ends), text(words.chance(min(claim.q_value for claim in claims))),
+            text(vehicle or ALL), text(title(fleet, shown)), "leads" if leads else "named" if named else "fits too",
+            text(of_value), text(ends), text(size(fleet, shown)), str(max(claim.recordings for claim in claims)),
+            text(words.chance(min(claim.q_value for claim in claims))),
         )  # fmt: skip
         rows.append(Row(cells, LEADS if leads or named else None))
-    header = ("vehicle", "effect", "", "named in", "first on", "size", "95 % interval", "q")
-    return _limited(header, rows, (3, 7), "claims.parquet")
-
-
-def _acting(fleet: Fleet) -> dict[tuple[str, str], list[Claim]]:
-    """Names and joint evidence by vehicle and effect, the surest first."""
-    found: dict[tuple[str, str], list[Claim]] = {}
-    for claim in fleet.claims:
-        if claim.kind in ("recording", "joint"):
-            found.setdefault((claim.vehicle, claim.effect), []).append(claim)
-    return found
+    header = ("vehicle", "effect", "", "value", "95 % interval", "torque", "recordings", "q")
+    return _limited(header, rows, (6, 7), "claims.parquet")
 
 
 def _rank(claims: Sequence[Claim]) -> tuple[bool, int, float]:
@@ -133,25 +142,25 @@ def _rank(claims: Sequence[Claim]) -> tuple[bool, int, float]:
 
 def _since(fleet: Fleet) -> str:
     rows = [
-        (text(claim.vehicle), text(_title(claim)), text((claim.since or "")[:10]), f"{code(claim.parameter)} by {_slope(claim)}",
-         str(claim.recordings), text(words.chance(claim.q_value)))
+        (text(claim.vehicle), text(title(fleet, claim)), text(day(claim.since)),
+         f"{text(claim.parameter.replace('_', ' '))} by {_slope(claim)}",
+         text(size(fleet, claim)), str(claim.recordings), text(words.chance(claim.q_value)))
         for claim in fleet.claims if claim.kind == "since"
     ]  # fmt: skip
-    return _limited(("vehicle", "effect", "since", "changed", "recordings", "q"), rows, (4, 5), "claims.parquet")
+    return _limited(("vehicle", "effect", "since", "changed", "torque", "recordings", "q"), rows, (5, 6), "claims.parquet")
 
 
 def _slope(claim: Claim) -> str:
-    return text(f"{words.number(claim.value, 3)} {claim.unit}")
+    return text(words.quantity(claim.value, claim.unit))
 
 
 def _shared(fleet: Fleet) -> str:
     rows = []
     for one in fleet.shared:
+        claim = next(claim for claim in fleet.claims if claim.kind == "joint" and claim.effect == one.effect)
         said = "alike on all vehicles" if one.common else "differs between vehicles"
-        title = CATALOGUE[one.effect.partition("[")[0]].title
-        between = text(f"{words.number(one.between, 3)} {one.unit}")
-        name = f"{text(title)} ({code(one.effect)})"
-        rows.append((name, said, text(", ".join(one.vehicles)), between, text(words.chance(one.alike_p))))
+        between = text(words.quantity(one.between, one.unit))
+        rows.append((text(title(fleet, claim)), said, text(", ".join(one.vehicles)), between, text(words.chance(one.alike_p))))
     return _limited(("effect", "", "stands on", "spread between vehicles", "p that there is none"), rows, (3, 4), "claims.parquet")
 
 
@@ -169,9 +178,8 @@ def _trends(fleet: Fleet, records: Sequence[Record], charts: Charts) -> str:
     dates = [_days(record) for own in scored.values() for record in own]
     if not dates:
         return found
-    start = min(dates)
-    begun = datetime.fromtimestamp(start * DAY_S).date()
-    over_dates = _chart(scored, lambda record: _days(record) - start, f"days since {begun}")
+    start = floor(min(dates))
+    over_dates = _chart(scored, lambda record: _days(record) - start, "date", datetime.fromtimestamp(start * DAY_S, timezone.utc))
     warm = {vehicle: [record for record in own if record["air_degC"] is not None] for vehicle, own in scored.items()}
     over_air = _chart(warm, lambda record: float(record["air_degC"]), "air temperature (degC)")
     left = f'<p class="note">The first {MOST_VEHICLES} vehicles.</p>' if len(fleet.vehicles) > MOST_VEHICLES else ""
@@ -183,20 +191,21 @@ def _days(record: Record) -> float:
     return datetime.fromisoformat(record["recorded"]).timestamp() / DAY_S
 
 
-def _chart(of: dict[str, list[Record]], x: Callable[[Record], float], label: str) -> Chart | None:
-    """A dot for every recording; None without any."""
+def _chart(of: dict[str, list[Record]], x: Callable[[Record], float], label: str, since: datetime | None = None) -> Chart | None:
+    """A dot for every recording; None without any, or where there is only one place to put them. ``since``: day from which x counts."""
     series = []
     for i, (vehicle, own) in enumerate(of.items()):
         every = sorted(own, key=x)[:: max(1, len(own) // MOST_DOTS)]
         if every:
             errors = np.array([record["score"]["rmse_Nm"] for record in every])
             series.append(Series(vehicle, str(i), errors, np.array([x(record) for record in every]), dots=True))
-    return Chart(label, [Panel("RMSE", "N m", series)]) if series else None
+    places = {x(record) for own in of.values() for record in own}
+    return Chart(label, [Panel("error (RMSE)", "N m", series)], since=since) if len(places) > 1 else None
 
 
 def _outliers(fleet: Fleet) -> str:
     rows = [
-        (text(one.vehicle), text(one.bag), text(f"{words.number(one.rmse_Nm)} N m"), text(f"{words.number(one.median_Nm)} N m"))
+        (text(one.vehicle), text(one.bag), text(words.quantity(one.rmse_Nm, "N m")), text(words.quantity(one.median_Nm, "N m")))
         for one in fleet.outliers
     ]
     return _limited(("vehicle", "recording", "RMSE", "median of the vehicle"), rows, (2, 3), "scores.parquet")
@@ -204,12 +213,13 @@ def _outliers(fleet: Fleet) -> str:
 
 def _vehicles(fleet: Fleet) -> str:
     rows = [
-        (text(one.name), str(one.recordings), str(one.quarantined), text(words.number(one.hours, 3)), text((one.first or "-")[:10]),
-         text((one.last or "-")[:10]), text("-" if one.median_rmse_Nm is None else f"{words.number(one.median_rmse_Nm)} N m"),
-         text(", ".join(f"{count} {verdict}" for verdict, count in one.verdicts.items()) or "-"))
+        (text(one.name), str(one.recordings), str(one.quarantined), text(words.number(one.hours, 3)), text(day(one.first)),
+         text(day(one.last)), text("-" if one.median_rmse_Nm is None else words.torque(one.vehicle, one.median_rmse_Nm)),
+         text(", ".join(f"{VERDICTS[verdict][0].lower() if verdict in VERDICTS else verdict}: {count}"
+                        for verdict, count in one.verdicts.items()) or "-"))
         for one in fleet.vehicles
     ]  # fmt: skip
-    header = ("vehicle", "recordings", "in quarantine", "hours", "first", "last", "median RMSE", "verdicts of single recordings")
+    header = ("vehicle", "recordings", "in quarantine", "hours", "first", "last", "median error", "verdicts of single recordings")
     return _limited(header, rows, (1, 2, 3, 6), "scores.parquet")
 
 
@@ -226,11 +236,18 @@ def _quarantine(fleet: Fleet) -> str:
     return _limited(("recording", "reason"), rows, (), "scores.parquet")
 
 
+def _origin(fleet: Fleet) -> str:
+    by = fleet.provenance
+    return "" if by is None else made_by(replace(by, bags=by.bags[:MOST_ROWS]), f"{code('fleet.json')} names every bag.")
+
+
 def _reading(fleet: Fleet) -> str:
     return (
-        f"<p>All claims of this page share one budget: on average at most {fleet.budget:.0%} of those that stand are false, however "
-        "they hang together (Benjamini and Yekutieli); q is the share at which a claim would just stand. What was looked for in vain "
-        "counts.</p>\n<p>Joint evidence adds up how much of an effect each recording shows, with sign and error, whether or not it is "
-        "enough to be named there; recordings may differ by more than their errors (random effects). Effects are taken one at a time, "
-        "so what is there shows in its rivals too: the strongest of a vehicle leads, others that fit are no second finding.</p>\n"
+        f"<p>All claims of this page share one budget: on average at most {fleet.budget:.0%} of those that stand ({len(fleet.claims)} of "
+        f"{fleet.considered}) are false, however they hang together (Benjamini and Yekutieli); q is the share at which a claim would just "
+        "stand. What was looked for in vain counts.</p>\n"
+        "<p>Joint evidence adds up how much of an effect each recording shows, with sign and error, whether or not it is enough to be "
+        "named there. Where all hint at something and most name nothing, the recordings that say most are diagnosed together. Effects are "
+        "taken one at a time in joint evidence, so what is there shows in its rivals too: what leads is the finding, others that fit are "
+        "no second one. The torque of joint evidence is that of its value, in proportion.</p>\n"
     )

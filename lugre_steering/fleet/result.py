@@ -5,15 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from lugre_steering.bag.find import Skipped
+from lugre_steering.counted import counted
 from lugre_steering.fleet.changes import Difference
-from lugre_steering.fleet.claims import Claim, Outlier, Shared
+from lugre_steering.fleet.claims import ACTING, Claim, Outlier, Shared
 from lugre_steering.fleet.work import FleetOptions
 from lugre_steering.gate import Facts, Gate
+from lugre_steering.provenance import Provenance
 from lugre_steering.result import Result
+from lugre_steering.serialise import ADDED, IN_MEMORY
+from lugre_steering.vehicle import Vehicle
 
 SCHEMA: Final = "lugre_steering/fleet/1"
 RECORD, PAGE = "fleet.json", "report.html"
@@ -36,6 +40,18 @@ class VehicleSummary:
     last: str | None
     median_rmse_Nm: float | None
     verdicts: Mapping[str, int]
+    vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
+
+
+@dataclass(frozen=True)
+class DiagnosedTogether:
+    """Several recordings of a vehicle that were diagnosed as one: their paths, the verdict and its words, and the effects named."""
+
+    vehicle: str
+    bags: tuple[str, ...]
+    verdict: str
+    statement: str
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -67,6 +83,9 @@ class Fleet(Result):
     workers: int
     seconds: float
     work_seconds: float
+    together: tuple[DiagnosedTogether, ...] = field(default=(), metadata=ADDED)
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    """By what version, when, with what options and from which files it was made."""
 
 
 def gate(wanted: Sequence[str]) -> Gate:
@@ -76,11 +95,12 @@ def gate(wanted: Sequence[str]) -> Gate:
 
 def facts(result: Mapping[str, Any]) -> Facts:
     """What of it is so; ``effect``: any that the budget allows to be claimed, ``rmse`` [N m]: the largest median of a vehicle."""
-    effects = sorted({f"{claim['effect']} on {claim['vehicle']}" for claim in result["claims"] if claim["kind"] in ("recording", "joint")})
+    acting = (claim for claim in result["claims"] if claim["kind"] in ACTING)
+    effects = sorted({f"{claim['effect']} on {claim['vehicle'] or 'all vehicles'}" for claim in acting})
     return {
-        "quarantine": f"{len(result['quarantine'])} recordings in quarantine" if result["quarantine"] else None,
+        "quarantine": f"{counted(len(result['quarantine']), 'recording')} in quarantine" if result["quarantine"] else None,
         "effect": ", ".join(effects) or None,
-        "outlier": f"{len(result['outliers'])} outliers" if result["outliers"] else None,
-        "change": f"{len(result['changes'])} differences to {result['other_version']}" if result["changes"] else None,
+        "outlier": counted(len(result["outliers"]), "outlier") if result["outliers"] else None,
+        "change": f"{counted(len(result['changes']), 'difference')} to {result['other_version']}" if result["changes"] else None,
         "rmse": max((one["median_rmse_Nm"] for one in result["vehicles"] if one["median_rmse_Nm"] is not None), default=None),
     }

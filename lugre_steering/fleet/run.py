@@ -6,29 +6,35 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from lugre_steering.bag.find import Skipped
+from lugre_steering.effects.registry import made
 from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.fleet.changes import differences
-from lugre_steering.fleet.claims import BUDGET, Claim, by_vehicle, claims, shared, unusual
+from lugre_steering.fleet.claims import BUDGET, Claim, by_vehicle, claims, shared, unusual, worth_pooling
 from lugre_steering.fleet.cluster import on_cluster
 from lugre_steering.fleet.content import code_version, foreign
 from lugre_steering.fleet.page import write_page
-from lugre_steering.fleet.result import PAGE, RECORD, SCHEMA, Fleet, VehicleSummary
+from lugre_steering.fleet.result import PAGE, RECORD, SCHEMA, DiagnosedTogether, Fleet, VehicleSummary
 from lugre_steering.fleet.store import Store
 from lugre_steering.fleet.tables import KINDS, need_parquet, rows, write_tables
+from lugre_steering.fleet.together import known, pooled
+from lugre_steering.fleet.together import process as diagnose_together
 from lugre_steering.fleet.vehicles import Member, member_of, read_members
 from lugre_steering.fleet.work import FleetOptions, Record, Task, nothing, process
 from lugre_steering.pool import Progress, WorkerDiedError, in_processes, processors
+from lugre_steering.provenance import Provenance, Source, source
 
 STORE = "recordings"
+T = TypeVar("T")
 
 
 def run(
@@ -64,9 +70,13 @@ def run(
                 records.append(record)
                 progress("recordings", len(records), len(bags))
             records.sort(key=lambda record: (record["member"], record["recorded"] or "", record["bag"]))
-            found, seconds = claims(records, options.seed), time.perf_counter() - begun
-            earlier = store.earlier(records)
-            fleet = _summary(records, members, skipped, options, version, found, earlier=earlier, workers=jobs, seconds=seconds)
+            together = list(_diagnosed_together(records, members, store, jobs, scheduler, progress))
+            found = claims(records, options.seed, together)
+            fleet = _summary(
+                records, members, skipped, options, version, found, earlier=store.earlier(records), together=together, workers=jobs,
+                seconds=time.perf_counter() - begun,
+            )  # fmt: skip
+            fleet = replace(fleet, provenance=_provenance(vehicles, members, options, records))
             write_tables(rows(records, found, fleet.changes), out)
             write_page(fleet, records, out / PAGE)
             write_record(fleet.json, out / RECORD)
@@ -102,19 +112,41 @@ def _sorted(bags: Sequence[Path], members: list[Member], store: Store) -> tuple[
 
 def _work(tasks: Sequence[Task], jobs: int, scheduler: str | None) -> Iterator[Record]:
     """The record of each task as it ends; a worker that died twice over a bag is told, and tried again by the next run."""
-    if not tasks:
-        return
-    results = on_cluster(process, tasks, scheduler) if scheduler is not None else in_processes(process, tasks, jobs)
-    for number, result in results:
+    for number, result in _in_parallel(process, tasks, jobs, scheduler):
         if isinstance(result, WorkerDiedError):
             task = tasks[number]
             result = {"bag": str(task.bag), "member": task.member, "version": task.version, **nothing(str(result))}
         yield result
 
 
+def _in_parallel(
+    function: Callable[[T], Record], tasks: Sequence[T], jobs: int, scheduler: str | None
+) -> Iterator[tuple[int, Record | WorkerDiedError]]:
+    if not tasks:
+        return iter(())
+    return on_cluster(function, tasks, scheduler) if scheduler is not None else in_processes(function, tasks, jobs)
+
+
+def _diagnosed_together(
+    records: Sequence[Record], members: Sequence[Member], store: Store, jobs: int, scheduler: str | None, progress: Progress
+) -> Iterator[Record]:
+    """Diagnoses of several recordings of one vehicle, where they are worth it; one whose worker died is tried again by the next run."""
+    chosen = worth_pooling(records)
+    tasks = [pooled(member, chosen[member.name], store) for member in members if member.name in chosen]
+    kept = [record for record in map(known, tasks) if record is not None]
+    yield from kept
+    done = {record["inputs"] for record in kept}
+    left = [task for task in tasks if task.inputs not in done]
+    for count, (_, result) in enumerate(_in_parallel(diagnose_together, left, jobs, scheduler), 1):
+        progress("vehicles", count, len(left))
+        if not isinstance(result, WorkerDiedError):
+            yield result
+
+
 def _summary(
     records: Sequence[Record], members: Sequence[Member], skipped: Sequence[Skipped], options: FleetOptions, version: str,
-    found: Sequence[Claim] = (), *, earlier: dict[str, Record] | None = None, workers: int = 0, seconds: float = 0.0,
+    found: Sequence[Claim] = (), *, earlier: dict[str, Record] | None = None, together: Sequence[Record] = (), workers: int = 0,
+    seconds: float = 0.0,
 ) -> Fleet:  # fmt: skip
     """What all records came to; without ``earlier``, that a run has begun."""
     worked = [record for record in records if not record.get("cached")]
@@ -139,8 +171,24 @@ def _summary(
         changes=tuple(differences(records, earlier or {})),
         workers=workers,
         seconds=seconds,
-        work_seconds=sum(record.get("seconds", 0.0) for record in worked),
-    )
+        work_seconds=sum(record.get("seconds", 0.0) for record in (*worked, *together) if not record.get("cached")),
+        together=tuple(
+            DiagnosedTogether(
+                record["member"], tuple(record["bags"]), record["verdict"], record["statement"],
+                tuple(effect["id"] for effect in record["effects"]),
+            )
+            for record in together
+        ),
+    )  # fmt: skip
+
+
+def _provenance(vehicles: Path, members: Sequence[Member], options: FleetOptions, records: Sequence[Record]) -> Provenance:
+    """Of the whole fleet; what was read of a bag is known from its record, and none is read again."""
+    made_by = made("fleet", asdict(options), vehicles, ())
+    sheets = {str(member.file): digest for member in members for digest in source(member.file).sha256.values()}
+    map_of = {} if made_by.vehicle is None else made_by.vehicle.sha256
+    bags = tuple(Source(record["bag"], record.get("files", {})) for record in records)
+    return replace(made_by, vehicle=Source(str(vehicles), {**map_of, **(sheets if str(vehicles) not in sheets else {})}), bags=bags)
 
 
 def _vehicle(member: Member, records: Sequence[Record]) -> VehicleSummary:
@@ -157,4 +205,5 @@ def _vehicle(member: Member, records: Sequence[Record]) -> VehicleSummary:
         last=own[-1]["recorded"] if own else None,
         median_rmse_Nm=float(np.median(errors)) if errors else None,
         verdicts=dict(Counter(record["verdict"] for record in own if record["verdict"] is not None)),
+        vehicle=member.vehicle,
     )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, stats
 
+from lugre_steering.diagnosis.investigate import NULL_DRAWS
 from lugre_steering.recording import Array, Mask
 
 CONFIDENCE = 0.95
@@ -22,6 +23,10 @@ MOST = 400
 OWN_ERROR = 1.0
 """What smoothing and simulation may leave in every estimate alike, in its standard deviations: up to 0.6 of them on recordings that
 hide nothing. It does not average out, so joint evidence counts from there."""
+KNOWN = NULL_DRAWS
+"""Degrees of freedom with which the error of one estimate is known, at least: the draws that hide nothing, of one recording."""
+ALIKE = 0.05
+"""Chance of their differences below which values are taken to differ by more than their errors."""
 OUTLIER = 3.5
 """Robust standard deviations from the median, after Iglewicz and Hoaglin."""
 
@@ -29,7 +34,8 @@ OUTLIER = 3.5
 @dataclass(frozen=True)
 class Combined:
     """Several estimates as one: ``value``, its standard ``error`` and interval, ``p_value`` against none, ``between``: standard
-    deviation of what differs beyond the errors, ``alike_p``: chance of such differences where there are none."""
+    deviation of what differs beyond the errors, ``alike_p``: chance of such differences where there are none, ``floor``: size up to
+    which there may be nothing, ``hint_p``: the p-value if differences were hardly more than errors."""
 
     value: float
     error: float
@@ -38,13 +44,17 @@ class Combined:
     p_value: float
     between: float
     alike_p: float
+    floor: float
+    hint_p: float
 
 
-def combined(value: ArrayLike, sd: ArrayLike, sign: int = 0, own: float = OWN_ERROR) -> Combined:
+def combined(value: ArrayLike, sd: ArrayLike, sign: int = 0, floor: float | None = None) -> Combined:
     """Random-effects mean of ``value`` (n,), n > 1, with errors ``sd`` (n,); ``sign`` 1: only values above zero are possible.
 
-    ``p_value`` is that of a mean as large as ``own`` errors. Variance between after Paule and Mandel (1982), interval and p-value
-    after Hartung and Knapp (2001), never narrower than those without a variance between.
+    Variance between after Paule and Mandel (1982), interval after Hartung and Knapp (2001), never narrower than that without a variance
+    between. ``p_value`` is that of a mean as large as ``floor`` (OWN_ERROR where none is given). Values that agree within their
+    errors are judged by these, which are known from KNOWN draws each, values that do not by how they differ: a few of them tell little
+    about that, so that of few recordings only what is strong would stand.
     """
     y, s2 = np.asarray(value, np.float64), np.asarray(sd, np.float64) ** 2
 
@@ -52,18 +62,31 @@ def combined(value: ArrayLike, sd: ArrayLike, sign: int = 0, own: float = OWN_ER
         weight = 1.0 / (s2 + tau2)
         return float(np.sum(weight * (y - np.average(y, weights=weight)) ** 2)) - (y.size - 1)
 
-    tau2 = 0.0
-    if excess(0.0) > 0.0:
+    tau2, differs = 0.0, excess(0.0)
+    if differs > 0.0:
         tau2 = float(optimize.brentq(excess, 0.0, 10.0 * float(np.var(y)) * y.size))
-    weight = 1.0 / (s2 + tau2)
+    alike = float(stats.chi2.sf(differs + y.size - 1, y.size - 1))
+    mean, error = _mean(y, s2 + tau2)
+    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, y.size - 1)) * error
+    least = OWN_ERROR * float(np.mean(1.0 / s2)) ** -0.5 if floor is None else floor
+    plain, freedom = float(np.average(y, weights=1.0 / s2)), KNOWN + y.size - 1
+    scale = max(1.0, (differs + freedom) / freedom)  # the scatter, drawn towards the errors that are known
+    hint = _beyond(plain, least, float(np.sqrt(scale / np.sum(1.0 / s2))), freedom, sign)
+    p = _beyond(mean, least, error, y.size - 1, sign) if alike < ALIKE else hint
+    return Combined(mean, error, mean - reach, mean + reach, p, tau2**0.5, alike, least, hint)
+
+
+def _beyond(mean: float, least: float, error: float, freedom: int, sign: int) -> float:
+    """p-value of a mean (of this sign, or of either) against one of size ``least``."""
+    return min(1.0, (1.0 if sign else 2.0) * float(stats.t.sf(((mean if sign else abs(mean)) - least) / error, freedom)))
+
+
+def _mean(y: Array, variance: Array) -> tuple[float, float]:
+    """Weighted mean of ``y`` (n,) and its standard error: by the ``variance`` (n,) of each, or by the scatter if that is larger."""
+    weight = 1.0 / variance
     mean = float(np.average(y, weights=weight))
     spread = float(np.sum(weight * (y - mean) ** 2)) / (y.size - 1)
-    error = float(np.sqrt(max(spread, 1.0) / weight.sum()))
-    t = stats.t(y.size - 1)
-    reach = float(t.ppf(0.5 + 0.5 * CONFIDENCE)) * error
-    floor = own * float(np.mean(1.0 / s2)) ** -0.5
-    p = float(t.sf((mean - floor) / error)) if sign else min(1.0, 2.0 * float(t.sf((abs(mean) - floor) / error)))
-    return Combined(mean, error, mean - reach, mean + reach, p, tau2**0.5, float(stats.chi2.sf(excess(0.0) + y.size - 1, y.size - 1)))
+    return mean, float(np.sqrt(max(spread, 1.0) / weight.sum()))
 
 
 @dataclass(frozen=True)

@@ -37,10 +37,11 @@ FINDINGS: Columns = {
 EFFECTS: Columns = {
     "vehicle": "text", "bag": "text", "recorded": "text", "effect": "text", "parameter": "text", "unit": "text", "value": "number",
     "low": "number", "high": "number", "p_value": "number", "energy_share": "number", "masked_share": "number",
+    "largest_Nm": "number", "largest_share": "number",
 }  # fmt: skip
 ESTIMATES: Columns = {
     "vehicle": "text", "bag": "text", "recorded": "text", "effect": "text", "shape": "whole", "parameter": "text", "unit": "text",
-    "value": "number", "sd": "number", "sign": "whole",
+    "value": "number", "sd": "number", "sign": "whole", "each_Nm": "number", "each_share": "number",
 }  # fmt: skip
 KINDS: Mapping[str, Columns] = {
     "scores": SCORES, "findings": FINDINGS, "effects": EFFECTS, "estimates": ESTIMATES, "claims": _columns(Claim),
@@ -98,7 +99,7 @@ def _findings(record: Record) -> Iterator[dict[str, Any]]:
 
 def _effects(record: Record) -> Iterator[dict[str, Any]]:
     for effect in record["effects"]:
-        shared = {name: effect[name] for name in ("p_value", "energy_share", "masked_share")}
+        shared = {name: effect[name] for name in ("p_value", "energy_share", "masked_share", "largest_Nm", "largest_share")}
         for name, fitted in effect["parameters"].items():
             low, high = fitted["ci95"]
             numbers = {"value": fitted["value"], "low": low, "high": high, "unit": fitted["unit"]}

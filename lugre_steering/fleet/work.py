@@ -20,23 +20,24 @@ from lugre_steering.calibration.calibrate import check_motion
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import Quality, inspect
 from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.diagnosis.signed import Signed, signed
 from lugre_steering.effects.registry import VARIABLE
 from lugre_steering.errors import BagError, DataError, ImplausibleWarning, LugreSteeringError
 from lugre_steering.files import read_record, write_record
 from lugre_steering.fitting.clocks import synchronised
-from lugre_steering.fleet.content import State, digest_of, foreign, key_of, state
-from lugre_steering.fleet.signed import Signed, signed
+from lugre_steering.fleet.content import State, digest_of, digests_of, foreign, key_of, state
 from lugre_steering.recording import Recording
 from lugre_steering.replay.library import replay
 from lugre_steering.serialise import plain
 from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.vehicle.identity import identity
 
-SCHEMA = "lugre_steering/fleet_recording/1"
+SCHEMA = "lugre_steering/fleet_recording/2"
 
 Record = dict[str, Any]
-"""As JSON holds it. ``inputs`` to ``state``: what was examined; ``quarantine``: why it tells nothing, or None; ``score``: replay against
-measured torque [N m]; ``verdict``, ``effects``, ``estimates``: of the diagnosis; ``air_degC``, ``rubber_degC``: means."""
+"""As JSON holds it. ``inputs`` to ``state``: what was examined (``files``: SHA-256 by name); ``quarantine``: why it tells nothing, or
+None; ``score``: replay against measured torque [N m]; ``verdict``, ``effects``, ``estimates``: of the diagnosis; ``air_degC``,
+``rubber_degC``: means."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +72,7 @@ def process(task: Task) -> Record:
 
     A bag that changes meanwhile is told to, and nothing about it is kept.
     """
-    if task.physics != foreign():
-        here, wanted = (", ".join(known) or "none" for known in (foreign(), task.physics))
-        raise LugreSteeringError(
-            f"a worker knows other physics of users ({here}) than this command ({wanted}); start the workers with {VARIABLE} naming the "
-            "same files, or leave --scheduler out"
-        )
+    refuse_other_physics(task.physics)
     begun = time.perf_counter()
     head: Record = {
         "schema": SCHEMA, "bag": str(task.bag), "member": task.member, "version": task.version, "options": asdict(task.options),
@@ -84,14 +80,15 @@ def process(task: Task) -> Record:
     }  # fmt: skip
     try:
         before = state(task.bag)
-        sha256, vehicle = digest_of(task.bag), _quietly(task.vehicle_file)
+        files, vehicle = digests_of(task.bag), quietly(task.vehicle_file)
+        sha256 = digest_of(files)
         inputs = key_of(sha256, identity(vehicle), asdict(task.options))
         file = record_file(task.store, inputs, task.version)
         known = read_record(file, SCHEMA)
         if known is not None:
-            record = {**known, "bag": str(task.bag), "member": task.member, "state": before}
+            record = {**known, "bag": str(task.bag), "member": task.member, "files": files, "state": before}
         else:
-            record = {**head, "inputs": inputs, "bag_sha256": sha256, "state": before, **_examined(task, vehicle)}
+            record = {**head, "inputs": inputs, "bag_sha256": sha256, "files": files, "state": before, **_examined(task, vehicle)}
         if state(task.bag) != before:
             return {**head, **nothing("is still being written: it changed while it was read")}
         record["seconds"] = time.perf_counter() - begun
@@ -110,7 +107,17 @@ def nothing(reason: str) -> Record:
     }  # fmt: skip
 
 
-def _quietly(file: Path) -> Vehicle:
+def refuse_other_physics(physics: Mapping[str, str]) -> None:
+    """A worker may have been started without the users' physics that the command knows."""
+    if physics != foreign():
+        here, wanted = (", ".join(known) or "none" for known in (foreign(), physics))
+        raise LugreSteeringError(
+            f"a worker knows other physics of users ({here}) than this command ({wanted}); start the workers with {VARIABLE} naming the "
+            "same files, or leave --scheduler out"
+        )
+
+
+def quietly(file: Path) -> Vehicle:
     """Doubts about the sheet are told once, by the command."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ImplausibleWarning)

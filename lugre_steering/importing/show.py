@@ -10,6 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from lugre_steering.counted import counted
+
 
 def show_import(console: Console, result: Mapping[str, Any]) -> None:
     """One row per channel: samples, rate, range, and what is worth a look."""
@@ -53,7 +55,7 @@ def _notes(channel: Mapping[str, Any]) -> list[str]:
     notes = [f"{count} {what}" for what, count in counts if count]
     if gaps := channel["gaps_s"]:
         begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
-        notes.append(f"{len(gaps)} gaps, longest {end - begin:.3g} s at {begin:.4g} s")
+        notes.append(f"{counted(len(gaps), 'gap')}, longest {end - begin:.3g} s at {begin:.4g} s")
     if spikes := channel["outliers_s"]:
-        notes.append(f"{len(spikes)} outliers, first at {spikes[0]:.4g} s")
+        notes.append(f"{counted(len(spikes), 'outlier')}, first at {spikes[0]:.4g} s")
     return [*notes, *channel["doubts"]]

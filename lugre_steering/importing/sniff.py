@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
+from lugre_steering.counted import counted
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
 from lugre_steering.importing.text import number
@@ -125,7 +126,7 @@ def _reasons(options: Csv, header: Sequence[Sequence[str]]) -> list[str]:
     if options.encoding != "utf-8":
         found.append(f"encoding {options.encoding}: the file is not UTF-8")
     if options.skip_rows:
-        found.append(f"{options.skip_rows:.0f} lines above the column names are left out")
+        found.append(f"{counted(int(options.skip_rows), 'line')} above the column names left out")
     if not header:
         found.append("the first row holds numbers, so the columns are called c1, c2, ...: name them with csv.columns")
     if len(header) > 1:

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from lugre_steering.counted import counted
 from lugre_steering.online import NOTABLE_SHARE, is_large, sheet_words
 from lugre_steering.recording import NODE, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
@@ -225,7 +226,7 @@ class Health:
                 troubles.append(f"{label} stamps are not close to the clock{hint}")
                 level = max(level, WARN)
         if self.namesakes:
-            troubles.append(f"{self.namesakes} other node{'s' * (self.namesakes > 1)} of this name: their outputs mix with these")
+            troubles.append(f"{counted(self.namesakes, 'other node')} of this name: their outputs mix with these")
             level = max(level, WARN)
         return self._status("inputs", level, "; ".join(troubles) or "all inputs arrive", values)
 
@@ -250,7 +251,9 @@ class Health:
             p50, p99 = window.percentiles_ms(50.0, 99.0)
             values |= {f"{name} p50 [ms]": p50, f"{name} p99 [ms]": p99, f"{name} max [ms]": window.max_ns * 1e-6}
         values["samples in window"] = min(self.stamp_to_publish.count, self.stamp_to_publish.values.size)
-        return self._status("latency", OK, "p50 and p99 of the window, max since start", values)
+        p50, p99 = self.arrival_to_publish.percentiles_ms(50.0, 99.0)
+        said = f"from arrival to publish: p50 {p50:.2g} ms, p99 {p99:.2g} ms" if self.estimates else "nothing published yet"
+        return self._status("latency", OK, said, values)
 
     def _residual(self, saturated_steps: int) -> DiagnosticStatus:
         *squares, count = self._sums(RESIDUAL_SECONDS)

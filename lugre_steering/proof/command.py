@@ -16,6 +16,7 @@ import numba
 import numpy
 import scipy
 
+from lugre_steering.counted import counted
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.files import output_folder, refuse_foreign, write_record
 from lugre_steering.proof import campaign
@@ -54,7 +55,7 @@ def run(
     flags = {"--quick": quick, "--peers": peers, f"--simulator {simulator}": simulator != "all"}
     flags |= {f"--each {each}": each is not None, f"--kinds {kinds}": kinds is not None, f"--cases '{cases}'": cases is not None}
     command = " ".join(["lugre-steering prove --out DIR", f"--seed {seed}", *(flag for flag, given in flags.items() if given)])
-    announce(f"{len(chosen)} cases, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
+    announce(f"{counted(len(chosen), 'case')}, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
     with output_folder(out):
         refuse_foreign([out / "scoreboard.json"])
         rows = run_all(

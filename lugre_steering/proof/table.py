@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from lugre_steering.counted import counted
 from lugre_steering.proof.campaign import DISGUISES, RATIOS
 
 Row = Mapping[str, Any]
@@ -52,7 +53,7 @@ def told(score: Row) -> str:
 
 
 def _show_targets(console: Console, number: str, part: Row) -> None:
-    table = Table(title=f"simulator {number}: {sum(part['cases'].values())} cases")
+    table = Table(title=f"simulator {number}: {counted(sum(part['cases'].values()), 'case')}")
     for name in ("score", "reached", "target", ""):
         table.add_column(name, justify="left" if name == "score" else "right")
     colour = {"met": "green", "not met": "red", "too few cases": "yellow", None: ""}

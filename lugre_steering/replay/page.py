@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lugre_steering.counted import counted
 from lugre_steering.files import refuse_foreign, write_text
 from lugre_steering.online import Curves, r2_words
 from lugre_steering.provenance import Provenance
@@ -43,7 +44,8 @@ def write_page(bag: ReplayedBag, vehicle: Vehicle, motion: Curves, check: Curves
 
 
 def _head(bag: ReplayedBag, vehicle: Vehicle) -> str:
-    numbers, fit = [("recorded", f"{bag.duration_s:.1f} s", f"{bag.estimates} torques from {bag.messages} messages")], bag.fit
+    came = f"{counted(bag.estimates, 'torque')} from {counted(bag.messages, 'message')}"
+    numbers, fit = [("recorded", f"{bag.duration_s:.1f} s", came)], bag.fit
     if fit is None:
         said = str(bag.fit_note)
     else:
@@ -57,7 +59,7 @@ def _head(bag: ReplayedBag, vehicle: Vehicle) -> str:
             ("mean error", f"{words.tenths(fit.bias_Nm, '+', fit.rmse_Nm)} {vehicle.coordinate.force_unit}", "measured minus estimate"),
             ("largest torque measured", words.torque(vehicle, peak), ""),
         ]
-    more = f'<p class="more">{len(bag.findings)} {"finding" if len(bag.findings) == 1 else "findings"} below.</p>' if bag.findings else ""
+    more = f'<p class="more">{counted(len(bag.findings), "finding")} below.</p>' if bag.findings else ""
     return (
         f'<header id="verdict"><p class="over">{text(vehicle.name)}</p>\n<h1>{text(bag.name)}</h1>\n'
         f'<div class="verdict"><p>{text(said)}</p>{more}</div>\n{facts(numbers)}</header>'

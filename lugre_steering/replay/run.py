@@ -30,6 +30,7 @@ from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import bag_name, shortened
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
+from lugre_steering.counted import counted
 from lugre_steering.effects.registry import made
 from lugre_steering.errors import BagError, DataError, ImplausibleWarning
 from lugre_steering.estimator import Estimator, Options
@@ -493,19 +494,19 @@ class Passage:
             yield Finding("large_residual", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0
         if set_back:
-            yield Finding("clock_set_back", "", f"stamps jumped back {set_back} times")
+            yield Finding("clock_set_back", "", f"stamps jumped back {counted(set_back, 'time')}")
         if restarts := self.estimator.restarts:
-            statement = f"the estimator began anew {restarts} times (clock set back, or a torque that was no finite number)"
+            statement = f"the estimator began anew {counted(restarts, 'time')} (clock set back, or a torque that was no finite number)"
             yield Finding("restart", "", statement)
         if self._counts["withheld"]:
-            statement = f"{self._counts['withheld']} results were no finite numbers and are left out"
+            statement = f"{counted(self._counts['withheld'], 'result was no finite number', 'results were no finite numbers')}; left out"
             yield Finding("withheld", "", statement)
         if self.estimator.saturated_steps:
-            statement = "steps with a temperature outside the rubber table, whose edge was used"
-            yield Finding("rubber_table_left", "", f"{self.estimator.saturated_steps} {statement}")
+            statement = "with a temperature outside the rubber table, whose edge was used"
+            yield Finding("rubber_table_left", "", f"{counted(self.estimator.saturated_steps, 'step')} {statement}")
         for law, steps in self.estimator.law_left_steps.items():
             if steps:
-                statement = f"{law} of the vehicle file: {steps} steps with its coordinate outside the range on which it was seen"
+                statement = f"{law} of the vehicle file: {counted(steps, 'step')} with a coordinate outside the range on which it was seen"
                 yield Finding("law_left", "", f"{statement}; the law is not known there")
 
     def _counted(self, samples: Mapping[str, InputCounts], *kinds: Kind) -> str:
@@ -520,7 +521,7 @@ class Passage:
             reasons = [f"{n} {reason}" for part in (counts.rejected, counts.noted) for reason, n in part.items()]
             if not reasons and not counts.used and channel.joint:
                 reasons = [f"'{counts.topic}' has no message with the joint '{channel.joint}'"]
-            words.append(", ".join([f"{label}: {counts.used} samples used", *reasons]))
+            words.append(", ".join([f"{label}: {counted(counts.used, 'sample')} used", *reasons]))
         return "; ".join(words) or "no pressure or torque sensor in the vehicle file"
 
     def _picture(self, file: Path, fit: Agreement | None, origin: Provenance) -> tuple[str | None, str | None]:

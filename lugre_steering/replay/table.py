@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from lugre_steering.bag.find import told_apart
+from lugre_steering.bag.reader import bag_name
 from lugre_steering.report import words
 
 
@@ -21,8 +24,11 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     table.add_column("recording", overflow="fold")
     for column in ("seconds", "torques", f"RMSE [{unit}]", "R2", f"bias [{unit}]"):
         table.add_column(column, justify="right", no_wrap=True)
-    for bag in summary["bags"]:
-        table.add_row(bag["name"], f"{bag['duration_s']:.1f}", str(bag["estimates"]), *_fit(bag["fit"]))
+    shown = told_apart([bag["bag"] for bag in summary["bags"]])
+    for bag, path in zip(summary["bags"], shown, strict=True):
+        # Of several recordings of one name, where each lies and what its results are called.
+        label = f"{path} -> {bag['name']}" if "/" in path or bag_name(Path(bag["bag"])) != bag["name"] else bag["name"]
+        table.add_row(label, f"{bag['duration_s']:.1f}", str(bag["estimates"]), *_fit(bag["fit"]))
     if len(summary["bags"]) > 1:
         seconds, torques = (sum(bag[key] for bag in summary["bags"]) for key in ("duration_s", "estimates"))
         table.add_row("all", f"{seconds:.1f}", str(torques), *_fit(summary["overall"]))

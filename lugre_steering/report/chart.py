@@ -11,12 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 
 from lugre_steering.recording import Array
 from lugre_steering.report import words
+
+DOT_ROOM = 0.03
+"""Share of the x range left free on either side of points, which would be cut in halves at its ends."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +73,12 @@ class Spans:
 
 @dataclass(frozen=True)
 class Chart:
-    """Panels over one x axis; ``label`` has its unit."""
+    """Panels over one x axis; ``label`` has its unit; ``since``: instant from which x counts days, shown as dates."""
 
     label: str
     panels: list[Panel]
     spans: list[Spans] = field(default_factory=list)
+    since: datetime | None = None
 
     def plain(self) -> dict[str, Any]:
         """As the page holds it."""
@@ -83,7 +88,10 @@ class Chart:
             for s in self.spans
             if s.at
         ]
-        return {"label": self.label, "range": [min(ends, default=0.0), max(ends, default=1.0)],
+        low, high = min(ends, default=0.0), max(ends, default=1.0)
+        aside = DOT_ROOM * (high - low) * any(series.dots and series.x is not None for panel in self.panels for series in panel.series)
+        since = {} if self.since is None else {"since": round(1e3 * self.since.timestamp())}
+        return {"label": self.label, "range": [low - aside, high + aside], **since,
                 "panels": [panel.plain() for panel in self.panels], "spans": spans}  # fmt: skip
 
 

@@ -118,7 +118,7 @@ def percent(share: float | None) -> str:
         return "-"
     size = abs(100.0 * share)
     if size < 0.05:
-        return "0 %"
+        return "less than 0.1 %" if share > 0.0 else "0 %"
     return f"{100.0 * share:.1f} %" if size < 10.0 else f"{100.0 * share:.0f} %"
 
 

@@ -39,6 +39,8 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
         console.print(f"effect {effect['id']}: {parameters} (SI)")
     for warning in result["warnings"]:
         console.print(f"warning: {warning['statement']}")
+    if result["picture"]:
+        console.print(f"picture in {result['picture']}", highlight=False, soft_wrap=True)
 
 
 def draw_footprint(vehicle: Vehicle, out: Path) -> Path:

@@ -303,7 +303,7 @@ def test_a_clock_set_back_a_little_does_not_mix_two_times(tmp_path: Path) -> Non
     recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
     assert recording.rejected == {"/" + LEFT.topic: {"backward": 49}}
     assert recording.angle["left"].value.size == 251
-    assert [f.statement for f in recording.findings] == ["1 messages were recorded out of order and put back in order"]
+    assert [f.statement for f in recording.findings] == ["1 message was recorded out of order and put back in order"]
 
 
 def test_late_messages_are_sorted_and_bad_ones_counted(tmp_path: Path) -> None:

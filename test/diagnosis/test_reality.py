@@ -373,7 +373,7 @@ def test_three_hours_are_cut_into_pieces() -> None:
     pieces, findings = in_pieces([long])
     assert sum(float(np.ptp(p.angle["left"].time_s)) for p in pieces) < LONGEST_S
     assert all(float(np.ptp(p.angle["left"].time_s)) == pytest.approx(PIECE_S, abs=1.0) for p in pieces)
-    assert "93% of it is not" in findings["long"].statement
+    assert "93 % of it is not" in findings["long"].statement
     assert in_pieces([pieces[0]]) == ([pieces[0]], {})
 
 

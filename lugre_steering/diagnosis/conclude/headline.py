@@ -63,10 +63,13 @@ def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
+def inside(title: str) -> str:
+    """A title within a sentence; abbreviations stay."""
+    return title if title[1:2].isupper() else title[:1].lower() + title[1:]
+
+
 def _found(done: Finished, effect: NamedEffect) -> str:
-    title = done.title(effect.id)
-    name = title if title[1:2].isupper() else title[:1].lower() + title[1:]
-    parts = [f"{name} ({effect.id})", *_where(done, effect)]
+    parts = [f"{inside(done.title(effect.id))} ({effect.id})", *_where(done, effect)]
     if effect.largest_Nm is not None and effect.largest_share is not None:
         parts.append(f"up to {done.torque(effect.largest_Nm)} ({_share(effect.largest_share)})")
     return ", ".join(parts)

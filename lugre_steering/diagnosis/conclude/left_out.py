@@ -18,6 +18,7 @@ from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import split
 from lugre_steering.recording import Array, Finding, Recording
+from lugre_steering.report import words
 
 MANY = 0.05
 """Share of the samples of a channel that may be left out without a word about the verdict."""
@@ -50,7 +51,7 @@ def left_out(
         except DataError as error:
             told = f"with it nothing could be examined ({error})"
     return {
-        name: Finding("left_out", "", f"{100 * share:.0f} % of a channel was not used (see the other findings); {told}")
+        name: Finding("left_out", "", f"{words.percent(share)} of a channel was not used (see the other findings); {told}")
         for name, share in shares.items() if share > MANY
     }  # fmt: skip
 
@@ -65,7 +66,7 @@ def _told(done: Finished, effects: Effects, recordings: Sequence[Recording], see
     if not effects:
         return told
     verdict = "would stand" if with_all.interval[0] > 0.0 else "would not stand"
-    return f"{told}, what is named takes {100 * with_all.gain:.0f} % of that instead of {100 * without.gain:.0f} %, and {verdict}"
+    return f"{told}, what is named takes {words.percent(with_all.gain)} of that instead of {words.percent(without.gain)}, and {verdict}"
 
 
 def _judged(done: Finished, problem: Problem, effects: Effects, seed: int) -> verify.Judged:

@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
+from lugre_steering.report import words
 
 FORETELLS = 0.1
 """Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
@@ -74,13 +75,13 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     formula = None
     if proposal is not None:
         law = units.law(done.problem.vehicle, proposal.text)
-        formula = f"{law} (removes {100 * proposal.gain:.0f} % of the held-out residual energy)"
+        formula = f"{law} (removes {words.percent(proposal.gain)} of the held-out residual energy)"
     more = max(excess, slow)  # the level of the noise may be overstated
     text = (
-        f"{100 * more / (1.0 + more):.0f} % of what the model leaves over is more than noise, most of it along {axis} "
-        f"({100 * share:.0f} % of the residual energy follows it)"
+        f"{words.percent(more / (1.0 + more))} of what the model leaves over is more than noise, most of it along {axis} "
+        f"({words.percent(share)} of the residual energy follows it)"
         if loud
-        else f"a pattern outside the catalogue foretells {100 * gain:.0f} % of the held-out residual energy"
+        else f"a pattern outside the catalogue foretells {words.percent(gain)} of the held-out residual energy"
     )
     where = _where(done, axes, axis, residual, shape)
     return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)

@@ -16,6 +16,7 @@ from lugre_steering.diagnosis.laws.refine import Law
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.effects import laws
 from lugre_steering.recording import Array
+from lugre_steering.report import words
 from lugre_steering.vehicle import LawEntry, Vehicle
 
 WRITTEN_KNOTS = 65
@@ -209,7 +210,7 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
 def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:
     """Laws with their sizes; ``torque`` writes a torque with its unit."""
     return " and ".join(
-        f"{law['title']} (up to {torque(law['largest_Nm'])}, {100 * law['largest_share']:.2g} % of the torque)" for law in described
+        f"{law['title']} (up to {torque(law['largest_Nm'])}, {words.percent(law['largest_share'])} of the torque)" for law in described
     )
 
 

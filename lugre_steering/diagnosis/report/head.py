@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from lugre_steering.counted import counted
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.report.names import called
 from lugre_steering.diagnosis.result import Diagnosis
@@ -66,8 +67,7 @@ def next_steps(diagnosis: Diagnosis) -> str:
     if result["verdict"] == "insufficient_data":
         steps.append("Put the data right or record again; nothing about the physics can be concluded from these.")
     if bad:
-        things = "one finding" if bad == 1 else f"{bad} findings"
-        steps.append(f'Look at <a href="#quality">data quality</a>: {things} about the recording itself.')
+        steps.append(f'Look at <a href="#quality">data quality</a>: {counted(bad, "finding")} about the recording itself.')
     for effect in result["effects"]:
         if effect["indistinguishable_from"]:
             rivals = " or ".join(called(diagnosis, rival) for rival in effect["indistinguishable_from"])

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from lugre_steering import units
+from lugre_steering.counted import counted
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.report.names import called, place
 from lugre_steering.diagnosis.result import Diagnosis
@@ -114,7 +115,7 @@ def limits(diagnosis: Diagnosis) -> str:
     made = table(["effect", "parameter", "smallest that would have shown", "unit"], rows, numeric=(2,))
     if len(rows) > EVIDENCE_SHOWN:
         opened = " open" if diagnosis.json["verdict"] == "consistent" else ""
-        made = f"<details{opened}><summary>{len(rows)} effects</summary>{made}</details>\n"
+        made = f"<details{opened}><summary>{counted(len(rows), 'effect')}</summary>{made}</details>\n"
     return "<p>An effect smaller than this could be present without these recordings showing it.</p>\n" + made
 
 

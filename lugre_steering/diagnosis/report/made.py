@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from lugre_steering import units
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.fitting.keys import KEYS
 from lugre_steering.fitting.problem import calibrations_for
 from lugre_steering.report import words
 from lugre_steering.report.markup import code, pairs, table, text
+from lugre_steering.report.origin import made_by, plain_words
 
 
 def baseline(diagnosis: Diagnosis) -> str:
@@ -37,22 +36,8 @@ def baseline(diagnosis: Diagnosis) -> str:
 
 def origin(diagnosis: Diagnosis) -> str:
     """Version, date, options and hashes, and what the vehicle file says of itself."""
-    made = [(name.replace("_", " "), _plain(value)) for name, value in diagnosis.vehicle.provenance.items()]
-    if (by := diagnosis.provenance) is None:
-        return pairs(made)
-    files = [("vehicle file", by.vehicle)] if by.vehicle is not None else []
-    files += [("bag", bag) for bag in by.bags]
-    rows = [[text(kind), text(source.path), text(name), code(digest)] for kind, source in files for name, digest in source.sha256.items()]
-    run = pairs([("made by", text(f"{by.tool} {by.command}")), ("date (UTC)", text(by.date)), ("options", _plain(by.options))])
-    return run + (table(["", "given as", "file", "SHA-256"], rows) if rows else "") + pairs(made)
-
-
-def _plain(value: object) -> str:
-    if isinstance(value, Mapping):
-        return ", ".join(f"{text(key)}: {_plain(item)}" for key, item in value.items())
-    if isinstance(value, (list, tuple)):
-        return ", ".join(_plain(item) for item in value)
-    return words.number(value) if isinstance(value, float) else text(value)
+    made = pairs([(name.replace("_", " "), plain_words(value)) for name, value in diagnosis.vehicle.provenance.items()])
+    return made if diagnosis.provenance is None else made_by(diagnosis.provenance) + made
 
 
 GLOSSARY = pairs(

@@ -26,6 +26,16 @@
     for (var k = first; k * step <= high + 1e-9 * step; k++) found.push([k * step, (k * step).toFixed(decimals).replace("-", "\u2212").replace(/^\u2212(0(\.0*)?)$/, "$1")]);
     return found;
   }
+  // Days since an instant [ms] as dates, with hours only where a day is wide enough.
+  function dates(low, high, most, since) {
+    var step = [1 / 24, 1 / 8, 1 / 4, 1 / 2, 1, 2, 7, 14, 30, 90, 180, 365, 730, 1825].find(function (n) { return n >= (high - low) / Math.max(most, 1); }) || 3650;
+    var found = [];
+    for (var k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
+      var said = new Date(since + Math.round(k * step * 24) * 3600000).toISOString();
+      found.push([k * step, step < 1 ? said.slice(5, 16).replace("T", " ") : said.slice(0, 10)]);
+    }
+    return found;
+  }
   function digits(value) { return value === null || value === undefined ? "-" : String(Number(value.toPrecision(4))).replace("-", "\u2212"); }
 
   function Chart(figure, spec) {
@@ -118,7 +128,7 @@
         svg("path", { d: "M" + left + "," + toY(tick[0]).toFixed(1) + "H" + right, "class": "grid" }, root);
         svg("text", { x: left - 6, y: (toY(tick[0]) + 4).toFixed(1), "text-anchor": "end" }, root, tick[1]);
       });
-      ticks(a, b, Math.max(4, (right - left) / 90)).forEach(function (tick) {
+      (spec.since === undefined ? ticks(a, b, Math.max(4, (right - left) / 90)) : dates(a, b, Math.max(2, (right - left) / 100), spec.since)).forEach(function (tick) {
         svg("path", { d: "M" + toX(tick[0]).toFixed(1) + "," + top + "V" + (top + h), "class": "grid" }, root);
         if (p === spec.panels.length - 1) svg("text", { x: toX(tick[0]).toFixed(1), y: top + h + 16, "text-anchor": "middle" }, root, tick[1]);
       });

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lugre_steering.diagnosis.finished import amplitude_of
 from lugre_steering.diagnosis.investigate import NULL_DRAWS, recalibrate
 from lugre_steering.fitting.fingerprint import candidates, signature
 from lugre_steering.fitting.noise import repeated_motion
@@ -27,7 +28,8 @@ LEAST_VISIBLE = 1e-4
 class Signed:
     """Amplitude ``value`` of one effect in ``unit``, standard deviation ``sd``; ``shape``: number of its variant.
 
-    ``sign``: 1 where no other is possible, 0 where both are.
+    ``sign``: 1 where no other is possible, 0 where both are; ``each_Nm``: largest torque that one ``unit`` of it makes in the recording
+    [N m], ``each_share``: the same over the amplitude of the measured torque.
     """
 
     effect: str
@@ -37,6 +39,8 @@ class Signed:
     value: float
     sd: float
     sign: int
+    each_Nm: float
+    each_share: float
 
 
 def signed(problem: Problem, seed: int) -> list[Signed]:
@@ -46,12 +50,19 @@ def signed(problem: Problem, seed: int) -> list[Signed]:
     basis = baseline.basis()
     residuals = np.vstack([problem.measured - baseline.prediction, noise.draws]) * weight
     base = [problem.predict(bag, baseline.x, baseline.effects) for bag in range(len(problem.runs))]
+    amplitude = amplitude_of(problem.measured)
     found = []
     for shape, candidate in _numbered(candidates(problem)):
-        columns = signature(problem, baseline, base, candidate)[:, :1] * weight[:, None]
-        one = _estimate(candidate, shape, columns[:, 0], basis, residuals)
-        if one is not None:
-            found.append(one)
+        trace = signature(problem, baseline, base, candidate)[:, 0]
+        fitted = _estimate(trace * weight, basis, residuals)
+        if fitted is None:
+            continue
+        parameter, largest = candidate.parameter(candidate.free[0]), float(np.max(np.abs(trace)))
+        value, deviation = (parameter.scale * number for number in fitted)
+        found.append(Signed(
+            candidate.label, shape, parameter.name, parameter.unit, value, deviation, int(parameter.low >= 0.0),
+            largest / parameter.scale, largest / amplitude / parameter.scale,
+        ))  # fmt: skip
     return found
 
 
@@ -64,16 +75,11 @@ def _numbered(found: list[Candidate]) -> Iterator[tuple[int, Candidate]]:
             yield seen[candidate.label], candidate
 
 
-def _estimate(candidate: Candidate, shape: int, column: Array, basis: Array, residuals: Array) -> Signed | None:
+def _estimate(column: Array, basis: Array, residuals: Array) -> tuple[float, float] | None:
     """Least squares on the visible part of a trace; the error is that of draws that hide nothing, never below the noise."""
     visible = column - basis @ (basis.T @ column)
     energy = float(visible @ visible)
     if not energy > LEAST_VISIBLE * float(column @ column):
         return None
     along = residuals @ visible / energy
-    parameter = candidate.parameter(candidate.free[0])
-    deviation = max(float(np.sqrt(np.mean(along[1:] ** 2))), energy**-0.5)
-    return Signed(
-        candidate.label, shape, parameter.name, parameter.unit, float(along[0]) * parameter.scale, deviation * parameter.scale,
-        int(parameter.low >= 0.0),
-    )  # fmt: skip
+    return float(along[0]), max(float(np.sqrt(np.mean(along[1:] ** 2))), energy**-0.5)
