@@ -227,7 +227,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
             return _no_torque(vehicle)
         return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE and not _lacks_terms(vehicle, run, total) else ()
     best = min(h.error for h in convincing)
-    if mistyped <= min(POOR, TIE * best + 0.01):
+    if mistyped < min(GOOD, best) or mistyped <= min(POOR, TIE * best + 0.01):
         return ()  # a level of the vehicle file may be wrong as well; all its entries are compared later
     tied = [h for h in convincing if h.error <= TIE * best + 0.01]
     first = min(tied, key=lambda h: h.topics)
