@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -30,14 +31,6 @@ def made(function: object, *parameters: Parameter, hook: str = "torque", **more:
 SIZE = Parameter("size", "N m", "amplitude", 500.0)
 
 
-@pytest.fixture
-def known() -> Iterator[dict[str, Effect]]:
-    before = dict(registry.CATALOGUE)
-    yield registry.CATALOGUE
-    registry.CATALOGUE.clear()
-    registry.CATALOGUE.update(before)
-
-
 def not_neutral(size):  # type: ignore[no-untyped-def]
     return 100.0 + size
 
@@ -58,21 +51,34 @@ def driving(omega, size):  # type: ignore[no-untyped-def]
     return -400.0 * size * omega
 
 
-@pytest.mark.parametrize(
-    ("effect", "word"),
-    [
+BREAKING = {
+    f"breaking_{i}": (dataclasses.replace(effect, id=f"breaking_{i}"), word)
+    for i, (effect, word) in enumerate([
         (made(one_sided, SIZE), "mirror"),
         (made(idle, SIZE, Parameter("edge", "rad", "read, but to no end", 0.1, grid=(0.1,))), "acting: .* edge"),
         (made(endless, SIZE), "finite: two samples"),
         (made(driving, SIZE), "passive"),
         (made(one_sided, dataclasses.replace(SIZE, unit="lbf ft"), one_sided=True), "unit"),
         (made(not_neutral, Parameter("size", "N m", "", 5.0), acts_by=("size",), one_sided=False), "mirror"),
-    ],
-)
-def test_what_an_effect_breaks_is_told(known: dict[str, Effect], effect: Effect, word: str) -> None:
-    known[effect.id] = effect
+    ])
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def _all_known() -> Iterator[None]:
+    """All at once in the catalogue, so that one step is compiled for all of them."""
+    registry.CATALOGUE.update({name: effect for name, (effect, _) in BREAKING.items()})
+    yield
+    for name in BREAKING:
+        del registry.CATALOGUE[name]
+
+
+@pytest.mark.usefixtures("_all_known")
+@pytest.mark.parametrize("name", BREAKING)
+def test_what_an_effect_breaks_is_told(name: str) -> None:
+    effect, word = BREAKING[name]
     found = broken(effect)
-    assert any(__import__("re").match(word, line) for line in found), found
+    assert any(re.match(word, line) for line in found), found
 
 
 def forgetful(theta, size, wound):  # type: ignore[no-untyped-def]
