@@ -16,7 +16,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import Bag
 from lugre_steering.bench.replay import write_cycle
-from lugre_steering.replay.run import PREFIX, replay
+from lugre_steering.replay.outputs import PREFIX
+from lugre_steering.replay.run import replay
 from lugre_steering.resources import config_folder
 from lugre_steering.vehicle import load
 

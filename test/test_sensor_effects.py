@@ -45,7 +45,7 @@ def test_the_lag_solves_its_differential_equation(tau: float) -> None:
 @pytest.fixture(autouse=True)
 def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody looks at them here, and they take longer than all the rest."""
-    monkeypatch.setattr("lugre_steering.replay.run.no_pictures", lambda: "not wanted")
+    monkeypatch.setattr("lugre_steering.replay.passage.no_pictures", lambda: "not wanted")
 
 
 def recorded(vehicle: Vehicle, folder: Path) -> tuple[Path, Path]:

@@ -15,8 +15,8 @@ from lugre_steering.errors import BagError
 from lugre_steering.estimator import Options
 from lugre_steering.online import Comparison
 from lugre_steering.recording import Recording, unused_name
+from lugre_steering.replay.passage import Passage
 from lugre_steering.replay.result import SCHEMA, Replay, ReplayedBag
-from lugre_steering.replay.run import Passage
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
