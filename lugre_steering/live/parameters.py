@@ -14,7 +14,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.parameter import NodeParameter as Change
+from rclpy.parameter import Parameter as Change
 
 from lugre_steering.estimator import Options
 from lugre_steering.estimator.node_parameters import (
