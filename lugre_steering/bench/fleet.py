@@ -101,7 +101,7 @@ def run(argv: Sequence[str]) -> None:
     print("| workers | recordings per hour | work on each | overhead | start | all known, again |\n|---|---|---|---|---|---|")
     for row in rows:
         print(
-            f"| {row['workers']} | {row['recordings_per_hour']:,.0f} | {row['work_s_per_recording']:.2f} s | {row['overhead']:.1%} | "
+            f"| {row['workers']} | {row['recordings_per_hour']:,.0f} | {row['work_s_per_recording']:.2f} s | {100.0 * row['overhead']:.1f} % | "
             f"{row['start_s']:.1f} s | {row['known_again_s']:.2f} s |"
         )
     whole = result["hundred_thousand"]
