@@ -27,6 +27,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
+from lugre_steering.counted import counted
 from lugre_steering.diagnosis import effect_card as card
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.report.page import Written, render, write_report
@@ -412,6 +413,16 @@ def test_errors_have_the_digits_of_their_machine(value: float, beside: float, te
 )  # fmt: skip
 def test_numbers_are_readable(value: float | None, text: str) -> None:
     assert words.number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.0, "0 %"), (1e-6, "less than 0.1 %"), (0.0006, "0.1 %"), (0.084, "8.4 %"), (0.996, "100 %"), (-1e-6, "0 %"), (None, "-")],
+)
+def test_a_small_share_is_not_none(share: float | None, said: str) -> None:
+    assert words.percent(share) == said
+    assert counted(1, "recording") == "1 recording"
+    assert counted(2, "message is lost", "messages are lost") == "2 messages are lost"
 
 
 def test_intervals_show_digits_that_differ() -> None:

@@ -100,8 +100,9 @@ def run(argv: Sequence[str]) -> None:
         return
     print("| workers | recordings per hour | work on each | overhead | start | all known, again |\n|---|---|---|---|---|---|")
     for row in rows:
+        overhead = f"{100.0 * row['overhead']:.1f} %"
         print(
-            f"| {row['workers']} | {row['recordings_per_hour']:,.0f} | {row['work_s_per_recording']:.2f} s | {row['overhead']:.1%} | "
+            f"| {row['workers']} | {row['recordings_per_hour']:,.0f} | {row['work_s_per_recording']:.2f} s | {overhead} | "
             f"{row['start_s']:.1f} s | {row['known_again_s']:.2f} s |"
         )
     whole = result["hundred_thousand"]
