@@ -23,14 +23,15 @@ from lugre_steering.bag.mcap_records import (
     CHUNK,
     CHUNK_HEAD,
     CHUNK_INDEX,
-    CODES,
     FOOTER,
     GAP,
     MESSAGE,
     RECORD,
     SCHEMA,
     STATISTICS,
+    Data,
     Record,
+    fills,
     records,
 )
 from lugre_steering.bag.messages import Connection, Messages, windows
@@ -54,8 +55,6 @@ _SUMMARY_LIMIT = 256 << 20  # bytes; one of a recording of 100 GB has some 50 MB
 _TOPICS_LIMIT = 64 << 20  # bytes of all definitions and descriptions of topics
 _MOST_REPORTED = 30  # findings of one file
 _NO_HEADS = np.empty(0, MESSAGE_HEAD)
-
-Data = bytes | bytearray | memoryview
 
 
 class _Run(NamedTuple):
@@ -169,7 +168,7 @@ class McapFile:
             data = self._open_chunk(run) if run.is_chunk else self._read(run.offset, run.size)
         except _DamageError as damage:
             reason, whole, believed, data = str(damage), False, damage.located, damage.remains
-        starts, broken = self._find(data, torn=run.torn)
+        starts, broken = self._find(data, torn=run.torn, in_chunk=run.is_chunk)
         try:
             self._allowance.spend_messages(len(starts))
         except TooLargeError as error:
@@ -243,32 +242,36 @@ class McapFile:
             raise _DamageError("its checksum does not match", remains, located=False)
         return data
 
-    def _find(self, data: Data, *, torn: bool) -> tuple[array[int], bool]:
+    def _find(self, data: Data, *, torn: bool, in_chunk: bool) -> tuple[array[int], bool]:
         """Where the messages begin, and whether there is damage between them. Learns topics on the way.
 
         In unpacked ``data`` (a bytearray) nothing behind the damage is worth a search.
         """
         starts = array("q")
         at, end = 0, len(data)
+
+        def read(at: int, size: int) -> Data:
+            return data[at : at + size]
+
         unpack, head, least = RECORD.unpack_from, RECORD.size, MESSAGE_HEAD.itemsize - RECORD.size
         while at + head <= end:
             op, size = unpack(data, at)
             after = at + head + size
-            if after > end or op not in CODES:
+            if after > end:
                 break
-            if op == MESSAGE:
-                if size < least:
-                    break
+            if op == MESSAGE and size >= least:
                 starts.append(at)
-            elif op in (SCHEMA, CHANNEL):
+            elif op in (SCHEMA, CHANNEL) and fills(read, at, after, end):
                 self._register(op, data[at + head : after])
+            else:
+                break
             at = after
         if at == end:
             return starts, False
         if isinstance(data, bytearray):
             return starts if torn else starts[:-1], not torn
         starts, broken = array("q"), False
-        for record in records(lambda at, size: data[at : at + size], 0, end, self._known):
+        for record in records(read, 0, end, self._known, in_chunk=in_chunk):
             broken |= record.op == GAP or (record.after > end and not torn)
             if record.op == MESSAGE and record.after <= end:
                 starts.append(record.at)

@@ -99,6 +99,21 @@ def test_one_wrong_length_costs_its_message_and_is_told(tmp_path: Path, chunked:
     assert "damaged" in said
 
 
+@pytest.mark.parametrize("chunked", [True, False])
+def test_a_wrong_operation_code_costs_its_message_and_is_told(tmp_path: Path, chunked: bool) -> None:
+    """Every kind of record, one that is unknown, and one of another program."""
+    messages = make.steering(1.0)
+    file = mcap(tmp_path / "run.mcap", messages, chunked=chunked, whole=False)
+    data = bytearray(file.read_bytes())
+    at = data.index(struct.pack("<Q", messages[200][2]), 200) - 15
+    for code in (*range(1, 5), *range(6, 17), 0x80, 0x85, 0xFF):
+        data[at] = code
+        file.write_bytes(data)
+        count, said = values(file)
+        assert len(messages) - 2 <= count < len(messages), code
+        assert "damaged" in said, code
+
+
 def chunk(kind: str, packed: bytes, plain: int) -> bytes:
     head = struct.pack("<QQQI", T0, T0 + 10**9, plain, 0) + struct.pack("<I", len(kind)) + kind.encode()
     content = head + struct.pack("<Q", len(packed)) + packed
