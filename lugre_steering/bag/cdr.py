@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,12 +40,18 @@ class _Cursor:
     """Walks one serialised message and marks the bytes that are structure (encapsulation, lengths, joint names)."""
 
     def __init__(self, raw: bytes) -> None:
-        order = {b"\0\0": ">", b"\0\1": "<"}.get(raw[:2])
-        if order is None:
-            raise _MalformedError
-        self.raw, self.order, self.at = raw, order, 4
+        self.raw, self.order, self.at = raw, "", 4
         self.structure = np.zeros(len(raw), np.uint8)
         self.structure[:2] = 0xFF
+
+    def header(self) -> None:
+        """Step over encapsulation, stamp and frame."""
+        order = {b"\0\0": ">", b"\0\1": "<"}.get(self.raw[:2])
+        if order is None:
+            raise _MalformedError
+        self.order = order
+        self.skip(4, 2)
+        self.text(is_structure=False)
 
     def skip(self, size: int, count: int = 1) -> int:
         """Step over ``count`` aligned primitives of ``size`` bytes; returns where they begin."""
@@ -77,34 +84,28 @@ class _Layout:
     """Where the wanted numbers of a message are: (value, rate) offsets per joint, -1 where there is none."""
 
     order: str
-    structure: Bytes
     fields: Sequence[tuple[int, int] | None]
 
 
 def joint_names(raw: bytes) -> list[str]:
     """Joint names of one serialised JointState; empty for a malformed one."""
+    cursor = _Cursor(raw)
     try:
-        return _names(_after_header(raw))
+        cursor.header()
+        return _names(cursor)
     except _MalformedError:
         return []
-
-
-def _after_header(raw: bytes) -> _Cursor:
-    cursor = _Cursor(raw)
-    cursor.skip(4, 2)
-    cursor.text(is_structure=False)
-    return cursor
 
 
 def _names(cursor: _Cursor) -> list[str]:
     return [cursor.text(is_structure=True).decode("utf-8", "replace") for _ in range(cursor.count())]
 
 
-def _layout(raw: bytes, msgtype: str, joints: Sequence[str]) -> _Layout:
-    cursor = _after_header(raw)
+def _layout(cursor: _Cursor, msgtype: str, joints: Sequence[str]) -> _Layout:
+    cursor.header()
     if msgtype != JOINT_STATE:
         return _Layout(
-            cursor.order, cursor.structure, [(cursor.skip(8, _FIELD[msgtype] + 1) + 8 * _FIELD[msgtype], -1)]
+            cursor.order, [(cursor.skip(8, _FIELD[msgtype] + 1) + 8 * _FIELD[msgtype], -1)]
         )
     names = _names(cursor)
     sequences = (cursor.doubles(), cursor.doubles())
@@ -118,7 +119,7 @@ def _layout(raw: bytes, msgtype: str, joints: Sequence[str]) -> _Layout:
         i = names.index(joint) if joint in names else 0
         position, velocity = (begin + 8 * i if i < count else -1 for begin, count in sequences)
         fields.append((position, velocity))
-    return _Layout(cursor.order, cursor.structure, fields)
+    return _Layout(cursor.order, fields)
 
 
 def _column(rows: Bytes, at: int, dtype: str) -> NDArray[np.generic]:
@@ -152,16 +153,15 @@ def decode(rows: Bytes, msgtype: str, joints: Sequence[str] = ("",)) -> Decoded:
     layouts = 0
     while len(todo):
         first = rows[todo[0]]
-        try:
-            layout = _layout(first.tobytes(), msgtype, joints)
-        except _MalformedError:
-            todo = todo[1:]
-            continue
+        cursor, layout = _Cursor(first.tobytes()), None
+        with suppress(_MalformedError):  # as are those that look like it so far
+            layout = _layout(cursor, msgtype, joints)
         # Where every message looks different, comparing each with all others would cost the square of their number.
         among = todo if layouts < _LAYOUTS_TRIED else todo[:1]
         layouts += 1
-        alike = ~((rows[among] ^ first) & layout.structure).any(axis=1)
-        _fill(result, rows, among[alike], layout)
+        alike = ~((rows[among] ^ first) & cursor.structure).any(axis=1)
+        if layout is not None:
+            _fill(result, rows, among[alike], layout)
         todo = np.concatenate([among[~alike], todo[len(among) :]])
     return result
 

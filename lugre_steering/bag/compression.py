@@ -22,6 +22,7 @@ MESSAGE_LIMIT = 32 << 20  # bytes of one message: more than any camera or laser 
 _FED, _STEP = 1 << 16, 1 << 17  # bytes given to a codec, and taken from it, at a time (zstd makes blocks of 128 kB)
 _FREE, _RATIO = 256 << 20, 50  # bytes; recordings of sensors shrink to a fifteenth at best
 _FREE_MESSAGES = 200_000
+_CHUNK_MESSAGES = 1_000_000  # rosbag2 closes a chunk after some 10 000
 _LEAST = 4  # bytes of a file for each message: no two have the same times, so 7 are left of them at best
 
 
@@ -30,28 +31,43 @@ class TooLargeError(Exception):
 
 
 class Allowance:
-    """How much one pass over a file of ``size`` bytes may unpack: bounds what a small hostile file can cost.
+    """How much one pass over a file may unpack: bounds what a small hostile file can cost.
 
     Bytes and messages count apart: a message costs as much time as some 500 bytes, but what sets a recording apart from
-    repeated bytes differs between them. Both grow with the file, so a recording of any length has enough.
+    repeated bytes differs between them. Both grow with the bytes that were recorded, so a recording of any length has enough.
     """
 
-    def __init__(self, size: int) -> None:
-        self._bytes = self._bytes_left = _FREE + _RATIO * size
-        self._messages = self._messages_left = _FREE_MESSAGES + size // _LEAST
+    def __init__(self, size: int = 0) -> None:
+        self._bytes = self._bytes_left = _FREE
+        self._messages = self._messages_left = _FREE_MESSAGES
+        self.earn(size)
+
+    def earn(self, size: int) -> None:
+        """Add what ``size`` recorded bytes may unpack to."""
+        self._bytes += _RATIO * size
+        self._bytes_left += _RATIO * size
+        self._messages += size // _LEAST
+        self._messages_left += size // _LEAST
 
     def spend(self, size: int) -> None:
         """Take ``size`` bytes off."""
         if size > self._bytes_left:
             self._bytes_left = 0
-            raise TooLargeError(f"they unpack to more than the {self._bytes >> 20} MB that a file of this size may")
+            raise TooLargeError(f"they unpack to more than the {self._bytes >> 20} MB that so few bytes may")
         self._bytes_left -= size
 
+    @property
+    def chunk_messages(self) -> int:
+        """How many messages a chunk may hold."""
+        return min(_CHUNK_MESSAGES, self._messages_left)
+
     def spend_messages(self, count: int) -> None:
-        """Take ``count`` messages off."""
+        """Take the ``count`` messages of a chunk off."""
+        if count > _CHUNK_MESSAGES:
+            raise TooLargeError(f"it holds more than {_CHUNK_MESSAGES} messages")
         if count > self._messages_left:
             self._messages_left = 0
-            raise TooLargeError(f"they unpack to more than the {self._messages} messages that a file of this size may hold")
+            raise TooLargeError(f"they unpack to more than the {self._messages} messages that so few bytes may hold")
         self._messages_left -= count
 
 

@@ -143,8 +143,8 @@ class McapFile:
         self._learned = 0  # bytes of topics and schemas
         self._file = path.open("rb")
         self._size = path.stat().st_size
-        self._recorded_size = packed or self._size
-        self._allowance = Allowance(self._recorded_size)
+        self._recorded = packed / self._size if packed else 1.0  # of each byte
+        self._allowance = Allowance()
         if self._file.read(len(MAGIC)) != MAGIC:
             self._file.close()
             raise BagError(f"{path}: not an MCAP file (it does not begin with the MCAP magic bytes)")
@@ -159,20 +159,22 @@ class McapFile:
         self._wanted = self._index
         if wanted is not None:
             self._wanted = np.where(np.isin(self._index, list(wanted)), self._index, -1)
-        self._allowance = Allowance(self._recorded_size)
-        return [(run.begin_ns, self._load(run)) for run in self._runs]
+        self._allowance = Allowance()
+        # Not generators: one that is suspended would hold on to what it has given.
+        return [(run.begin_ns, filter(len, map(self._load, (run,)))) for run in self._runs]
 
-    def _load(self, run: _Run) -> Iterator[Messages]:
+    def _load(self, run: _Run) -> Messages:
+        self._allowance.earn(int(run.size * self._recorded))
         reason, whole, believed = "its records are damaged", True, True
         try:
             data = self._open_chunk(run) if run.is_chunk else self._read(run.offset, run.size)
         except _DamageError as damage:
             reason, whole, believed, data = str(damage), False, damage.located, damage.remains
-        starts, broken = self._find(data, torn=run.torn, in_chunk=run.is_chunk)
         try:
+            starts, broken = self._find(data, torn=run.torn, in_chunk=run.is_chunk)
             self._allowance.spend_messages(len(starts))
         except TooLargeError as error:
-            reason, starts, whole = str(error), array("q"), False
+            reason, starts, broken, whole = str(error), array("q"), False, False
         if not believed and not broken:
             starts = array("q")
         messages, foreign = self._messages(data, starts)
@@ -187,9 +189,7 @@ class McapFile:
             self._report(f"{where} cannot be read in full: {reason}{kept}")
         if foreign:
             self._report(f"{counted(foreign, 'message')} of {where} left out: topic or log time damaged or missing")
-        del data
-        if len(messages):
-            yield messages
+        return messages
 
     @property
     def begin_ns(self) -> int:
@@ -254,7 +254,9 @@ class McapFile:
             return data[at : at + size]
 
         unpack, head, least = RECORD.unpack_from, RECORD.size, MESSAGE_HEAD.itemsize - RECORD.size
-        while at + head <= end:
+        for _ in range(self._allowance.chunk_messages + 1):
+            if at + head > end:
+                break
             op, size = unpack(data, at)
             after = at + head + size
             if after > end:
@@ -266,6 +268,8 @@ class McapFile:
             else:
                 break
             at = after
+        else:
+            self._allowance.spend_messages(len(starts) + 1)
         if at == end:
             return starts, False
         if isinstance(data, bytearray):
@@ -364,7 +368,7 @@ class McapFile:
         """Learn topics and stretches from the records themselves, beyond damage and as far as they go."""
         total, last_ns = 0, 0
         for run in self._stretches():
-            for messages in self._load(run):
+            if len(messages := self._load(run)):
                 self._runs.append(run._replace(begin_ns=int(messages.log_ns[0])))
                 total, last_ns = total + len(messages), max(last_ns, int(messages.log_ns[-1]))
         upto = f"; kept {counted(total, 'message')}" + (f" up to t={(last_ns - self.begin_ns) / 1e9:.3f} s" if total else "")

@@ -48,6 +48,11 @@ class Messages:
     def __len__(self) -> int:
         return len(self.log_ns)
 
+    @property
+    def size(self) -> int:
+        """Bytes of memory."""
+        return sum(array.nbytes for array in (self.connection, self.log_ns, self.start, self.length, self.data))
+
     def take(self, which: slice | IntArray | Mask) -> Messages:
         """The selected messages over the same bytes."""
         return Messages(self.connection[which], self.log_ns[which], self.start[which], self.length[which], self.data)
@@ -58,7 +63,12 @@ class Messages:
 
     def packed(self) -> Messages:
         """The same messages over just their own bytes (a part of a block must not keep the whole block in memory)."""
-        return from_rows(self.connection, self.log_ns, [self.bytes_of(i) for i in range(len(self))])
+        start = np.cumsum(self.length) - self.length
+        data = np.empty(int(self.length.sum()), np.uint8)
+        for length in np.unique(self.length[self.length > 0]):
+            alike = np.flatnonzero(self.length == length)
+            sliding_window_view(data, length, writeable=True)[start[alike]] = windows(self.data, self.start[alike], length)
+        return Messages(self.connection.copy(), self.log_ns.copy(), start, self.length.copy(), data)
 
 
 def from_rows(
@@ -150,16 +160,17 @@ def merged(runs: Sequence[tuple[int, Iterable[Messages]]], per_block: int) -> It
         piece = next(pieces, None)
         if piece is not None:
             waiting.append(piece)
-            count, size = count + len(piece), size + len(piece.data)
+            count, size = count + len(piece), size + piece.size
             heapq.heappush(ahead, (int(piece.log_ns[-1]), i, pieces))
             if size > _WAITING_BYTES:  # whole chunks are held for the sake of few messages, or too much is
-                waiting = [part.packed() for part in waiting]
-                size = sum(len(part.data) for part in waiting)
+                for k, part in enumerate(waiting):
+                    waiting[k] = part.packed()
+                size = sum(part.size for part in waiting)
                 if size > _WAITING_BYTES:
                     raise BagError(f"more than {size >> 20} MB lie so far out of time order that they cannot be sorted")
         if not waiting or (ahead and count < enough and size < full):
             continue
-        block = join(waiting)
+        block, waiting = join(waiting), []
         block = block.take(np.argsort(block.log_ns, kind="stable"))
         ready = int(np.searchsorted(block.log_ns, ahead[0][0])) if ahead else len(block)
         for begin in range(0, ready, per_block):
@@ -167,5 +178,5 @@ def merged(runs: Sequence[tuple[int, Iterable[Messages]]], per_block: int) -> It
         rest = block.take(slice(ready, None)).packed()
         waiting = [rest] if len(rest) else []
         # What is carried over must not be sorted again with every small piece.
-        count, size = len(rest), len(rest.data)
-        enough, full = per_block + count, BLOCK_BYTES + size
+        count, size = len(rest), rest.size
+        enough, full = max(per_block, 2 * count), max(BLOCK_BYTES, 2 * size)
