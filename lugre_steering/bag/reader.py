@@ -197,13 +197,13 @@ class Bag:
         """Hold how many messages of each connection were read against what the metadata promise."""
         total, promised = int(counts.sum()), self.message_count
         if len(read) == len(self.connections) and promised is not None and total != promised:
-            self._say("message_count", f"metadata.yaml promises {promised} messages, {total} could be read")
+            self._say("message_count", f"metadata.yaml promises {counted(promised, 'message')}, {total} could be read")
             return
         for topic in {self.connections[k].topic for k in read}:
             of_topic = {k for k, connection in enumerate(self.connections) if connection.topic == topic}
             count, promised = int(counts[list(of_topic)].sum()), self._promised.get(topic)
             if of_topic <= set(read) and promised is not None and count != promised:
-                self._say("message_count", f"metadata.yaml promises {promised} messages, {count} could be read", topic)
+                self._say("message_count", f"metadata.yaml promises {counted(promised, 'message')}, {count} could be read", topic)
 
     def blocks(
         self, channels: Sequence[Channel], messages_per_block: int = 50_000, *, all_messages: bool = False

@@ -16,6 +16,7 @@ from pathlib import Path
 import bag_making as make
 import numpy as np
 import pytest
+import yaml
 from bag_making import CHANNELS, LEFT, MAIN_A, T0
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
@@ -300,9 +301,11 @@ def test_an_index_that_leads_to_other_rows_is_not_believed(tmp_path: Path, whole
 def test_a_topic_with_fewer_messages_than_promised_is_told_when_it_is_read(tmp_path: Path, storage: str) -> None:
     folder = make.write(tmp_path / "run", make.steering(2.0), storage)
     metadata = folder / "metadata.yaml"
-    count = f"message_count: {sum(1 for m in make.steering(2.0) if m[0] == '/' + LEFT.topic)}"
-    text, at = metadata.read_text(), metadata.read_text().index(f"name: /{LEFT.topic}")
-    metadata.write_text(text[:at] + text[at:].replace(count, "message_count: 999", 1))
+    content = yaml.safe_load(metadata.read_text())
+    for topic in content["rosbag2_bagfile_information"]["topics_with_message_count"]:
+        if topic["topic_metadata"]["name"] == "/" + LEFT.topic:
+            topic["message_count"] = 999
+    metadata.write_text(yaml.safe_dump(content))
     assert read_recording(folder, [MAIN_A]).findings == ()
     (finding,) = read_recording(folder, [LEFT]).findings
     assert (finding.finding, finding.topic) == ("message_count", "/" + LEFT.topic)
