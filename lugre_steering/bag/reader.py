@@ -8,7 +8,7 @@ import os
 import sqlite3
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,6 +67,7 @@ class Bag:
         self.malformed: Counter[str] = Counter()  # messages per topic that do not decode as their type
         self._foreign: Counter[int] = Counter()  # messages per connection that speak of no wanted joint
         self.message_count: int | None = None  # as the metadata say; None where there are none
+        self._promised: Counter[str] = Counter()  # messages of each topic, as far as the metadata say
         self._files: list[mcap.McapFile | sqlite.SqliteFile] = []
         self._size = 0  # bytes of all files
         self._stack = ExitStack()
@@ -116,7 +117,7 @@ class Bag:
             try:
                 metadata = read_metadata(file)
                 listed = list(dict.fromkeys(self.path / Path(name).name for name in metadata.files))
-                self.message_count = metadata.messages
+                self.message_count, self._promised = metadata.messages, metadata.of_topic
             except (ValueError, OSError) as error:
                 self._say("damaged_metadata", f"metadata.yaml is not readable ({error}); the files themselves were read")
         else:
@@ -176,23 +177,33 @@ class Bag:
 
     def messages(self, wanted: set[int] | None = None, messages_per_block: int = 50_000) -> Iterator[Messages]:
         """Serialised messages in log order; ``wanted`` limits them to some of ``connections``."""
-        count = 0
+        counts = np.zeros(_TOPICS_LIMIT, np.int64)
         left_out: Counter[str] = Counter()  # compressed messages, by reason
         allowance = Allowance(self._size)
         try:
             runs = [run for file in self._files for run in file.runs(wanted)]
             for block in merged(runs, messages_per_block):
                 for messages, lost in inflated(block, allowance):
-                    count += len(messages)
+                    counts += np.bincount(messages.connection, minlength=_TOPICS_LIMIT)
                     left_out.update(lost)
                     yield messages
         except (OSError, sqlite3.Error, BagError) as error:
             raise BagError(f"{self.path}: reading stopped ({error})") from error
         for reason, number in left_out.items():
             self._say("damaged_bag", f"{number} compressed messages are left out: {reason}")
-        everything = wanted is None or len(wanted) == len(self.connections)
-        if everything and self.message_count is not None and count != self.message_count:
-            self._say("message_count", f"metadata.yaml promises {self.message_count} messages, {count} could be read")
+        self._compare(range(len(self.connections)) if wanted is None else wanted, counts)
+
+    def _compare(self, read: Collection[int], counts: IntArray) -> None:
+        """Hold how many messages of each connection were read against what the metadata promise."""
+        total, promised = int(counts.sum()), self.message_count
+        if len(read) == len(self.connections) and promised is not None and total != promised:
+            self._say("message_count", f"metadata.yaml promises {counted(promised, 'message')}, {total} could be read")
+            return
+        for topic in {self.connections[k].topic for k in read}:
+            of_topic = {k for k, connection in enumerate(self.connections) if connection.topic == topic}
+            count, promised = int(counts[list(of_topic)].sum()), self._promised.get(topic)
+            if of_topic <= set(read) and promised is not None and count != promised:
+                self._say("message_count", f"metadata.yaml promises {counted(promised, 'message')}, {count} could be read", topic)
 
     def blocks(
         self, channels: Sequence[Channel], messages_per_block: int = 50_000, *, all_messages: bool = False

@@ -16,7 +16,8 @@ from pathlib import Path
 import bag_making as make
 import numpy as np
 import pytest
-from bag_making import CHANNELS, T0
+import yaml
+from bag_making import CHANNELS, LEFT, MAIN_A, T0
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
@@ -274,3 +275,38 @@ def test_a_lost_file_of_a_split_recording_does_not_cost_the_others(tmp_path: Pat
     count, findings = sound(folder)
     assert count == 2 * len(make.steering(1.0))
     assert sorted(findings) == ["lost_file", "no_metadata"]
+
+
+def test_an_index_that_leads_to_other_rows_is_not_believed(tmp_path: Path, whole: Callable[..., Path]) -> None:
+    """As many entries as rows, but one leads to a row twice, and so another is never found."""
+    folder = shutil.copytree(whole(5.0, "sqlite3", "none"), tmp_path / "run")
+    (folder / "metadata.yaml").unlink()
+    file = make.file_of(folder)
+    with contextlib.closing(sqlite3.connect(file)) as db:
+        number, log_ns = db.execute("SELECT id, timestamp FROM messages ORDER BY id LIMIT 1 OFFSET 400").fetchone()
+    data = bytearray(file.read_bytes())
+    entry = struct.pack(">q", log_ns) + struct.pack(">h", number)  # the index holds log times and row numbers
+    assert data.count(entry) == 1
+    data[data.index(entry) + 9] ^= 1
+    file.write_bytes(data)
+    with contextlib.closing(sqlite3.connect(file)) as db:
+        rows = db.execute("SELECT id FROM messages INDEXED BY timestamp_idx").fetchall()
+        assert len(rows) == len(set(rows)) + 1
+    with Bag(folder) as bag:
+        assert sum(len(block) for block in bag.messages()) == len(rows)
+        assert [f.finding for f in bag.findings] == ["no_metadata", "damaged_bag"]
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_topic_with_fewer_messages_than_promised_is_told_when_it_is_read(tmp_path: Path, storage: str) -> None:
+    folder = make.write(tmp_path / "run", make.steering(2.0), storage)
+    metadata = folder / "metadata.yaml"
+    content = yaml.safe_load(metadata.read_text())
+    for topic in content["rosbag2_bagfile_information"]["topics_with_message_count"]:
+        if topic["topic_metadata"]["name"] == "/" + LEFT.topic:
+            topic["message_count"] = 999
+    metadata.write_text(yaml.safe_dump(content))
+    assert read_recording(folder, [MAIN_A]).findings == ()
+    (finding,) = read_recording(folder, [LEFT]).findings
+    assert (finding.finding, finding.topic) == ("message_count", "/" + LEFT.topic)
+    assert "promises 999 messages, 200 could be read" in finding.statement
