@@ -19,6 +19,15 @@ from lugre_steering.files import read_text, write_text
 VARIABLE = "LUGRE_STEERING_CONFIG"
 """Environment variable that names another file."""
 
+_SAVED: dict[type, tuple[tuple[type, ...], str]] = {
+    bool: ((bool,), "true or false"),
+    int: ((int,), "a whole number"),
+    float: ((int, float), "a number"),
+    str: ((str,), "text"),
+    Path: ((str,), "a path"),
+}
+"""For each type of option what YAML has for it, and in words."""
+
 
 def file() -> Path:
     """Where they are kept."""
@@ -75,6 +84,17 @@ class Option:
         return kind
 
 
+    @property
+    def expected(self) -> str:
+        """What may be saved for it, in words."""
+        return f"a list, each {_SAVED[self.kind][1]}" if self.several else _SAVED[self.kind][1]
+
+    def takes(self, saved: object) -> bool:
+        """Whether this may be saved for it."""
+        values = saved if isinstance(saved, list) else [saved]
+        return isinstance(saved, list) == self.several and all(type(value) in _SAVED[self.kind][0] for value in values)
+
+
 CommandOptions = Mapping[str, Mapping[str, Option]]
 """Options of each command by the name as it is typed, without its dashes."""
 
@@ -82,8 +102,12 @@ CommandOptions = Mapping[str, Mapping[str, Option]]
 def of_commands(saved: Mapping[str, Any], options: CommandOptions) -> dict[str, dict[str, Any]]:
     """Defaults of each command by the name of its parameter."""
     for key in saved:
-        if not _meant(key, options):
-            raise LugreSteeringError(f"{file()}: key '{key}': no such option; 'lugre-steering config {key} --unset' forgets it")
+        meant, forget = _meant(key, options), f"'lugre-steering config {key} --unset' forgets it"
+        if not meant:
+            raise LugreSteeringError(f"{file()}: key '{key}': no such option; {forget}")
+        if not any(option.takes(saved[key]) for option in meant):
+            got = str(saved[key])[:40]
+            raise LugreSteeringError(f"{file()}: key '{key}': got '{got}', expected {meant[0].expected}; {forget}")
     return {
         command: {
             option.parameter: saved.get(f"{command}.{name}", saved.get(name))

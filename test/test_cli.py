@@ -264,15 +264,17 @@ def test_saved_defaults_stand_in_for_options(
     assert (done.exit_code, done.stderr) == (0, "")
     given = here("replay", bag, "--out", "out", "--vehicle", "absent.yaml")
     assert (given.exit_code, "absent.yaml" in given.stderr) == (2, True)  # what is given counts
-    for wrong in (("diagnose.seed", "x"), ("nothing", "1"), ("replay.seed", "1"), ("vehicle",)):
-        refused = here("config", *wrong)
+    for refusable in (("diagnose.seed", "x"), ("nothing", "1"), ("replay.seed", "1"), ("vehicle",)):
+        refused = here("config", *refusable)
         assert (refused.exit_code, len(refused.stderr.splitlines())) == (2, 1)
     assert here("config", "vehicle", "--unset").exit_code == 0
     assert "Missing option" in here("replay", bag, "--out", "out").stderr
-    (tmp_path / "etc" / "lugre_steering" / "defaults.yaml").write_text("colour: red\n")
-    broken = here("effects")
-    assert (broken.exit_code, len(broken.stderr.splitlines())) == (2, 1)
-    assert "colour" in broken.stderr
+    kept = tmp_path / "etc" / "lugre_steering" / "defaults.yaml"
+    for wrong, key in (("jobs: 1.5", "jobs"), ("vehicle: [a]", "vehicle"), ("fail-on: 3", "fail-on"), ("colour: red", "colour")):
+        kept.write_text(wrong)
+        broken = here("effects")
+        assert (broken.exit_code, len(broken.stderr.splitlines())) == (2, 1)
+        assert f"{kept}: key '{key}'" in broken.stderr
     assert here("config", "colour", "--unset").exit_code == 0  # the way out that it names
     assert here("effects").exit_code == 0
 

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Protocol, cast
 
 from lugre_steering.serialise import as_json
 
-TARGETS = {name: f"lugre_steering.bench.fuzz_{name}" for name in ("bag", "vehicle", "parameters", "effects", "import")}
+TARGETS = {name: f"lugre_steering.bench.fuzz_{name}" for name in ("bag", "vehicle", "parameters", "effects", "import", "results")}
 TIME_LIMIT_S, MEMORY_LIMIT_MB = 10.0, 1024.0
 _RUNAWAY = 4 << 30  # bytes of address space, so that one case cannot take the machine with it
 GOOD = ("read", "refused")  # any other verdict is a fault

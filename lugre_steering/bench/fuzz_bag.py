@@ -8,7 +8,6 @@ import random
 import shutil
 import struct
 import tempfile
-from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import Bag, read_recording
+from lugre_steering.bench.fuzz_bytes import damage_bytes
 from lugre_steering.bench.replay import VEHICLE, write_cycle
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.recording import Channel, Recording
@@ -23,7 +23,6 @@ from lugre_steering.vehicle import load
 
 _SECONDS = 5.0
 _FOOTER = struct.Struct("<BQQQI")  # of an MCAP file, before its last eight bytes
-_BLOCK = 4096
 
 
 @lru_cache(maxsize=1)
@@ -57,54 +56,16 @@ def _copy(source: Path, writer: Writer) -> None:
                 writer.write(topics[number], int(block.log_ns[i]), block.bytes_of(i))
 
 
-def _flip(data: bytearray, dice: random.Random) -> None:
-    for _ in range(dice.choice([1, 1, 10, 200])):
-        data[dice.randrange(len(data))] ^= 1 << dice.randrange(8)
-
-
-def _blank(data: bytearray, dice: random.Random) -> None:
-    begin = dice.randrange(len(data)) // _BLOCK * _BLOCK
-    size = len(data[begin : begin + _BLOCK])
-    data[begin : begin + size] = bytes([dice.choice([0, 0x55, 0xFF])]) * size
-
-
-def _cut(data: bytearray, dice: random.Random) -> None:
-    del data[dice.randrange(1, len(data)) :]
-
-
-def _drop(data: bytearray, dice: random.Random) -> None:
-    begin = dice.randrange(len(data))
-    del data[begin : begin + dice.choice([1, 8, 100, _BLOCK])]
-
-
-def _repeat(data: bytearray, dice: random.Random) -> None:
-    begin = dice.randrange(len(data))
-    data[begin:begin] = data[begin : begin + dice.choice([1, 8, 100, _BLOCK])]
-
-
-def _extreme(data: bytearray, dice: random.Random) -> None:
-    size = dice.choice([1, 2, 4, 8])
-    number = dice.choice([0, 1, 2 ** (8 * size - 1), 2 ** (8 * size) - 1, 2 ** (8 * size - 1) - 1])
-    begin = dice.randrange(max(len(data) - size, 1))
-    data[begin : begin + size] = number.to_bytes(size, dice.choice(["little", "big"]))
-
-
-_DAMAGES: tuple[Callable[[bytearray, random.Random], None], ...] = (_flip, _blank, _cut, _drop, _repeat, _extreme)
-
-
 def damaged(source: Path, target: Path, dice: random.Random) -> str:
     """Copy a bag and damage one of its files; returns what was done."""
     shutil.copytree(source, target)
     files = sorted(target.iterdir(), key=lambda file: file.name == "metadata.yaml")
     file = files[-1] if dice.random() < 0.1 else files[0]
-    data = bytearray(file.read_bytes())
-    damage = dice.choice(_DAMAGES)
-    damage(data, dice)
-    file.write_bytes(data)
+    done = damage_bytes(file, dice)
     without = "" if dice.random() < 0.7 else ", no metadata.yaml"
     if without:
         (target / "metadata.yaml").unlink()
-    return f"{source.name}, {file.name}: {damage.__name__[1:]}{without}"
+    return f"{source.name}, {file.name}: {done}{without}"
 
 
 def _samples(recording: Recording) -> int:

@@ -30,4 +30,8 @@ def corpus(folder: Path) -> None:
 def attempt(folder: Path, case: int) -> tuple[str, str]:
     """Import a damaged table, or by a damaged map."""
     table = ("table.csv", "table.json")[case % 2]
-    return fuzz_text.tried(folder, case, ["map.yaml", table], lambda place: import_table(place / table, place / "map.yaml", place / "bag"))
+
+    def use(place: Path) -> None:
+        import_table(place / table, place / "map.yaml", place / "bag")
+
+    return fuzz_text.tried(folder, case, {"map.yaml": use, table: use})

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Text files to be damaged: vehicle, parameter and effect files, import maps and tables."""
+"""Text files to be damaged: vehicle, parameter and effect files, defaults, earlier results, import maps and tables."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import random
 import shutil
 import tempfile
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from lugre_steering.bench.fuzz_bytes import damage_bytes
 from lugre_steering.errors import ImplausibleWarning, LugreSteeringError
 from lugre_steering.resources import config_folder
 
@@ -66,20 +67,17 @@ _DAMAGES: tuple[Callable[[str, random.Random], str], ...] = (
 )  # fmt: skip
 
 
-def damage_one(files: list[Path], dice: random.Random) -> str:
-    """Damage one of the files as text, or now and then as bytes; returns what was done."""
-    file = dice.choice(files)
+def _damage(file: Path, dice: random.Random) -> str:
+    """Damage a file as text, or where it is none, and now and then, as bytes; returns what was done."""
+    if file.suffix == ".npz" or dice.random() < 0.1:
+        return f"{file.name}: {damage_bytes(file, dice)}"
     text = file.read_text(encoding="utf-8")
     done = []
     for _ in range(dice.choice([1, 1, 2, 5])):
         damage = dice.choice(_DAMAGES)
         text = damage(text or " ", dice)
         done.append(damage.__name__[1:])
-    data = bytearray(text.encode("utf-8", "surrogatepass"))
-    if dice.random() < 0.1 and data:
-        data[dice.randrange(len(data))] = dice.randrange(256)
-        done.append("byte")
-    file.write_bytes(bytes(data))
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
     return f"{file.name}: {', '.join(done)}"
 
 
@@ -89,16 +87,17 @@ def copied(names: list[str], folder: Path) -> None:
         shutil.copy(config_folder() / name, folder / name)
 
 
-def tried(folder: Path, case: int, damageable: list[str], use: Callable[[Path], object]) -> tuple[str, str]:
-    """Copy the corpus, damage one of its files, and use it."""
+def tried(folder: Path, case: int, uses: Mapping[str, Callable[[Path], object]]) -> tuple[str, str]:
+    """Copy the corpus, damage one of its files, and use it: ``uses`` of the copy, by the name of the file."""
     dice = random.Random(case)
     with tempfile.TemporaryDirectory(prefix="lugre_steering_fuzz_") as temporary, warnings.catch_warnings():
         warnings.simplefilter("ignore", ImplausibleWarning)
         place = Path(temporary) / "corpus"
         shutil.copytree(folder, place)
-        done = damage_one([place / name for name in damageable], dice)
+        name = dice.choice(list(uses))
+        done = _damage(place / name, dice)
         try:
-            use(place)
+            uses[name](place)
         except LugreSteeringError as error:
             return "refused", f"{done}: {error}"
     return "read", done

@@ -55,7 +55,7 @@ def recall(core: Core, sides: Sequence[str], memory: Memory) -> None:
         records = [(_record(core.state, row["state"]), _record(core.motion, row["motion"])) for _, row in rows]
         last = [(int(row["stamp_ns"]), float(row["angle"]), float(row["fastest"])) for _, row in rows]
         start_ns = int(memory["start_ns"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(f"it is not the memory of this model ({error})") from error
     core.config["start_ns"] = start_ns
     for (i, _), (state, motion), (stamp_ns, angle, fastest) in zip(rows, records, last, strict=True):
