@@ -74,7 +74,9 @@ def read_window(file: Path, channels: Sequence[Channel]) -> Window:
         reason, labels = str(about["reason"]), [str(label) for label in about["channels"]]
     except OSError as error:
         raise DataError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, NotImplementedError, RuntimeError, MemoryError, zlib.error) as error:
+    except (
+        ValueError, KeyError, TypeError, EOFError, NotImplementedError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error,
+    ) as error:  # fmt: skip
         raise DataError(f"{file}: is damaged or no window file, expected one that the live node wrote") from error
     if not known:
         raise DataError(f"{file}: is of another version, expected {SCHEMA}")
