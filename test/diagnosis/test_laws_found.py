@@ -93,6 +93,15 @@ def test_a_torque_that_remembers_the_rate_is_found_with_its_time_constant() -> N
     entry = entries(found)[0]
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert entry.memory_size == pytest.approx(1.5, rel=0.2)
+    assert found.foretold == found.ceiling  # nothing of any shape foretells more
+
+
+def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling() -> None:
+    """A wave that runs along angle and rate at once: a law of the angle is the best there is, and a black box foretells clearly more."""
+    _, found = searched(by_run(lambda run: np.sum(1500.0 * np.cos(9.0 * run.theta + 25.0 * run.omega), axis=0)))
+    assert found is not None
+    assert 0.3 < found.foretold / found.ceiling < 0.9
+    assert described(found)[0]["share_of_ceiling"] == found.foretold / found.ceiling
 
 
 def test_laws_that_tie_are_separated_by_the_next_experiment() -> None:

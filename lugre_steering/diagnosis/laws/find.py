@@ -54,7 +54,8 @@ class FoundLaws:
     ``judged`` on samples held out, against these alone.
 
     ``gains``: energy that each took away when it was added; ``ties``: laws that fit as well as the first; ``bar``: the largest gain
-    in errors that hide nothing; ``ceiling``: energy that the best further law would foretell beside those found.
+    in errors that hide nothing; ``foretold``: energy of blocks left out that they take together; ``ceiling``: that which a smooth function
+    of all coordinates takes in their place, if it is more.
     """
 
     problem: Problem
@@ -64,6 +65,7 @@ class FoundLaws:
     gains: tuple[float, ...]
     ties: tuple[Tried, ...]
     bar: float
+    foretold: float
     ceiling: float
 
     @property
@@ -84,7 +86,7 @@ def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None]
     samples = float(roles.fit.sum())
     gains: list[float] = []
     ties: tuple[Tried, ...] = ()
-    current, first_bar, ceiling = fit(sought, weight, before.effects, before.x), 0.0, 0.0
+    current, first_bar, foretold, ceiling = fit(sought, weight, before.effects, before.x), 0.0, 0.0, 0.0
     for index in range(MOST_LAWS):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
@@ -93,23 +95,25 @@ def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None]
         least = max(bar(screened), OWN_ERROR * samples, SECOND * gains[0] if gains else 0.0)
         first_bar = first_bar or bar(screened)
         if screened[0].gain < least:
-            ceiling = max(screened[0].gain, 0.0)
             break
         tried = _tried(sought, weight, current, screen, screened, place, progress)
         best, gain = tried[0], current.cost - tried[0].fit.cost
         if gain < least or _unseen(there, best.fit) >= _unseen(there, current):
-            ceiling = max(gain, 0.0)
             break
         if not index:
+            ceiling = screen.black_box(seed)
             ties = tuple(other for other in tried[1:] if other.fit.cost < best.fit.cost + TIED * gain)
         gains.append(gain)
+        foretold += best.screened.gain
         current = best.fit
     if not gains:
         return None
     progress("proving the law")
     fitted, whole = (fit(problem, w, current.effects, current.x, linearisations=6) for w in (done.fitted, done.weight))
     judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
-    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, ceiling) if judged.interval[0] > 0.0 else None
+    if judged.interval[0] <= 0.0:
+        return None
+    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, foretold, max(ceiling, foretold))
 
 
 def _with_places(problem: Problem, before: Fit) -> Problem:

@@ -10,8 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 
 import numpy as np
+from scipy import stats
 
 from lugre_steering.diagnosis.laws.cells import HATS, Cell, Traces
 from lugre_steering.fitting.fit import Fit, normalised
@@ -28,6 +31,9 @@ RIDGE = 1e-6
 FREE = 1e3
 """Length of the columns of what is named, in noise standard deviations: so long that priors of one leave it free."""
 PERMUTED = 16
+FEATURES, REACHES, SIZES, TOLD = 300, (0.5, 1.0, 2.0), (0.3, 3.0), 0.01
+"""Of the black box: random features; how far they reach, in the spread of its coordinates, and their size, in root mean squares of the
+errors, of which the best count; and the share of their variance from which combinations of coordinates are told apart."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,11 @@ class Rows:
         first_one = np.isin(stretch, roles.cluster[problem.edges[:-1]] // FOLD_CLUSTERS)
         fold[take] = np.where(first_one, FOLDS, stretch % FOLDS)
         return Rows(whole, np.where(used, weight / np.sqrt(count[np.maximum(whole, 0)]), 0.0), fold)
+
+    def plain_mean(self, column: Array) -> Array:
+        """Rows (rows,) of a column (n,) in its own unit."""
+        used = self.take >= 0
+        return np.asarray(np.bincount(self.take[used], column[used]) / np.bincount(self.take[used]))
 
     def mean(self, columns: Array) -> Array:
         """Rows of columns (n, k) in noise standard deviations of the row."""
@@ -93,17 +104,45 @@ class Screen:
         own = self.rows.mean(residual[:, None])
         self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
 
+    @cached_property
+    def left(self) -> Array:
+        """Energy (k,) of each of the errors that a linear recalibration leaves of blocks left out."""
+        return _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[:1])
+
     def pieces(self, traces: Traces, cell: Cell) -> Array:
         """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
         columns, m = self.rows.mean(traces.columns(cell, traces.pieces(cell))), self.nuisance.shape[1]
         gram, right, _ = _normal(np.column_stack([self.nuisance, columns]), self.errors[:, :1])
         return np.asarray(np.linalg.solve(gram + _penalty(gram, m, SMOOTHING[0]), right)[m:, 0])
 
+    def black_box(self, seed: int) -> float:
+        """Energy that any smooth function of all coordinates together foretells of blocks left out, whatever it means.
+
+        Ridge regression on random Fourier features, which draws near a Gaussian process (Rahimi and Recht, NIPS 2007).
+        """
+        places = [np.concatenate(bags, axis=1) for bags in self.traces.axes.values()]
+        rows = np.array([self.rows.plain_mean(place) for axis in places for place in (axis.mean(axis=0), np.ptp(axis, axis=0))]).T
+        moved = rows[:, rows.std(axis=0) > 1e-9 * np.abs(rows).max(axis=0)]
+        along, size, _ = np.linalg.svd(stats.zscore(moved), full_matrices=False)
+        apart = along[:, size**2 > TOLD * float(np.sum(size**2))] * np.sqrt(len(rows))
+        own, nothing = self.errors[:, :1], np.zeros((len(rows), 0))
+        unit = self.rows.mean(np.ones((self.rows.take.size, 1)))
+        high = float(np.sqrt(np.mean(own**2) / np.mean(unit**2)))
+        rng = np.random.default_rng(seed)
+        waves, phase = rng.standard_normal((apart.shape[1], FEATURES)), rng.uniform(0.0, 2.0 * np.pi, FEATURES)
+
+        def left(reach: float, size: float) -> float:
+            drawn = np.cos(apart @ waves / (reach * np.sqrt(apart.shape[1])) + phase) * np.sqrt(2.0 / FEATURES)
+            both = np.column_stack([self.nuisance, size * high * unit * drawn])
+            return float(_left(both, nothing, own, self.rows.fold, SMOOTHING[:1])[0])
+
+        least = min(in_threads(lambda one: left(*one), list(product(REACHES, SIZES))))
+        return max(float(self.left[0]) - least, 0.0)
+
     def search(self, near: Traces | None = None, like: Cell | None = None) -> list[Screened]:
         """All cells, best first; or of other traces at the same fit those of the channel and the pieces of one."""
         traces = near or self.traces
         cells = [cell for cell in traces.cells() if like is None or _alike(cell, like)]
-        base = _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[:1])
 
         def one(cell: Cell, pieces: Sequence[Array]) -> Screened:
             columns = self.rows.mean(traces.columns(cell, pieces))
@@ -111,7 +150,7 @@ class Screen:
             if norm < 1e-12:
                 return Screened(cell, 0.0, np.zeros(self.errors.shape[1] - 1))
             smoothing = SMOOTHING if cell.pieces > HATS else SMOOTHING[:1]
-            gains = base - _left(self.nuisance, columns / norm, self.errors, self.rows.fold, smoothing)
+            gains = self.left - _left(self.nuisance, columns / norm, self.errors, self.rows.fold, smoothing)
             return Screened(cell, float(gains[0]), gains[1:])
 
         def of_one_basis(alike: Sequence[Cell]) -> list[Screened]:

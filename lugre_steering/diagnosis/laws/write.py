@@ -140,7 +140,7 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
                 name: list(span) for name, span in entry.intervals.items()},
             "range": list(entry.range), "largest_Nm": largest, "largest_share": largest / torque,
             "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
-            "share_of_ceiling": sum(found.gains) / (sum(found.gains) + found.ceiling),
+            "share_of_ceiling": found.foretold / found.ceiling,
             "ties": [_tie(tie) for tie in found.ties] if not index else [], "nearest_listed": list(nearest),
             "f": {
                 **_picture(found, found.names + index, law, values), **_points(found, found.names + index, traces, law, values),

@@ -50,7 +50,7 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("form, SI units", f"{law['form']}: {numbers}" if numbers else f"{law['form']}, see augmented.yaml"),
         ("at most", f"{words.number(law['largest_Nm'], 3)} {unit}, {words.percent(law['largest_share'])} of the torque"),
         ("foretells on held-out data", f"{words.percent(law['heldout_gain'])} of the missing energy"),
-        ("of what any law of this kind could", words.percent(law["share_of_ceiling"])),
+        ("of what any function of these coordinates could", words.percent(law["share_of_ceiling"])),
         ("not to be trusted", f"outside {low} to {high}, which nobody saw" if law["coordinate"] != "none" else ""),
         ("fits as well", ties),
         ("nearest in the catalogue, which explains less", ", ".join(law["nearest_listed"])),
