@@ -443,6 +443,9 @@ def diagnose(
     material: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,
+    without: Annotated[
+        list[str] | None, typer.Option(help="ID of an effect that is not considered, to see what takes its place; may be given again")
+    ] = None,
     report: Annotated[bool, typer.Option(help="write report.html and pictures")] = True,
     exit_code: Annotated[
         bool, typer.Option("--exit-code", help="leave with 3 for missing, 4 for unlisted physics, 5 for insufficient data")
@@ -463,8 +466,8 @@ def diagnose(
     use_threads(jobs)
     with step_bar(STEPS) as progress:
         result = run(
-            found.bags, vehicle, out, seed=seed, material=material, report=report, windows=window or [], progress=progress,
-            skipped=found.skipped,
+            found.bags, vehicle, out, seed=seed, material=material, report=report, windows=window or [], without=without or [],
+            progress=progress, skipped=found.skipped,
         )  # fmt: skip
     if as_json:
         print_json(result.json)

@@ -15,7 +15,7 @@ from lugre_steering.bag.find import Skipped
 from lugre_steering.bag.load import distinct
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, picture_names
-from lugre_steering.effects.registry import made
+from lugre_steering.effects.registry import leaving_out, made
 from lugre_steering.errors import BagError, DataError
 from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder
 from lugre_steering.vehicle import load
@@ -40,14 +40,16 @@ def run(
     material: float = MATERIAL_SHARE,
     report: bool = True,
     windows: Sequence[Path] = (),
+    without: Sequence[str] = (),
     progress: Callable[[str], None] = lambda _: None,
     skipped: Sequence[Skipped] = (),
 ) -> Diagnosis:
     """Diagnose bags, and windows that the live node has written; returns the result.
 
     Written are DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures. ``skipped``: what has been left out
-    before; of several bags, those of other machines are left out too. Both are told among the findings about the data. The report
-    of an earlier diagnosis in DIR is taken away: its pictures would not belong to this result.
+    before; of several bags, those of other machines are left out too. Both are told among the findings about the data. ``without``:
+    names that are not considered, to see what takes their place. The report of an earlier diagnosis in DIR is taken away: its
+    pictures would not belong to this result.
     """
     vehicle = load(vehicle_file)
     if not 0.0 <= material <= 1.0:
@@ -65,11 +67,12 @@ def run(
         left = {one.bag for one in others}
         used = [bag for bag in bags if str(bag) not in left]
         recordings = distinct([*zip(map(str, used), recordings, strict=True), *seen])
-        found = diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
+        with leaving_out(without):
+            found = diagnose_recordings(recordings, vehicle, seed=seed, material=material, progress=progress)
         result = replace(
             found,
             data_quality=(*(one.finding() for one in (*skipped, *others)), *found.data_quality),
-            provenance=made("diagnose", {"seed": seed, "material": material}, vehicle_file, [*used, *windows]),
+            provenance=made("diagnose", {"seed": seed, "material": material, "without": list(without)}, vehicle_file, [*used, *windows]),
         )
         try:
             if old is not None:

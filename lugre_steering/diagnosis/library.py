@@ -11,7 +11,7 @@ from pathlib import Path
 from lugre_steering.bag.given import Given, files, given_recordings
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
-from lugre_steering.effects.registry import made
+from lugre_steering.effects.registry import leaving_out, made
 from lugre_steering.result import folder_for
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
@@ -22,19 +22,23 @@ def diagnose(
     *,
     seed: int = 1,
     material: float = MATERIAL_SHARE,
+    without: str | Sequence[str] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Say which physics the vehicle file leaves out of bags (paths) or recordings of one vehicle, all together.
 
     ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file;
     ``seed``: of noise draws and bootstraps; ``material``: share of the torque amplitude from which an effect is called material;
-    ``progress`` is called with what is being done.
+    ``without``: names of the catalogue that are not considered, to see what takes their place; ``progress`` is called with what is
+    being done.
     """
     model = vehicle_of(vehicle)
     recordings = given_recordings(data, model.channels, progress)
-    found = diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
+    unsought = [without] if isinstance(without, str) else list(without)
+    with leaving_out(unsought):
+        found = diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
-    return replace(found, provenance=made("diagnose", {"seed": seed, "material": material}, sheet, files(data)))
+    return replace(found, provenance=made("diagnose", {"seed": seed, "material": material, "without": unsought}, sheet, files(data)))
 
 
 def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:

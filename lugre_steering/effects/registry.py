@@ -14,6 +14,7 @@ import os
 import pkgutil
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -65,6 +66,7 @@ CATALOGUE: dict[str, Effect] = {effect.id: effect for effect in _shipped()}
 """All known effects by id, in the order of the chain."""
 ORIGINS: dict[str, Origin] = {}
 """Where the effects come from that this package does not ship."""
+_LEFT_OUT: set[str] = set()
 
 
 def effect(effect_id: str) -> Effect:
@@ -74,6 +76,22 @@ def effect(effect_id: str) -> Effect:
         hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(CATALOGUE)}"
         raise EffectError(f"effect '{effect_id}': not in the catalogue; {hint}")
     return CATALOGUE[effect_id]
+
+
+def sought(effect: Effect) -> bool:
+    """Whether diagnoses consider it as a name."""
+    return effect.id not in _LEFT_OUT
+
+
+@contextmanager
+def leaving_out(ids: Sequence[str]) -> Iterator[None]:
+    """Diagnoses of this process do not consider these names, as if nobody had listed them; what a vehicle file has still acts."""
+    added = {effect(name).id for name in ids} - _LEFT_OUT
+    _LEFT_OUT.update(added)
+    try:
+        yield
+    finally:
+        _LEFT_OUT.difference_update(added)
 
 
 def rivals(effect: Effect) -> list[str]:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats
 
 from lugre_steering.effects.entry import Effect, Seen
-from lugre_steering.effects.registry import CATALOGUE, ORIGINS
+from lugre_steering.effects.registry import CATALOGUE, ORIGINS, sought
 from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, is_rig, resized
@@ -67,6 +67,8 @@ class Score:
 
 def possible(vehicle: Vehicle, effect: Effect) -> bool:
     """Whether a machine can have it: all that the effect needs is there, and a single joint has words for it."""
+    if not sought(effect):
+        return False
     if is_rig(vehicle) and effect.id not in ORIGINS and not effect.joint_title:
         return False
     if effect.of_angle and vehicle.coordinate.unit != "rad":

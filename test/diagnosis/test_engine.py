@@ -16,14 +16,14 @@ from bag_making import thinned_bag
 from hidden_cases import VEHICLE, cut, made, thinned
 from small_problem import effect, small_problem, weight
 
+import lugre_steering as ls
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis import engine
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects import registry
 from lugre_steering.errors import BagError
-from lugre_steering.fitting import fingerprint
 from lugre_steering.fitting.fit import fit
 from lugre_steering.proof.simulator import Concealed
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
@@ -40,11 +40,11 @@ def test_silent_when_nothing_is_hidden(tmp_path: Path, noise: str) -> None:
     assert result.json["detection_limits"]["end_stop"]["smallest"] > 0.0
 
 
-def test_without_the_right_entry_a_law_of_the_angle_takes_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_right_entry_a_law_of_the_angle_takes_its_place(tmp_path: Path) -> None:
     _, bags = made(tmp_path, Concealed("end_stop"))
-    poorer = {key: entry for key, entry in CATALOGUE.items() if key != "end_stop"}
-    monkeypatch.setattr(fingerprint, "CATALOGUE", poorer)
-    result = diagnose_recordings([cut(recording, 70.0) for recording in thinned(bags)], load(VEHICLE))
+    result = ls.diagnose([cut(recording, 70.0) for recording in thinned(bags)], VEHICLE, without="end_stop")
+    assert "end_stop" not in result.json["detection_limits"]
+    assert registry.sought(registry.effect("end_stop"))  # by the next diagnosis again
     assert result.json["verdict"] == "unlisted_physics"
     assert result.json["effects"] == []
     (law,) = result.json["laws"]

@@ -13,6 +13,7 @@ from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, lef
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.sheet import at_bounds
 from lugre_steering.recording import Array
 
 TRUER = 0.5
@@ -20,10 +21,12 @@ TRUER = 0.5
 
 
 def room_for_laws(done: Finished) -> bool:
-    """Whether names leave so much that laws in their place could take clearly more than they do."""
-    there, named = done.compared, done.compared.found
+    """Whether names leave so much that laws in their place could take clearly more than they do, or recalibration goes beside them as
+    far as it may: then it makes up for what they are not."""
+    there, named, final = done.compared, done.compared.found, done.found.final
     rest = excess(there.problem, named.final, there.fitted)
-    return rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
+    stuck = at_bounds(done.problem, final.x, [calibration.name for calibration in done.problem.calibrations])
+    return bool(stuck) or rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
 
 
 def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool:
