@@ -33,7 +33,7 @@ def _command(place: Path) -> None:
     told = io.StringIO()
     try:
         with redirect_stderr(told), redirect_stdout(told):
-            code = cli.app(["diagnose", str(place / "no.mcap")], standalone_mode=False)
+            code = cli.app(["replay", str(place / "no.mcap")], standalone_mode=False)
     except (typer.BadParameter, typer.Abort) as error:
         raise LugreSteeringError(str(error)) from error
     if code:

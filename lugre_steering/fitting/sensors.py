@@ -32,11 +32,10 @@ def loop(pressure: Array, half_width: float) -> Array:
     return out
 
 
-def sensor_columns(problem: Problem) -> Array:
-    """Torque (n, k) [N m] of each at one standard deviation."""
-    columns = []
+def sensor_columns(problem: Problem) -> list[tuple[slice, Array]]:
+    """Torque [N m] of each at one standard deviation, and which samples it belongs to: it is zero elsewhere."""
+    columns: list[tuple[slice, Array]] = []
     for bag, run in enumerate(problem.runs):
-        part = slice(problem.edges[bag], problem.edges[bag + 1])
         rows = [CLOCK_S * np.gradient(run.measured, run.time)]
         if problem.vehicle.hydraulics is not None:
             span = problem.vehicle.sensors.pressure_range_Pa
@@ -44,10 +43,8 @@ def sensor_columns(problem: Problem) -> Array:
             for gain, pressure in zip(run.torque_per_line, run.pressure, strict=True):
                 rows.append(HYSTERESIS * span * gain * loop(np.ascontiguousarray(pressure), HYSTERESIS * span))
                 rows += [SETTLING * span * gain * np.exp(-elapsed / tau) for tau in SETTLING_S]
-        for row in rows:
-            columns.append(np.zeros(problem.measured.size))
-            columns[-1][part] = row
-    return np.column_stack(columns)
+        columns += [(slice(problem.edges[bag], problem.edges[bag + 1]), row) for row in rows]
+    return columns
 
 
 def beside_sensors(problem: Problem, residual: Array, weight: Array, weighted: Array) -> Array:
@@ -55,12 +52,15 @@ def beside_sensors(problem: Problem, residual: Array, weight: Array, weighted: A
 
     ``weight`` (n,) one over sigma where valid, ``weighted`` (n, p) the baseline's own columns times the weight of its fit.
     """
-    own = sensor_columns(problem) * weight[:, None]
+    own = sensor_columns(problem)
     norms = np.linalg.norm(weighted, axis=0)
-    free = weighted[:, norms > 0.0] / norms[norms > 0.0]
-    columns = np.hstack([own, free])
+    moves = norms > 0.0
+    columns = np.zeros((weight.size, len(own) + int(moves.sum())))  # filled in place: of a long recording it is the largest of all
+    for k, (part, row) in enumerate(own):
+        columns[part, k] = row * weight[part]
+    np.divide(weighted[:, moves], norms[moves], out=columns[:, len(own) :])
     target = residual * weight
     # The baseline is only moved along: its own part of the residual has been fitted already.
-    penalty = np.concatenate([np.ones(own.shape[1]), np.full(free.shape[1], 1e-3)])
+    penalty = np.concatenate([np.ones(len(own)), np.full(int(moves.sum()), 1e-3)])
     values = np.linalg.solve(columns.T @ columns + np.diag(penalty**2), columns.T @ target)
     return np.asarray(target - columns @ values)

@@ -24,7 +24,6 @@ from mcap.writer import Writer as McapWriter
 from lugre_steering.bag import Bag, BagWriter, Part, cdr, read_recording
 from lugre_steering.bag.compression import zstd_decompressor
 from lugre_steering.bag.mcap_records import records
-from lugre_steering.bench import fuzz, fuzz_bag
 from lugre_steering.errors import BagError
 
 LINE = ("/" + MAIN_A.topic, make.FLUID_PRESSURE)
@@ -370,18 +369,3 @@ def test_a_message_of_another_joint_on_the_topic_of_one_is_told(tmp_path: Path) 
     recording = read_recording(make.write(tmp_path / "run", messages), CHANNELS)
     assert recording.angle["left"].value.size == 8
     assert [f.finding for f in recording.findings] == ["foreign_joint"]
-
-
-def test_the_bench_tells_every_way_to_fail() -> None:
-    cases = [fuzz.Case(i, verdict, "", float(i), 100.0 * i) for i, verdict in enumerate([*fuzz.GOOD, *fuzz.FAULTS])]
-    board = fuzz.scoreboard(cases)
-    assert [board[verdict] for verdict in (*fuzz.GOOD, *fuzz.FAULTS)] == [1] * 7
-    assert (board["slowest_s"], board["peak_MB"], len(board["faults"])) == (6.0, 600.0, 5)
-
-
-def test_fuzzed_bags_are_read_or_refused(tmp_path: Path) -> None:
-    """The short form of ``python -m lugre_steering.bench fuzz bag``."""
-    fuzz_bag.corpus(tmp_path)
-    verdicts = {case: fuzz_bag.attempt(tmp_path, case) for case in range(10_000, 10_060)}
-    assert {case: v for case, v in verdicts.items() if v[0] not in fuzz.GOOD} == {}
-    assert {v[0] for v in verdicts.values()} == set(fuzz.GOOD)
