@@ -168,6 +168,15 @@ def test_staggered_angle_topics_still_pair(offset_ms: float) -> None:
     assert rejected(estimator) == {}
 
 
+@pytest.mark.parametrize("offset_ms", [30, 49])
+def test_staggered_sides_of_10_Hz_still_pair(offset_ms: int) -> None:
+    angles = [m for m in messages() if m[0] in (LEFT, RIGHT) and (m[1] - T0) // (10 * MS) % 10 == 0]
+    stream = [(k, stamp + offset_ms * MS * (k == RIGHT), *rest) for k, stamp, *rest in angles]
+    estimator, estimates, _ = feed(sorted(stream, key=lambda m: m[1]))
+    assert estimates.size >= len(angles) // 2 - 1
+    assert rejected(estimator) == {}
+
+
 def test_sides_at_different_rates() -> None:
     stream = [m for m in messages() if not (m[0] == RIGHT and (m[1] - T0) // (10 * MS) % 2)]
     estimator, estimates, _ = feed(stream)

@@ -46,7 +46,7 @@ BOUND_RMSE = 5.0
 
 @dataclass(frozen=True)
 class Options:
-    """Timing rules; the defaults suit sensors of 20 Hz and more."""
+    """Timing rules; the defaults suit sensors of 10 Hz and more."""
 
     pair_tolerance_s: float = quantity(0.0, 1.0, default=0.002)  # or half a sampling period, if that is more
     max_gap_s: float = quantity(0.001, 60.0, default=0.25)

@@ -78,7 +78,7 @@ NODE_TABLE = (
     NodeParameter("state_max_age_s", 86400.0, "an older state_file is not used [s]", 0.0, 1e8),
 )
 _MEANINGS = {
-    "pair_tolerance_s": "left and right stamps this close, or by half a sampling period up to 25 ms, are one instant [s]",
+    "pair_tolerance_s": "left and right stamps this close, or by half a sampling period up to 50 ms, are one instant [s]",
     "max_gap_s": "pressures are not interpolated across a longer gap [s]",
     "backward_jump_s": "a confirmed jump of all angles back in time this long is a restart [s]",
     "forward_jump_s": "a jump ahead this long must be confirmed [s]",

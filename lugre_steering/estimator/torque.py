@@ -26,7 +26,7 @@ from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
 from lugre_steering.estimator.release import release
 
-LONGEST_PERIOD_NS = 50_000_000  # of a sensor whose stamps may pair by half their period
+LONGEST_PERIOD_NS = 100_000_000  # of a sensor whose stamps may pair by half their period
 
 
 @inner
