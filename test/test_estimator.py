@@ -169,7 +169,7 @@ def test_staggered_angle_topics_still_pair(offset_ms: float) -> None:
 
 
 @pytest.mark.parametrize("offset_ms", [30, 49])
-def test_staggered_sides_of_10_Hz_still_pair(offset_ms: int) -> None:
+def test_staggered_sides_of_ten_hertz_still_pair(offset_ms: int) -> None:
     angles = [m for m in messages() if m[0] in (LEFT, RIGHT) and (m[1] - T0) // (10 * MS) % 10 == 0]
     stream = [(k, stamp + offset_ms * MS * (k == RIGHT), *rest) for k, stamp, *rest in angles]
     estimator, estimates, _ = feed(sorted(stream, key=lambda m: m[1]))
