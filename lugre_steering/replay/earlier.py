@@ -16,9 +16,7 @@ from lugre_steering.bag.find import REPLAYED
 from lugre_steering.bag.reader import bag_name
 from lugre_steering.errors import BagError
 from lugre_steering.files import is_ours, read_record, read_text
-from lugre_steering.recording import (
-    unused_name,
-)
+from lugre_steering.recording import unused_name
 from lugre_steering.replay.result import RECORD, SCHEMA
 
 

@@ -10,10 +10,7 @@ import numpy as np
 
 from lugre_steering.bag import BagWriter, Part, cdr
 from lugre_steering.chain.step import Records
-from lugre_steering.recording import (
-    NODE,
-    IntArray,
-)
+from lugre_steering.recording import NODE, IntArray
 from lugre_steering.vehicle import Vehicle
 
 PREFIX = f"/{NODE}"

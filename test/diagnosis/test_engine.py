@@ -57,6 +57,11 @@ def test_without_the_right_entry_a_law_of_the_angle_takes_its_place(tmp_path: Pa
     assert (before - after) / (before - noise) > 0.9
 
 
+def test_a_name_to_be_left_out_must_be_one() -> None:
+    with pytest.raises(ls.LugreSteeringError, match="did you mean 'end_stop'"):
+        ls.diagnose([], VEHICLE, without="end_stopp")
+
+
 def test_physics_outside_the_catalogue_is_unlisted(tmp_path: Path) -> None:
     _, bags = made(tmp_path, Concealed("gear_ripple"))
     result = diagnose_recordings(thinned(bags[:1]), load(VEHICLE))

@@ -123,17 +123,17 @@ class Screen:
         places = [np.concatenate(bags, axis=1) for bags in self.traces.axes.values()]
         rows = np.array([self.rows.plain_mean(place) for axis in places for place in (axis.mean(axis=0), np.ptp(axis, axis=0))]).T
         moved = rows[:, rows.std(axis=0) > 1e-9 * np.abs(rows).max(axis=0)]
-        along, size, _ = np.linalg.svd(stats.zscore(moved), full_matrices=False)
-        apart = along[:, size**2 > TOLD * float(np.sum(size**2))] * np.sqrt(len(rows))
+        along, extent, _ = np.linalg.svd(stats.zscore(moved), full_matrices=False)
+        apart = along[:, extent**2 > TOLD * float(np.sum(extent**2))] * np.sqrt(len(rows))
         own, nothing = self.errors[:, :1], np.zeros((len(rows), 0))
         unit = self.rows.mean(np.ones((self.rows.take.size, 1)))
-        high = float(np.sqrt(np.mean(own**2) / np.mean(unit**2)))
+        amplitude = float(np.sqrt(np.mean(own**2) / np.mean(unit**2)))
         rng = np.random.default_rng(seed)
         waves, phase = rng.standard_normal((apart.shape[1], FEATURES)), rng.uniform(0.0, 2.0 * np.pi, FEATURES)
 
         def left(reach: float, size: float) -> float:
             drawn = np.cos(apart @ waves / (reach * np.sqrt(apart.shape[1])) + phase) * np.sqrt(2.0 / FEATURES)
-            both = np.column_stack([self.nuisance, size * high * unit * drawn])
+            both = np.column_stack([self.nuisance, size * amplitude * unit * drawn])
             return float(_left(both, nothing, own, self.rows.fold, SMOOTHING[:1])[0])
 
         least = min(in_threads(lambda one: left(*one), list(product(REACHES, SIZES))))
