@@ -332,7 +332,7 @@ def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:
     estimator, totals = Estimator(VEHICLE), []
     for i, m in enumerate(messages()):
         if i == 1000:
-            estimator._core.state["z"][0] = math.nan
+            estimator._state["z"][0] = math.nan
         totals += [float(e["total"]) for e in estimator.push(*m)[0]]
     assert len(totals) == 600
     assert sum(math.isnan(total) for total in totals) == 1

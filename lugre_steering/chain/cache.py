@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import numba
-from numba.core import caching, dispatcher
+from numba.core import caching, ccallback, dispatcher
 
 _SEAL = hashlib.sha256
 _SEAL_BYTES = _SEAL().digest_size
@@ -161,7 +161,7 @@ def keep_safely() -> None:
         _tell(f"compiled code cannot be kept in {_folder() or 'any folder'}: every start compiles")
         return caching.NullCache()
 
-    dispatcher.FunctionCache = cache_of  # type: ignore[attr-defined]
+    ccallback.FunctionCache = dispatcher.FunctionCache = cache_of  # type: ignore[attr-defined]
 
 
 def _folder() -> str:

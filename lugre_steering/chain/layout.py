@@ -62,3 +62,7 @@ OUTPUT_FIELDS = (
     "z",  # bristle deflection [rad]
 )
 OUTPUT = np.dtype([(name, np.float64) for name in OUTPUT_FIELDS])
+BASELINE = np.dtype([(name, np.float64) for name in BASELINE_FIELDS])
+STATE = np.dtype([(name, np.float64) for name in STATE_FIELDS])
+LINE = np.dtype([("first", np.float64)])
+"""Records of all compositions begin with these; with what those of pressure lines begin depends on the effects."""

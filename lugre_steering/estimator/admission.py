@@ -9,6 +9,8 @@ import math
 import numpy as np
 
 from lugre_steering.chain.compiled import inner
+from lugre_steering.chain.doors import row
+from lugre_steering.chain.layout import STATE
 from lugre_steering.estimator.doubt import reachable
 from lugre_steering.estimator.layout import (
     ABSURD,
@@ -50,19 +52,21 @@ def _clear(ch):
 @inner
 def _begin_side(core, side):
     """Forget what one side has been through, but for the count of its steps outside the rubber table."""
-    saturated = core.state[side].saturated
-    core.state[side] = np.zeros_like(core.state)[side]
+    state = row(core.state, side, STATE)
+    saturated = state.saturated
+    for i in range(core.state.shape[1]):
+        core.state[side, i] = 0.0
     core.motion[side] = np.zeros_like(core.motion)[side]
     core.trust[side] = np.zeros_like(core.trust)[side]
     core.guard[side] = np.zeros_like(core.guard)[side]
-    core.state[side].saturated = saturated
+    state.saturated = saturated
     _clear(core.channels[side])
 
 
 @inner
 def restart(core, k):
     """Forget the past, except the counters; counted for channel ``k``, like the torques that still lack pressures."""
-    for side in range(core.state.size):  # slice assignment would compile for ten seconds more
+    for side in range(core.motion.size):  # slice assignment would compile for ten seconds more
         _begin_side(core, side)
     for i in range(core.channels.size):
         _clear(core.channels[i])
@@ -85,7 +89,7 @@ def _other_side(core, k, stamp_ns):
     A side without any sample yet (or without another) agrees.
     """
     near_ns = min(CONFIRM_NS, core.config[0].backward_jump_ns // 2)
-    for side in range(core.state.size):
+    for side in range(core.motion.size):
         other = core.channels[side]
         if side == k or other.last_ns == 0:
             continue

@@ -16,7 +16,8 @@ import math
 import numpy as np
 
 from lugre_steering.chain.compiled import inner
-from lugre_steering.chain.step import step
+from lugre_steering.chain.doors import call_step, copy_row, row
+from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.estimator.layout import ANGLE_JUMP
 from lugre_steering.estimator.preview import departs
 from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
@@ -177,7 +178,7 @@ def angle_doubts(core, side, dt, stamp_ns):
     found = 0
     if g.shadow_ns != 0:
         found |= JUMPED
-    if core.state.size > 1 and c.angle_noise > 0.0:
+    if core.motion.size > 1 and c.angle_noise > 0.0:
         _watch_other(core, side, dt, stamp_ns)
     if g.frozen:
         found |= FROZEN
@@ -193,15 +194,15 @@ def weigh_pressures(core, stamp_ns, measured):
     dt = (stamp_ns - c.swing_ns) * 1e-9
     c.swing_ns = stamp_ns
     stiffness, standing = 0.0, c.angle_noise > 0.0
-    for side in range(core.state.size):
-        stiffness += core.parameters[side].sigma_0
+    for side in range(core.motion.size):
+        stiffness += row(core.parameters, side, BASELINE).sigma_0
         standing = standing and still(core, side, stamp_ns)
     if not standing or dt <= 0.0:
         c.swing_from = measured
         return
     c.swing_from += (measured - c.swing_from) * min(1.0, dt / PRESSURE_MEMORY_S)
     if abs(measured - c.swing_from) > stiffness * UNSEEN_SIGMA * c.angle_noise:
-        for side in range(core.state.size):
+        for side in range(core.motion.size):
             _freeze(core, side)
 
 
@@ -246,17 +247,17 @@ def re_anchor(core, side, ch, stamp_ns, value):
 
     That it has, after it was frozen, and where the shadow can have got to.
     """
-    g, c, p, state, out = core.guard[side], core.config[0], core.parameters[side], core.state[side], core.output[side]
-    motion = core.motion[side]
+    g, c, out, motion = core.guard[side], core.config[0], core.output[side], core.motion[side]
+    p, state, trial = row(core.parameters, side, BASELINE), row(core.state, side, STATE), row(core.scratch_state, 0, STATE)
     ch.reasons[ANGLE_JUMP] += 1
     if g.shadow_ns == 0:
-        core.shadow[side] = state
+        copy_row(core.shadow, side, core.state, side)
         g.shadow_ns, g.shadow_angle = ch.last_ns, ch.last_value
         begin_ns = g.still_ns
         g.returned = g.frozen
     else:
         saturated = state.saturated
-        core.state[side] = core.shadow[side]
+        copy_row(core.state, side, core.shadow, side)
         state.saturated = saturated
         begin_ns = g.shadow_ns
         g.returned = reachable(core, side, begin_ns, stamp_ns, value - g.shadow_angle)
@@ -264,17 +265,17 @@ def re_anchor(core, side, ch, stamp_ns, value):
     passed = (stamp_ns - g.shadow_ns) * 1e-9
     if g.returned:
         rate = (value - g.shadow_angle) / ((stamp_ns - begin_ns) * 1e-9)
-        step(p, state, core.rubber, out, passed, value, rate, 0.0, c.effects)
+        call_step(c.step_door, p, state, core.rubber, out, passed, value, rate, 0.0, c.effects)
     else:
-        core.scratch_state[0] = state
-        step(p, core.scratch_state[0], core.rubber, core.scratch_output[0], 0.0, value, 0.0, 0.0, c.effects)
-        turned = core.scratch_state[0].theta - state.theta
+        copy_row(core.scratch_state, 0, core.state, side)
+        call_step(c.step_door, p, trial, core.rubber, core.scratch_output[0], 0.0, value, 0.0, 0.0, c.effects)
+        turned = trial.theta - state.theta
         state.theta += turned
         state.contact_angle += turned
-        step(p, state, core.rubber, out, passed, value, 0.0, 0.0, c.effects)
+        call_step(c.step_door, p, state, core.rubber, out, passed, value, 0.0, 0.0, c.effects)
     g.absurd = g.frozen = False
     _stand(g, stamp_ns, value)
-    for other in range(core.state.size):  # a jump is no motion
+    for other in range(core.motion.size):  # a jump is no motion
         core.guard[other].still_other, core.guard[other].apart = math.nan, 0
     g.before = g.bend = 0.0
     _stand_at(motion, value)
@@ -337,13 +338,13 @@ def standing_doubts(core, stamp_ns):
         large = c.estimate_square > (NOTABLE_SHARE * c.friction) ** 2 and level > LARGE_SHARE * smaller
         if large or c.beyond > 1.0 or _sudden(c):
             found |= RESIDUAL
-    for i in range(core.state.size, core.channels.size):
+    for i in range(core.motion.size, core.channels.size):
         if core.channels[i].kind == Kind.PRESSURE and line_frozen(core.channels[i]):
             found |= LINE
     if c.horizon > 0.0 and c.plan_size > 0:
         if stamp_ns >= core.plan_ns[c.plan_size - 1]:
             found |= PLAN_OUT
-        for side in range(core.state.size):
+        for side in range(core.motion.size):
             if departs(core, side, stamp_ns):
                 found |= PLAN_AWAY
     return found

@@ -8,12 +8,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from lugre_steering.chain.layout import OUTPUT
+from lugre_steering.chain.compose import Composition
+from lugre_steering.chain.doors import doors, row
+from lugre_steering.chain.layout import BASELINE, OUTPUT, STATE
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.effects.laws import slot
@@ -21,7 +23,18 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import JUMPED, REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD, watch_line
 from lugre_steering.estimator.known import known_range
-from lugre_steering.estimator.layout import CHANNEL, CONFIG, ESTIMATE, REASONS, RESIDUAL, RESTART, WAITING, Core
+from lugre_steering.estimator.layout import (
+    CHANNEL,
+    CONFIG,
+    ESTIMATE,
+    REASONS,
+    RESIDUAL,
+    RESTART,
+    WAITING,
+    Core,
+    records_of,
+    rows_of,
+)
 from lugre_steering.estimator.memory import Memory, hand_over, recall, remembered
 from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
@@ -83,9 +96,9 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
             n_estimates = advance(core, k, stamp_ns[i], value[i], rate[i], verdict == JUMPED, estimates, n_estimates)
         elif ch.kind == Kind.AIR_TEMPERATURE:
             ch.last_ns = stamp_ns[i]
-            for side in range(core.state.size):
-                core.state[side].air_temperature = value[i]
-                core.parameters[side].air_temperature = value[i]
+            for side in range(core.motion.size):
+                row(core.state, side, STATE).air_temperature = value[i]
+                row(core.parameters, side, BASELINE).air_temperature = value[i]
             continue
         else:
             line = ch.index
@@ -98,17 +111,23 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
     return n_estimates, n_residuals
 
 
+class Snapshot(NamedTuple):
+    """The state of an estimator, for one of the same model in the same process."""
+
+    model: str
+    arrays: list[np.ndarray[Any, Any]]
+
+
 class Estimator:
     """Steering-torque estimator of one vehicle; a thin owner of the compiled core."""
 
-    def __init__(self, vehicle: Vehicle | str | Path, options: Options | None = None, *, lean: bool = False) -> None:
-        """``vehicle``: one, or the path of its file; ``lean``: compiled for the effects of this file alone, which is faster in each
-        step and takes seconds once per set of them."""
-        self.vehicle, self.lean = (vehicle := vehicle_of(vehicle)), lean
+    def __init__(self, vehicle: Vehicle | str | Path, options: Options | None = None) -> None:
+        """``vehicle``: one, or the path of its file. The step is compiled for the effects of this file alone, once per set of them."""
+        self.vehicle = vehicle_of(vehicle)
         self.options = options or Options()
-        self.channels = vehicle.channels
-        self._first_line = len(vehicle.sides)
-        self._core = _new_core(vehicle, self.options, lean or not vehicle.effects)
+        self.channels = self.vehicle.channels
+        self._first_line = len(self.vehicle.sides)
+        self._composition, self._core = _new_core(self.vehicle, self.options)
         self._single = (np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1), np.empty(1))
         self._estimates = np.zeros(1, ESTIMATE)
         self._residuals = np.zeros(PENDING_RING, RESIDUAL)
@@ -151,7 +170,7 @@ class Estimator:
         low, high = RUBBER_DEGC
         if not low <= rubber_degC <= high:
             raise DataError(f"initial temperature: got {rubber_degC:g}, expected {low:g} to {high:g} degC")
-        self._core.parameters["rubber_temperature"] = rubber_degC
+        self._parameters["rubber_temperature"] = rubber_degC
 
     def set_plan(self, stamp_ns: IntArray, theta: Array) -> None:
         """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan.
@@ -192,9 +211,9 @@ class Estimator:
     def counters(self) -> Mapping[str, Mapping[str, int]]:
         """Accepted samples and rejected ones by reason, per channel name."""
         table: dict[str, dict[str, int]] = {}
-        for channel, row in zip(self.channels, self._core.channels, strict=True):
-            counts = {reason: int(n) for reason, n in zip(REASONS, row["reasons"], strict=True) if n}
-            table[_label(channel.kind, channel.name)] = {"accepted": int(row["accepted"]), **counts}
+        for channel, counted in zip(self.channels, self._core.channels, strict=True):
+            counts = {reason: int(n) for reason, n in zip(REASONS, counted["reasons"], strict=True) if n}
+            table[_label(channel.kind, channel.name)] = {"accepted": int(counted["accepted"]), **counts}
         return table
 
     @property
@@ -218,16 +237,16 @@ class Estimator:
     @property
     def saturated_steps(self) -> int:
         """Steps so far with a rubber temperature outside the rubber table."""
-        return int(self._core.state["saturated"].sum())
+        return int(self._state["saturated"].sum())
 
     @property
     def memory(self) -> Memory:
         """What the vehicle has been through: rubber temperatures, bristles, memories of effects."""
-        return remembered(self._core, self.vehicle.sides)
+        return remembered(self._core, self._composition, self.vehicle.sides)
 
     def resume(self, memory: Memory) -> None:
         """Begin with such a memory, before the first sample; ``DataError`` if it is of another model."""
-        recall(self._core, self.vehicle.sides, memory)
+        recall(self._core, self._composition, self.vehicle.sides, memory)
 
     def continued(self, vehicle: Vehicle) -> Estimator:
         """An estimator with the model of another file of this vehicle that goes on where this one is, no sample lost.
@@ -236,13 +255,13 @@ class Estimator:
         """
         if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
             raise DataError("it has other sides, topics or joints")
-        new = Estimator(vehicle, self.options, lean=self.lean)
-        hand_over(self._core, new._core)
+        new = Estimator(vehicle, self.options)
+        hand_over(self._core, self._composition, new._core, new._composition)
         return new
 
     def set_options(self, options: Options) -> None:
         """Go on with other options."""
-        _set_options(self._core.config, self._core.parameters, options)
+        _set_options(self._core.config, self._parameters, options)
         self.options = options
 
     def set_released(self, feed_forward: Sequence[float]) -> None:
@@ -254,19 +273,27 @@ class Estimator:
     def law_left_steps(self) -> Mapping[str, int]:
         """Steps so far with the coordinate of a law outside the range on which it was seen, by the law's place in the file; what
         was counted before a restart is forgotten."""
-        state = self._core.state
-        return {f"laws[{i}]": int(state[f"{slot(i).id}_outside"].sum()) for i in range(len(self.vehicle.laws))}
+        return {f"laws[{i}]": int(self._state[f"{slot(i).id}_outside"].sum()) for i in range(len(self.vehicle.laws))}
 
-    def snapshot(self) -> list[np.ndarray[Any, Any]]:
+    def snapshot(self) -> Snapshot:
         """A copy of the whole state, for ``restore``."""
-        return [array.copy() for array in self._core]
+        return Snapshot(self._composition.name, [array.copy() for array in self._core])
 
-    def restore(self, snapshot: list[np.ndarray[Any, Any]]) -> None:
+    def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of an estimator of the same vehicle; ``DataError``, and nothing changed, if it is of another."""
-        if [(a.dtype, a.shape) for a in self._core] != [(a.dtype, a.shape) for a in snapshot]:
+        shapes = [array.shape for array in self._core]
+        if snapshot.model != self._composition.name or shapes != [array.shape for array in snapshot.arrays]:
             raise DataError("it is not the snapshot of this model")
-        for array, saved in zip(self._core, snapshot, strict=True):
+        for array, saved in zip(self._core, snapshot.arrays, strict=True):
             array[...] = saved
+
+    @property
+    def _parameters(self) -> Records:
+        return records_of(self._core.parameters, self._composition.parameters)
+
+    @property
+    def _state(self) -> Records:
+        return records_of(self._core.state, self._composition.state)
 
 
 def doubts(row: Records) -> list[str]:
@@ -303,6 +330,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["lag"] = lag_s(vehicle)
     config["effects"] = any(has_effects(p) for p in model.parameters)
     config["message"] = -1
+    config["step_door"], config["arm_door"], config["line_door"] = doors(model.composition)
     config["friction"] = sum(float(p["static_torque"][0]) for p in model.parameters)
     config["weight"] = 1.0
     known = known_range(vehicle)
@@ -314,12 +342,12 @@ def _channel_rows(vehicle: Vehicle) -> tuple[Records, int]:
     """A row for each channel, and the number of lines among them (a torque sensor counts as one)."""
     rows = np.zeros(len(vehicle.channels), CHANNEL)
     lines = 0
-    for row, channel in zip(rows, vehicle.channels, strict=True):
-        row["kind"] = int(channel.kind)
+    for i, channel in enumerate(vehicle.channels):
+        rows[i]["kind"] = int(channel.kind)
         if channel.kind is Kind.ANGLE:
-            row["index"] = vehicle.sides.index(channel.name)
+            rows[i]["index"] = vehicle.sides.index(channel.name)
         elif channel.kind in (Kind.PRESSURE, Kind.TORQUE):
-            row["index"] = lines
+            rows[i]["index"] = lines
             lines += 1
     return rows, lines
 
@@ -332,23 +360,26 @@ def _cylinders(vehicle: Vehicle) -> tuple[Array, Array, IntArray]:
     return table.geometry, table.areas, table.lines
 
 
-def _new_core(vehicle: Vehicle, options: Options, lean: bool) -> Core:
-    model = build_model(vehicle, lean=lean)
+def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
+    """The composition of a vehicle's effects, and the core that runs it."""
+    model = build_model(vehicle, lean=True)
+    composition = model.composition
     sides = len(vehicle.sides)
     config, parameters = _config(vehicle, model), np.concatenate(model.parameters)
     _set_options(config, parameters, options)
     channels, lines = _channel_rows(vehicle)
     geometry, areas, line_index = _cylinders(vehicle)
-    return Core(
+    line_parameters = model.lines if vehicle.hydraulics is not None else np.zeros(lines, composition.lines)
+    return composition, Core(
         config=config,
         channels=channels,
-        parameters=parameters,
-        line_parameters=model.lines if vehicle.hydraulics is not None else np.zeros(lines, model.composition.lines),
-        state=np.zeros(sides, model.composition.state),
+        parameters=rows_of(parameters),
+        line_parameters=rows_of(line_parameters),
+        state=rows_of(np.zeros(sides, composition.state)),
         motion=np.zeros(sides, MOTION),
         trust=np.zeros(sides, TRUST),
         guard=np.zeros(sides, GUARD),
-        shadow=np.zeros(sides, model.composition.state),
+        shadow=rows_of(np.zeros(sides, composition.state)),
         released=np.zeros(sides),
         output=np.zeros(sides, OUTPUT),
         waiting=np.zeros((sides, WAITING_RING), WAITING),
@@ -362,6 +393,6 @@ def _new_core(vehicle: Vehicle, options: Options, lean: bool) -> Core:
         plan_ns=np.zeros(PLAN_POINTS, np.int64),
         plan_theta=np.zeros((sides, PLAN_POINTS)),
         scratch_value=np.zeros(lines),
-        scratch_state=np.zeros(1, model.composition.state),
+        scratch_state=rows_of(np.zeros(1, composition.state)),
         scratch_output=np.zeros(1, OUTPUT),
     )

@@ -60,6 +60,9 @@ CONFIG = np.dtype(
         ("pending_count", np.int64),
         ("plan_size", np.int64),
         ("effects", np.bool_),
+        ("step_door", np.int64),  # see ``chain.doors``
+        ("arm_door", np.int64),
+        ("line_door", np.int64),
         ("swing_ns", np.int64),  # stamp of the last measured torque
         ("swing_from", np.float64),  # measured torque of late, followed slowly while the angles stand still [N m]
         ("residual_ns", np.int64),  # stamp of the last residual
@@ -116,18 +119,31 @@ WAITING = np.dtype(
 )
 
 
+def rows_of(records: Records) -> Array:
+    """Records of numbers (n,) -> the same numbers (n, fields)."""
+    return records.view(np.float64).reshape(records.size, records.dtype.itemsize // 8)
+
+
+def records_of(rows: Array, kind: np.dtype[np.void]) -> Records:
+    """The same numbers (n, fields) as records (n,) of that kind."""
+    return rows.view(kind)[:, 0]
+
+
 class Core(NamedTuple):
-    """Everything the compiled loop reads and writes; arrays only, so that it can be copied and restored."""
+    """Everything the compiled loop reads and writes; arrays only, so that it can be copied and restored.
+
+    Of parameters and states it holds rows of numbers, which alone know nothing of the effects: ``chain.doors``.
+    """
 
     config: Records
     channels: Records
-    parameters: Records
-    line_parameters: Records
-    state: Records
+    parameters: Array
+    line_parameters: Array
+    state: Array
     motion: Records
     trust: Records
     guard: Records
-    shadow: Records
+    shadow: Array
     released: Array
     output: Records
     waiting: Records
@@ -141,5 +157,5 @@ class Core(NamedTuple):
     plan_ns: IntArray
     plan_theta: Array
     scratch_value: Array
-    scratch_state: Records
+    scratch_state: Array
     scratch_output: Records

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from lugre_steering.chain.compose import composition_of, name_of
+from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
-from lugre_steering.estimator.layout import Core
+from lugre_steering.estimator.layout import Core, records_of
 
 Memory = Mapping[str, Any]
 """Per side ``stamp_ns`` and ``angle`` [rad] of its last sample, the records ``state`` and ``motion``; JSON can hold it."""
 
+_STATES = ("state", "shadow")
 _HANDED_OVER = (
-    "state", "motion", "trust", "guard", "shadow", "output", "waiting", "pending", "line_ns", "line_value", "plan_ns",
-    "plan_theta", "released",
+    "motion", "trust", "guard", "output", "waiting", "pending", "line_ns", "line_value", "plan_ns", "plan_theta", "released",
 )  # fmt: skip
 _ONGOING = (
     "start_ns", "lagged", "lag_input", "lagged_ns", "pending_first", "pending_count", "plan_size", "swing_ns", "swing_from",
@@ -28,16 +28,17 @@ _ONGOING = (
 )  # fmt: skip
 
 
-def remembered(core: Core, sides: Sequence[str]) -> Memory:
+def remembered(core: Core, composition: Composition, sides: Sequence[str]) -> Memory:
     """The memory of each side that has begun; of one in doubt, the state that is trusted."""
     table: dict[str, Any] = {}
+    states, shadows = (records_of(getattr(core, name), composition.state) for name in _STATES)
     for i, side in enumerate(sides):
         channel, guard = core.channels[i], core.guard[i]
-        if core.state[i]["started"] == 0.0:
+        if states[i]["started"] == 0.0:
             continue
         doubted = guard["shadow_ns"] != 0
         stamp_ns, angle = (guard["shadow_ns"], guard["shadow_angle"]) if doubted else (channel["last_ns"], channel["last_value"])
-        state = core.shadow[i] if doubted else core.state[i]
+        state = shadows[i] if doubted else states[i]
         table[side] = {
             "stamp_ns": int(stamp_ns), "angle": float(angle), "fastest": float(guard["fastest"]),
             "state": _plain(state), "motion": _plain(core.motion[i]),
@@ -45,41 +46,42 @@ def remembered(core: Core, sides: Sequence[str]) -> Memory:
     return {"start_ns": int(core.config[0]["start_ns"]), "sides": table}
 
 
-def recall(core: Core, sides: Sequence[str], memory: Memory) -> None:
+def recall(core: Core, composition: Composition, sides: Sequence[str], memory: Memory) -> None:
     """Go on from there: the next sample of a side finds it as long ago as its stamp says, cooled and turned meanwhile.
 
     ``DataError``, and nothing changed, if the memory is not of this model.
     """
+    states = records_of(core.state, composition.state)
     try:
         rows = [(i, memory["sides"][side]) for i, side in enumerate(sides) if side in memory["sides"]]
-        records = [(_record(core.state, row["state"]), _record(core.motion, row["motion"])) for _, row in rows]
+        records = [(_record(states, row["state"]), _record(core.motion, row["motion"])) for _, row in rows]
         last = [(int(row["stamp_ns"]), float(row["angle"]), float(row["fastest"])) for _, row in rows]
         start_ns = int(memory["start_ns"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(f"it is not the memory of this model ({error})") from error
     core.config["start_ns"] = start_ns
     for (i, _), (state, motion), (stamp_ns, angle, fastest) in zip(rows, records, last, strict=True):
-        core.state[i], core.motion[i] = state, motion
+        states[i], core.motion[i] = state, motion
         core.guard[i]["fastest"] = fastest
         core.guard[i]["still_ns"] = stamp_ns
         core.channels[i]["last_ns"], core.channels[i]["last_value"] = stamp_ns, angle
 
 
-def hand_over(old: Core, new: Core) -> None:
+def hand_over(old: Core, old_composition: Composition, new: Core, composition: Composition) -> None:
     """Everything that samples have made of the old core, into one of the same channels and another model."""
     for name in _HANDED_OVER:
-        source, target = getattr(old, name), getattr(new, name)
-        for field in target.dtype.names or (None,):
-            if field is None:
-                target[...] = source
-            elif field in source.dtype.names:
-                target[field] = source[field]
+        getattr(new, name)[...] = getattr(old, name)
     new.channels[...] = old.channels
-    composition = composition_of(name_of(new.parameters.dtype.names or ()))
-    for field, start in composition.starts.items():  # physics that is new begins as at the start of a recording
-        if field not in (old.state.dtype.names or ()):
-            for state in (new.state, new.shadow):
-                state[field] = new.parameters[start] if isinstance(start, str) else start
+    parameters = records_of(new.parameters, composition.parameters)
+    known = old_composition.state.names or ()
+    for name in _STATES:
+        source, target = records_of(getattr(old, name), old_composition.state), records_of(getattr(new, name), composition.state)
+        for field in composition.state.names or ():
+            if field in known:
+                target[field] = source[field]
+            elif field in composition.starts:  # physics that is new begins as at the start of a recording
+                start = composition.starts[field]
+                target[field] = parameters[start] if isinstance(start, str) else start
     for field in _ONGOING:
         new.config[field] = old.config[field]
 

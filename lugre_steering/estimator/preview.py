@@ -9,7 +9,8 @@ import math
 import numpy as np
 
 from lugre_steering.chain.compiled import inner
-from lugre_steering.chain.step import step
+from lugre_steering.chain.doors import call_step, copy_row, row
+from lugre_steering.chain.layout import BASELINE, STATE
 
 PREVIEW_STEPS = 20
 BEND_NS = 50_000_000
@@ -61,7 +62,8 @@ def preview(core, side, stamp_ns):
         return core.output[side].torque
     planning = c.plan_size > 0 and stamp_ns < core.plan_ns[c.plan_size - 1] and not departs(core, side, stamp_ns)
     alpha = 0.0
-    core.scratch_state[0] = core.state[side]
+    copy_row(core.scratch_state, 0, core.state, side)
+    p, state, out = row(core.parameters, side, BASELINE), row(core.scratch_state, 0, STATE), core.scratch_output[0]
     dt = c.horizon / PREVIEW_STEPS
     theta = motion.theta
     for i in range(1, PREVIEW_STEPS + 1):
@@ -71,16 +73,6 @@ def preview(core, side, stamp_ns):
             alpha = _planned_acceleration(core, side, at_ns)
         target = theta + motion.omega * dt if math.isnan(planned) else planned
         omega = (target - theta) / dt
-        step(
-            core.parameters[side],
-            core.scratch_state[0],
-            core.rubber,
-            core.scratch_output[0],
-            dt,
-            target,
-            omega,
-            alpha,
-            c.effects,
-        )
+        call_step(c.step_door, p, state, core.rubber, out, dt, target, omega, alpha, c.effects)
         theta = target
-    return core.scratch_output[0].torque
+    return out.torque

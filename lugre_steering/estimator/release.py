@@ -28,7 +28,7 @@ def release(core, e):
         c.weight = max(0.0, c.weight - change) if e.doubts != 0 else min(1.0, c.weight + change)
     elif e.doubts != 0:
         c.weight = 0.0
-    for side in range(core.state.size):
+    for side in range(core.motion.size):
         wanted = max(-c.limit, min(c.limit, c.weight * e.feed_forward[side]))
         if not first and math.isfinite(wanted):
             reach, last = c.rate_limit * dt, core.released[side]

@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 from lugre_steering.chain.compiled import inner
+from lugre_steering.chain.doors import call_number, row
 from lugre_steering.chain.hydraulics import moment_arm
-from lugre_steering.chain.step import arm_factor, line_error
+from lugre_steering.chain.layout import BASELINE, LINE
 from lugre_steering.estimator.doubt import weigh_pressures, weigh_residual
 
 
@@ -26,7 +27,7 @@ def measured_torque(core, e, value):
         if core.lines[i, 1] >= 0:
             force -= value[core.lines[i, 1]] * core.areas[i, 1]
         arm = moment_arm(theta, core.geometry[i, 1], core.geometry[i, 2], core.geometry[i, 3], core.geometry[i, 4])
-        torque += force * arm * arm_factor(core.parameters[side], theta)
+        torque += force * arm * call_number(c.arm_door, row(core.parameters, side, BASELINE), theta)
     return torque * c.pressure_gain
 
 
@@ -62,7 +63,8 @@ def form_residuals(core, first_line, residuals, count):
                 before_ns = core.line_ns[line, (cursor - 1) % ring]
                 before = core.line_value[line, (cursor - 1) % ring]
                 p = before + (after - before) * ((at_ns - before_ns) / (after_ns - before_ns))
-            value[line] = p - c.gauge_offset - line_error(core.line_parameters[line], (at_ns - c.start_ns) * 1e-9)
+            elapsed = (at_ns - c.start_ns) * 1e-9
+            value[line] = p - c.gauge_offset - call_number(c.line_door, row(core.line_parameters, line, LINE), elapsed)
         c.pending_first = (c.pending_first + 1) % core.pending.size
         c.pending_count -= 1
         if not usable:

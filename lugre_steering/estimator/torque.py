@@ -7,9 +7,10 @@ from __future__ import annotations
 import math
 
 from lugre_steering.chain.compiled import inner
+from lugre_steering.chain.doors import call_step, row
 from lugre_steering.chain.lag import lag_weights
+from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.chain.rates import follow
-from lugre_steering.chain.step import step
 from lugre_steering.estimator.admission import restart
 from lugre_steering.estimator.doubt import (
     RANGE,
@@ -145,7 +146,7 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     """
     c, ch = core.config[0], core.channels[k]
     side = ch.index
-    state, motion, output = core.state[side], core.motion[side], core.output[side]
+    state, motion, output = row(core.state, side, STATE), core.motion[side], core.output[side]
     saturated = state.saturated
     dt = _elapsed(c, ch, state, stamp_ns)
     if jumped:
@@ -157,8 +158,8 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
         before = motion.theta if motion.started != 0.0 else value
         follow(motion, dt, value, rate, noise_of(core, side))
         rates.travel += abs(motion.theta - before)
-        p = core.parameters[side]
-        step(p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
+        p = row(core.parameters, side, BASELINE)
+        call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)
     ch.last_ns = stamp_ns
     ch.last_value = value

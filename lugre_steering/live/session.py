@@ -46,7 +46,7 @@ class Session:
         self.settings, self.vehicle, self.active = settings, vehicle, False
         tell_compiling(node.get_logger().info)
         warm_up(vehicle, settings.options)
-        self.estimator = Estimator(vehicle, settings.options, lean=True)
+        self.estimator = Estimator(vehicle, settings.options)
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
         self.outputs = Outputs(node, vehicle, settings)
         self.watch = Watch(vehicle)
@@ -220,7 +220,7 @@ class Session:
 def warm_up(vehicle: Vehicle, options: Options) -> None:
     """Compile, or load from the cache, everything that callbacks call, on an estimator that is then thrown away."""
     detector.warm_up()
-    estimator = Estimator(vehicle, options, lean=True)
+    estimator = Estimator(vehicle, options)
     for step in range(1, 200):
         stamp_ns = 1_000_000_000 + step * 10_000_000
         if step == 100:
