@@ -53,6 +53,8 @@ OFF, SEVERAL = 0.03, 1.1
 TIED = 1.1
 """Cost over the lowest up to which a hypothesis is as good."""
 SHOWN = 5
+SAME_SIZE = 0.1
+"""Share by which torques differ that are told to be of one size."""
 LOAD = SheetValue("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
 LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
@@ -105,8 +107,15 @@ class WrongSheet:
     @property
     def statement(self) -> str:
         check = ", ".join(suspect.words for suspect in self.suspects[:3])
-        said = f"measured torque is {self.times:.2g} times what this sheet can give" if self.why is None else self.why
-        return f"{said}; check {check}"
+        return f"{self._said}; check {check}"
+
+    @property
+    def _said(self) -> str:
+        if self.why is not None:
+            return self.why
+        if abs(self.times - 1.0) < SAME_SIZE:
+            return "friction or stiffness would have to be off by more than nominal values are"
+        return f"measured torque is {self.times:.2g} times what this sheet can give"
 
     def finding(self) -> SheetFinding:
         """As an entry of ``data_quality``."""

@@ -31,6 +31,8 @@ MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
 """Most names, most rivals told of one, and how many of the best fingerprints are tried in place of what every joint has."""
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
+REST = 0.1
+"""Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -39,7 +41,8 @@ BENT = 0.3
 class Found:
     """An accepted effect: its screen score, its rivals that fit as well, the trials of its round and the energy [noise variances] it took.
 
-    ``given``: it is what every joint may have, and was not looked for.
+    ``given``: it is what every joint may have, and was not looked for. ``in_place``: small changes of the friction law's form would
+    explain as much, all of them together.
     """
 
     score: Score
@@ -47,6 +50,7 @@ class Found:
     trials: tuple[Trial, ...]
     gain: float
     given: bool = False
+    in_place: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,12 +84,19 @@ def search(
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
         there, best = clearest(weight, seen)
         stands = sum(item.gain for item in found[given:])
+        simple = None if further else _in_place_of_form(seen, weight)
         nothing = not best.effects[len(current.effects) :]
-        if nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands):
+        hopeless = nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands)
+        if hopeless and simple is None:
             break
-        progress(f"a closer look at {best.effects[-1][0].label}")
-        there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
-        short = one.gain < needed(there, best, weight, stands)
+        short = hopeless
+        if not hopeless:
+            progress(f"a closer look at {best.effects[-1][0].label}")
+            there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
+            short = one.gain < needed(there, best, weight, stands)
+        if short and simple is not None:
+            problem, baseline, short = simple.problem, simple.current, False
+            there, best, one = _simplest(simple, weight, split)
         if short and (waiting or len(found) + 1 == given + MAX_EFFECTS):
             break
         both = [*found, one]
@@ -100,7 +111,8 @@ def search(
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
             found[i] = _told(item, _rivals(now, noise, weight, split, current, item, i))
-    problem, baseline = settled(problem, weight, baseline, now.doubt)
+    if not any(item.in_place for item in found):
+        problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
     if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
         rest = current.effects[:given]
@@ -132,8 +144,31 @@ def _closest(
     rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
     chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
     there, best = settled(own.problem, weight, chosen.fit)
-    names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
-    return there, best, Found(chosen.score, names, tuple(own.trials), _taken(there, weight, current, best))
+    return there, best, Found(chosen.score, _names(rivals), tuple(own.trials), _taken(there, weight, current, best))
+
+
+def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
+    """The round without freedoms, if one name does there nearly all that the freedoms do without it."""
+    free, exact = seen[0], seen[-1]
+    if free is exact or not exact.trials:
+        return None
+    best = exact.trials[0]
+    if exact.before - best.cost < needed(exact.problem, best.fit, weight):
+        return None
+    return exact if best.cost - free.before < REST * (exact.before - free.before) else None
+
+
+def _simplest(exact: Proposal, weight: Array, split: Split) -> tuple[Problem, Fit, Found]:
+    """Of the names that do what the freedoms do the simplest that ties, without them."""
+    own = closer(exact.problem, weight, [exact])
+    rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
+    chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
+    found = Found(chosen.score, _names(rivals), tuple(own.trials), own.before - chosen.cost, in_place=True)
+    return own.problem, chosen.fit, found
+
+
+def _names(rivals: Sequence[Trial]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
 
 
 def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
