@@ -14,7 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lugre_steering.diagnosis.search import flexible
-from lugre_steering.diagnosis.search.compare import clearest, foreign, left, needed, settled, simplest, tied, worlds
+from lugre_steering.diagnosis.search.compare import (
+    clearest,
+    foreign,
+    left,
+    may_differ,
+    needed,
+    settled,
+    simplest,
+    tied,
+    worlds,
+)
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
 from lugre_steering.fitting import rig
@@ -83,7 +93,7 @@ def search(
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
         there, best = clearest(weight, seen)
-        stands = sum(item.gain for item in found[given:])
+        stands = may_differ(now, current, given)
         simple = None if further else _in_place_of_form(seen, weight)
         nothing = not best.effects[len(current.effects) :]
         hopeless = nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands)
