@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,29 +93,17 @@ def search(
         further = len(found) > given
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
-        there, best = clearest(weight, seen)
-        stands = may_differ(now, current, given)
-        simple = None if further else _in_place_of_form(seen, weight)
-        nothing = not best.effects[len(current.effects) :]
-        hopeless = nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands)
-        if hopeless and simple is None:
+        step = _step(seen, now, current, given, weight, split, progress)
+        if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
             break
-        short = hopeless
-        if not hopeless:
-            progress(f"a closer look at {best.effects[-1][0].label}")
-            there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
-            short = one.gain < needed(there, best, weight, stands)
-        if short and simple is not None:
-            problem, baseline, short = simple.problem, simple.current, False
-            there, best, one = _simplest(simple, weight, split)
-        if short and (waiting or len(found) + 1 == given + MAX_EFFECTS):
-            break
-        both = [*found, one]
-        found, current = (both, best) if short else _pruned(there, weight, both, best)
+        there, both = step.problem, [*found, step.name]
+        if step.instead is not None:
+            problem, baseline = step.instead.problem, step.instead.current
+        found, current = (both, step.fit) if step.short else _pruned(there, weight, both, step.fit)
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
         if waiting and len(found) < len(both):
             break
-        waiting = short  # what another one keeps in doubt may stand beside that one
+        waiting = step.short  # what another one keeps in doubt may stand beside that one
         if not waiting:
             sure = found, now, current
     found, now, current = sure
@@ -130,6 +119,35 @@ def search(
         found = found[:given]
     more = np.zeros(now.nuisances - baseline.x.size)
     return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), pattern)
+
+
+class _Step(NamedTuple):
+    """A name that may come next, in its problem and fit; whether it is ``short`` of what it needs; and the round without freedoms if it
+    stands there ``instead`` of them."""
+
+    problem: Problem
+    fit: Fit
+    name: Found
+    short: bool
+    instead: Proposal | None = None
+
+
+def _step(
+    seen: Sequence[Proposal], now: Problem, current: Fit, given: int, weight: Array, split: Split, progress: Callable[[str], None]
+) -> _Step | None:
+    """The best of what is proposed beside ``current``, unless it takes far too little."""
+    there, best = clearest(weight, seen)
+    further, stands = len(seen[0].current.effects) > given, may_differ(now, current, given)
+    instead = None if further else _in_place_of_form(seen, weight)
+    named = bool(best.effects[len(current.effects) :])
+    step = None
+    if named and _taken(there, weight, current, best) >= HOPELESS * needed(there, best, weight, stands):
+        progress(f"a closer look at {best.effects[-1][0].label}")
+        there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
+        step = _Step(there, best, one, one.gain < needed(there, best, weight, stands))
+    if instead is not None and (step is None or step.short):
+        step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
+    return step
 
 
 def _given(
