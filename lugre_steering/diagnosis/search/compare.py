@@ -30,8 +30,8 @@ SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
-TAKEN_OF_MEMORY = 0.06
-"""What FORM_TAKEN is of names that remember: how rubber, oil and sensors forget is known less well than how they act."""
+TAKEN_OF_SETTLING = 0.06
+"""What FORM_TAKEN is of names that settle with time: how rubber, oil and sensors do is known less well than how they act."""
 ROUNDS, ALIKE = 3, 0.1
 """Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -115,15 +115,23 @@ def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) ->
     return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + stands + own
 
 
-def may_differ(problem: Problem, result: Fit, first: int) -> float:
-    """Energy that another form of the names from ``first`` on may make: shares of what their torques do beyond a recalibration."""
-    shares = [TAKEN_OF_MEMORY if _remembers(candidate.effect) else FORM_TAKEN for candidate, _ in result.effects]
-    does = (beyond_calibration(problem, result, contribution(problem, result, i)) for i in range(first, len(shares)))
-    return sum(share * energy for share, energy in zip(shares[first:], does, strict=True))
+def may_differ(problem: Problem, result: Fit, gains: Sequence[float]) -> float:
+    """Energy that another form of the last names of ``result`` may make; ``gains``: what each of them took.
+
+    Shares of these, as beside a name its own law may bend along its coordinate; and where time is that, of all that its torque does
+    beyond a recalibration.
+    """
+    first, found = len(result.effects) - len(gains), 0.0
+    for i, gain in enumerate(gains, first):
+        if _settles(result.effects[i][0].effect):
+            found += TAKEN_OF_SETTLING * beyond_calibration(problem, result, contribution(problem, result, i))
+        else:
+            found += FORM_TAKEN * gain
+    return found
 
 
-def _remembers(effect: Effect) -> bool:
-    return bool(effect.memory) or "lag" in effect.hooks
+def _settles(effect: Effect) -> bool:
+    return effect.coordinate == "dwell" or "lag" in effect.hooks
 
 
 def tied(

@@ -93,7 +93,8 @@ def search(
         further = len(found) > given
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
-        step = _step(seen, now, current, given, weight, split, progress)
+        stands = may_differ(now, current, [item.gain for item in found[given:]])
+        step = _step(seen, current, stands, weight, split, progress)
         if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
             break
         there, both = step.problem, [*found, step.name]
@@ -133,11 +134,11 @@ class _Step(NamedTuple):
 
 
 def _step(
-    seen: Sequence[Proposal], now: Problem, current: Fit, given: int, weight: Array, split: Split, progress: Callable[[str], None]
+    seen: Sequence[Proposal], current: Fit, stands: float, weight: Array, split: Split, progress: Callable[[str], None]
 ) -> _Step | None:
-    """The best of what is proposed beside ``current``, unless it takes far too little."""
+    """The best of what is proposed beside ``current``, unless it takes far too little; ``stands``: ``may_differ`` of names there."""
     there, best = clearest(weight, seen)
-    further, stands = len(seen[0].current.effects) > given, may_differ(now, current, given)
+    further = stands > 0.0
     instead = None if further else _in_place_of_form(seen, weight)
     named = bool(best.effects[len(current.effects) :])
     step = None
