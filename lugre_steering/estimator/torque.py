@@ -21,6 +21,7 @@ from lugre_steering.estimator.doubt import (
     standing_doubts,
     trust,
     watch,
+    watch_leap,
 )
 from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
@@ -154,6 +155,7 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     else:
         rates = core.trust[side]
         rate = believed(rates, ch, c, dt, value, rate)
+        watch_leap(core, side, ch, dt, value)
         watch(core, side, ch, dt, value)
         before = motion.theta if motion.started != 0.0 else value
         follow(motion, dt, value, rate, noise_of(core, side))
