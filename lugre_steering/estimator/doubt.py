@@ -237,7 +237,6 @@ def _leap_limit(core, side, dt):
 def watch_leap(core, side, ch, dt, value):
     """Keep the state before a reading [rad] that departs from the motion so far: the next one tells whether it was a jump."""
     g = core.guard[side]
-    g.leap_ns = 0
     if dt <= 0.0 or ch.head < 2:
         return
     if abs(value - ch.last_value - core.motion[side].omega * dt) > _leap_limit(core, side, dt):
