@@ -179,7 +179,10 @@ def output_folder(out: Path) -> Iterator[Path]:
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         out.mkdir(parents=True, exist_ok=True)
-        descriptor = _locked(out)
+        descriptor = lock_file(out / _LOCK)
+    except HeldError as error:
+        message = f"{out}: process {error.process} is writing its results there; wait for its end, or choose another --out"
+        raise DataError(message) from None
     except OSError as error:
         _take_away_empty(made)
         raise DataError(f"{out}: cannot be written ({error.strerror or error}); expected a writable folder") from error
@@ -187,10 +190,10 @@ def output_folder(out: Path) -> Iterator[Path]:
         _clear_dead(out)
         yield out
     except BaseException:
-        _unlock(out, descriptor)
+        unlock_file(out / _LOCK, descriptor)
         _take_away_empty(made)
         raise
-    _unlock(out, descriptor)
+    unlock_file(out / _LOCK, descriptor)
 
 
 def _take_away_empty(folders: Iterable[Path]) -> None:
@@ -200,21 +203,31 @@ def _take_away_empty(folders: Iterable[Path]) -> None:
             folder.rmdir()
 
 
-def _locked(out: Path) -> int:
-    """Descriptor of the folder's lock file, which names this process."""
-    file = out / _LOCK
+class HeldError(DataError):
+    """Another process holds a lock file."""
+
+    def __init__(self, file: Path, process: str) -> None:
+        super().__init__(f"{file}: process {process} holds it")
+        self.process = process
+
+
+def lock_file(file: Path) -> int:
+    """Descriptor of a lock file, made if it is not there, which names this process; ours until ``unlock_file`` or the process' end.
+
+    ``HeldError`` if another has it, ``DataError`` if it is no lock file, ``OSError``.
+    """
     while True:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
         opened = os.fstat(descriptor)
         if not stat.S_ISREG(opened.st_mode) or opened.st_nlink > 1:  # laid out by somebody else
             os.close(descriptor)
-            raise DataError(f"{file}: is not a file of ours; remove it, or choose another --out")
+            raise DataError(f"{file}: is not a lock file of ours; remove it, or choose another folder")
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             process = os.read(descriptor, 20).decode(errors="replace").strip() or "another"
             os.close(descriptor)
-            raise DataError(f"{out}: process {process} is writing its results there; wait for its end, or choose another --out") from None
+            raise HeldError(file, process) from None
         except OSError:  # a file system without locks
             return descriptor
         with suppress(FileNotFoundError):
@@ -225,9 +238,10 @@ def _locked(out: Path) -> int:
         os.close(descriptor)
 
 
-def _unlock(out: Path, descriptor: int) -> None:
+def unlock_file(file: Path, descriptor: int) -> None:
+    """Let others have what ``lock_file`` gave."""
     with suppress(OSError):
-        (out / _LOCK).unlink()
+        file.unlink()
     os.close(descriptor)
 
 

@@ -140,6 +140,35 @@ def test_a_jump_that_two_periods_would_allow_is_no_slip(rate_Hz: int, jump: floa
     assert np.abs(rows["temperature"][i] - sound["temperature"][j]).max() < 0.1
 
 
+@pytest.mark.parametrize("samples", [1, 2, 5])
+@pytest.mark.parametrize(("rate_Hz", "jump"), [(10, 0.3), (20, -0.08), (50, 0.05), (100, 0.02), (100, -0.09), (500, 0.015)])
+def test_a_step_that_the_joint_could_make_is_no_slip_if_its_neighbours_do_not_move_like_that(
+    rate_Hz: int, jump: float, samples: int
+) -> None:
+    """One reading of each step is believed, in doubt, and nothing of it is left."""
+    begin, end = 6.0, 6.0 + samples / rate_Hz
+    _, sound = push_both(rate_Hz, lambda _side, _t, angle: angle)
+    estimator, rows = push_both(
+        rate_Hz, lambda side, t, angle: angle + jump if side == 0 and begin - 1e-6 <= t < end - 1e-6 else angle
+    )
+    assert 1 <= estimator.counters["angle/left"]["angle_jump"] <= 2
+    _, i, j = np.intersect1d(rows["stamp_ns"], sound["stamp_ns"], return_indices=True)
+    off, told, t = np.abs(rows["total"][i] - sound["total"][j]), rows["doubts"][i] != 0, seconds_of(rows)[i]
+    left = 2 * 5 * SIGMA * 309e3 + 0.005 * FRICTION_NM
+    assert off[~told].max() < left
+    assert off[t > end + 1.5 / rate_Hz].max() < left
+    assert np.abs(rows["temperature"][i] - sound["temperature"][j])[t > end + 1.5 / rate_Hz].max() < 0.1
+
+
+def test_an_angle_that_thaws_within_one_reach_has_gone_there_and_not_leapt() -> None:
+    """Frozen for 0.4 s, in which the joint turns by 0.08 rad: less than it may in one sample."""
+    _, rows = drive(during(8.6, 9.0, held((0,))))
+    _, i, j = np.intersect1d(rows["stamp_ns"], clean()["stamp_ns"], return_indices=True)
+    after = seconds_of(rows)[i] > 9.015
+    assert np.abs(rows["total"][i] - clean()["total"][j])[after].max() < 0.05 * FRICTION_NM
+    assert not (rows["doubts"][i] != 0)[seconds_of(rows)[i] > 9.3].any()
+
+
 @pytest.mark.parametrize(("rate_Hz", "spike"), [(20, 0.6), (20, -0.9), (100, 0.11), (100, -0.19), (1000, 0.015)])
 def test_single_spikes_are_no_jump(rate_Hz: int, spike: float) -> None:
     estimator, _ = push_both(rate_Hz, lambda side, t, angle: angle + spike * (side == 0 and round(t * rate_Hz) % rate_Hz == 5))
@@ -153,6 +182,21 @@ def test_single_spikes_are_no_jump(rate_Hz: int, spike: float) -> None:
 def test_fast_motion_is_no_jump_though_messages_are_lost(rate_Hz: int, lost: float) -> None:
     """Up to 9 of the 10 rad/s that a joint may turn by."""
     estimator, _ = push_both(rate_Hz, lambda _side, t, _angle: 0.9 * math.sin(10.0 * t), 5.0, lost)
+    for side in ("left", "right"):
+        assert not {"spike", "angle_jump"} & set(estimator.counters[f"angle/{side}"])
+
+
+@pytest.mark.parametrize("rate_Hz", [10, 20, 100, 1000])
+@pytest.mark.parametrize("step_deg", [0.05, 0.25])
+def test_a_coarse_encoder_does_not_jump(rate_Hz: int, step_deg: float) -> None:
+    """The shape of each of its steps is that of a jump: nothing before it, nothing after it."""
+    step = math.radians(step_deg)
+    rng, estimator = np.random.default_rng(1), Estimator(VEHICLE)
+    for i in range(12 * rate_Hz):
+        t = i / rate_Hz
+        for side in (0, 1):
+            angle = 0.3 * math.sin(0.7 * max(0.0, t - 1.0)) + float(rng.normal(0.0, SIGMA))
+            estimator.push(side, T0 + round(t * 1e9), step * round(angle / step))
     for side in ("left", "right"):
         assert not {"spike", "angle_jump"} & set(estimator.counters[f"angle/{side}"])
 

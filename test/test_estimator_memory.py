@@ -7,6 +7,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +18,7 @@ import pytest
 
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options
-from lugre_steering.estimator.state_file import read_state, write_state
+from lugre_steering.estimator.state_file import Ownership, read_state, write_state
 from lugre_steering.vehicle import Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
@@ -141,3 +145,31 @@ def test_the_memory_is_plain_data() -> None:
     estimator = Estimator(VEHICLE)
     steer(estimator, 0, 100)
     assert json.loads(json.dumps(estimator.memory)) == estimator.memory
+
+
+def test_a_state_file_is_of_one_node_at_a_time(tmp_path: Path) -> None:
+    file, first, second = tmp_path / "state.json", Ownership(), Ownership()
+    assert first.take(file) == first.take(file) == ""
+    assert f"{file}: process {os.getpid()} keeps its state there" in second.take(file)
+    assert second.take(tmp_path / "other.json") == ""
+    assert first.take(tmp_path / "third.json") == ""  # which lets go of the one before
+    assert second.take(file) == ""
+    second.release()
+    first.release()
+    assert list(tmp_path.iterdir()) == []
+    assert "cannot be written" in first.take(tmp_path / "missing" / "state.json", 60.0)  # at once
+
+
+def test_a_killed_node_lets_go_of_its_state_file_and_one_that_leaves_is_waited_for(tmp_path: Path) -> None:
+    file, own = tmp_path / "state.json", Ownership()
+    script = "import sys, time; from pathlib import Path; from lugre_steering.estimator.state_file import Ownership; "
+    script += "assert Ownership().take(Path(sys.argv[1])) == ''; print('has it', flush=True); time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", script, str(file)], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "has it\n"
+        assert f"process {other.pid} keeps" in own.take(file)
+        killer = threading.Timer(0.5, other.kill)
+        killer.start()
+        assert own.take(file, 30.0) == ""
+        killer.join()
+    own.release()

@@ -348,5 +348,7 @@ def test_a_line_without_end_and_columns_without_number_are_refused(tmp_path: Pat
         read_table(write(tmp_path, "log.csv", "1," * 600_000))
     with pytest.raises(MapFileError, match="line 1: has 20000 columns"):
         read_table(write(tmp_path, "log.csv", ",".join(f"a{i}" for i in range(20_000)) + "\n1\n"))
-    with pytest.raises(MapFileError, match="no such file"):
+    with pytest.raises(MapFileError, match="is no regular file"):
         read_table(tmp_path)
+    with pytest.raises(MapFileError, match="no such file"):
+        read_table(tmp_path / "missing.csv")

@@ -446,6 +446,22 @@ def test_clock_set_back_is_reported_and_replayed(tmp_path: Path) -> None:
     assert summary["estimates"] > 390
 
 
+def test_a_time_of_recording_far_off_is_told_and_is_no_length(tmp_path: Path) -> None:
+    messages = drive(5.0)
+    last = messages[-1]
+    messages[-1] = (*last[:2], 2**63 - 1, last[3])
+    summary = replay([make.write(tmp_path / "run", messages, "sqlite3")], VEHICLE, tmp_path / "out")["bags"][0]
+    assert summary["duration_s"] == pytest.approx(5.0, abs=0.1)
+    assert "log_time" in {finding["finding"] for finding in summary["findings"]}
+
+
+def test_an_error_about_lost_angles_shows_the_damage(tmp_path: Path) -> None:
+    """Compressed messages that nobody can unpack: the topics are there, and the damage is the reason."""
+    messages = [(topic, kind, log, b"\x28\xb5\x2f\xfd" + data) for topic, kind, log, data in drive(2.0)]
+    with pytest.raises(BagError, match=r"no torque could be estimated.*damage: .*compressed messages are left out"):
+        replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")
+
+
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_torn_bag_is_replayed_as_far_as_it_goes(tmp_path: Path, storage: str) -> None:
     write_cycle(tmp_path / "run", 100.0, storage)  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ import lz4.frame  # type: ignore[import-untyped]
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 CHUNK_LIMIT = 128 << 20  # bytes of one chunk, packed or not: read at once, and a few copies of it must fit into memory
 MESSAGE_LIMIT = 32 << 20  # bytes of one message: more than any camera or laser sends
-_FED, _STEP = 1 << 16, 1 << 17  # bytes given to a codec, and taken from it, at a time (zstd makes blocks of 128 kB)
+_FED, _STEP = 1 << 16, 1 << 13  # bytes given to a codec, and taken from it, at a time: where it fails, so much may be lost
 _FREE, _RATIO = 256 << 20, 50  # bytes; recordings of sensors shrink to a fifteenth at best
 _FREE_MESSAGES = 200_000
 _CHUNK_MESSAGES = 1_000_000  # rosbag2 closes a chunk after some 10 000

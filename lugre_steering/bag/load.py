@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lugre_steering.bag.reader import Bag, Block, shortened
+from lugre_steering.bag.reader import Bag, Block, damage_words, shortened
 from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import (
@@ -133,7 +133,7 @@ def _nothing_usable(
     wanted = ", ".join(sorted({channel.topic for channel in channels}))
     counts = (f"{n} {reason} on {topic}" for topic, reasons in rejected.items() for reason, n in reasons.items())
     left_out = f"; left out: {text}" if (text := ", ".join(counts)) else ""
-    damage = f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
+    damage = damage_words(findings)
     remedy = "" if left_out or damage else f"; {REMEDY}"
     return BagError(
         f"{path}: no usable message on any wanted topic ({wanted}); topics in the bag: {found}{left_out}{damage}{remedy}"

@@ -20,7 +20,8 @@ from lugre_steering.recording import IntArray, Mask
 Bytes = NDArray[np.uint8]
 
 BLOCK_BYTES = 64 << 20
-_WAITING_BYTES = 256 << 20
+_WAITING_BYTES = 192 << 20
+"""Of messages that wait for earlier ones; to be sorted, they are held twice."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,7 @@ def merged(runs: Sequence[tuple[int, Iterable[Messages]]], per_block: int) -> It
             yield block.take(slice(begin, min(begin + per_block, ready)))
         rest = block.take(slice(ready, None)).packed()
         waiting = [rest] if len(rest) else []
+        del block  # not to be held beside the next one
         # What is carried over must not be sorted again with every small piece.
         count, size = len(rest), rest.size
         enough, full = max(per_block, 2 * count), max(BLOCK_BYTES, 2 * size)

@@ -376,6 +376,11 @@ def shortened(names: Sequence[str], most: int = 20) -> str:
     return ", ".join(names[:most]) + rest
 
 
+def damage_words(findings: Sequence[Finding]) -> str:
+    """What an error about a bag says of the damage that was found in it; nothing where none was."""
+    return f"; damage: {shortened([f.statement for f in findings], 3)}" if findings else ""
+
+
 def _full_name(msgtype: str) -> str:
     """``pkg/Type`` and ``pkg/msg/Type`` name the same type."""
     package, _, name = msgtype.partition("/")

@@ -11,7 +11,7 @@ import numpy as np
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import row
 from lugre_steering.chain.layout import STATE
-from lugre_steering.estimator.doubt import reachable
+from lugre_steering.estimator.doubt import leapt, reachable
 from lugre_steering.estimator.layout import (
     ABSURD,
     BACKWARD,
@@ -191,7 +191,7 @@ def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
     strayed = core.guard[ch.index].absurd and not reachable(core, ch.index, ch.last_ns, stamp_ns, change)
     strayed = strayed or (follows_suspect and _goes_with_suspect(core, ch, stamp_ns, value))
     if not strayed and abs(change) <= reach:
-        return _GOES_ON
+        return JUMPED if leapt(core, ch.index, ch, stamp_ns, value) else _GOES_ON
     near = follows_suspect and abs(value - ch.suspect_value) <= c.max_rate * (stamp_ns - ch.suspect_ns) * 1e-9 + reach
     if not near:
         return _suspect(ch, SPIKE, stamp_ns, value)
@@ -222,7 +222,7 @@ def admit(core, k, stamp_ns, value):
         verdict = _jump_in_time(core, k, stamp_ns, value, follows_suspect)
     # Only what may be a jump is worth the call: to hand over the whole core costs 0.1 us.
     if verdict == _GOES_ON and ch.kind == Kind.ANGLE and (
-        follows_suspect or core.guard[ch.index].absurd or abs(value - ch.last_value) > _reach(c, ahead)
+        follows_suspect or core.guard[ch.index].absurd or core.guard[ch.index].leap_ns != 0 or abs(value - ch.last_value) > _reach(c, ahead)
     ):
         verdict = _jump_of_angle(core, ch, stamp_ns, value, follows_suspect)
     if verdict != _GOES_ON:

@@ -7,6 +7,9 @@ heated by the jump. The state before the first jump is kept as a shadow, to whic
 between was not true. If the angle is now where the joint can have got to since, at the rates that it has shown before, the
 side goes there in a straight line over the time that passed. What no jump takes back within ``TRUSTED_S`` is believed; sooner where the
 measured torque speaks for it.
+
+A step that the joint could make is a jump as well (a leap) if neither the readings before it nor the one after it move like
+that. It is believed, in doubt, until that one has come.
 """
 
 from __future__ import annotations
@@ -31,6 +34,11 @@ SETTLED_S = 0.2
 FASTER = 1.5
 """How much faster than ever before a joint may be while nobody sees it."""
 FASTEST_MEMORY_S = 0.1
+LEAP_SHARE = 0.1
+"""A step of less than this share of the bristle's length costs less than that share of the friction."""
+LEAP_SIGMA = 10.0
+LEAP_RATE_RAD_S = 1.0
+"""No joint needs a sample to come to such a rate, or to leave it."""
 STANDING_SIGMA = 5.0
 """A reading this many times its noise from where it stood has moved: chance alone does that once in 200 000 samples."""
 STILL_NS = 100_000_000
@@ -65,6 +73,9 @@ GUARD = np.dtype(
         ("calm", np.float64),  # time without another jump since [s]
         ("returned", np.bool_),  # to where the shadow can have gone
         ("absurd", np.bool_),  # the readings since the last accepted one
+        ("leap_ns", np.int64),  # stamp of the reading before one that departs from the motion so far; 0: none does
+        ("leap_angle", np.float64),  # measured then [rad]
+        ("leap_since_ns", np.int64),  # since when the joint may have been on its way
         ("fastest", np.float64),  # rate that the joint has shown while trusted [rad/s]
         ("still_ns", np.int64),  # since when the reading has not changed by more than its noise
         ("still", np.int64),  # samples since
@@ -176,7 +187,7 @@ def angle_doubts(core, side, dt, stamp_ns):
     """Doubts about the angle of a side at its newest sample, ``dt`` [s] after the last."""
     g, c = core.guard[side], core.config[0]
     found = 0
-    if g.shadow_ns != 0:
+    if g.shadow_ns != 0 or g.leap_ns != 0:
         found |= JUMPED
     if core.motion.size > 1 and c.angle_noise > 0.0:
         _watch_other(core, side, dt, stamp_ns)
@@ -214,6 +225,39 @@ def _supported(c):
 
 
 @inner
+def _leap_limit(core, side, dt):
+    """How far [rad] a reading may depart from the motion before it, or after it, ``dt`` [s] away."""
+    g, p = core.guard[side], row(core.parameters, side, BASELINE)
+    noise = LEAP_SIGMA * max(core.config[0].angle_noise, math.sqrt(g.noise))
+    length = p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else math.inf
+    return max(LEAP_SHARE * length, noise) + max(2.0 * FASTER * g.fastest, LEAP_RATE_RAD_S) * dt
+
+
+@inner
+def watch_leap(core, side, ch, dt, value):
+    """Keep the state before a reading [rad] that departs from the motion so far: the next one tells whether it was a jump."""
+    g = core.guard[side]
+    if dt <= 0.0 or ch.head < 2:
+        return
+    if abs(value - ch.last_value - core.motion[side].omega * dt) > _leap_limit(core, side, dt):
+        g.leap_ns, g.leap_angle = ch.last_ns, ch.last_value
+        g.leap_since_ns = g.still_ns if g.frozen else ch.last_ns
+        if g.shadow_ns == 0:
+            copy_row(core.shadow, side, core.state, side)
+
+
+@inner
+def leapt(core, side, ch, stamp_ns, value):
+    """Whether the reading [rad] after one that departed from the motion before does not go on from there either."""
+    g = core.guard[side]
+    if g.leap_ns == 0:
+        return False
+    dt = (ch.last_ns - g.leap_ns) * 1e-9
+    rate = (value - ch.last_value) / ((stamp_ns - ch.last_ns) * 1e-9)
+    return abs(ch.last_value - g.leap_angle - rate * dt) > _leap_limit(core, side, dt)
+
+
+@inner
 def trust(core, side, dt):
     """Time passes without a jump: in the end the present state is the trusted one."""
     g = core.guard[side]
@@ -223,7 +267,7 @@ def trust(core, side, dt):
         patience = SUPPORTED_S if _supported(core.config[0]) else TRUSTED_S
         if g.calm >= (SETTLED_S if g.returned else patience):
             g.shadow_ns = 0
-    elif not g.frozen:
+    elif not g.frozen and g.leap_ns == 0:
         g.fastest += max(0.0, abs(core.motion[side].omega) - g.fastest) * min(1.0, dt / FASTEST_MEMORY_S)
 
 
@@ -250,7 +294,7 @@ def re_anchor(core, side, ch, stamp_ns, value):
     g, c, out, motion = core.guard[side], core.config[0], core.output[side], core.motion[side]
     p, state, trial = row(core.parameters, side, BASELINE), row(core.state, side, STATE), row(core.scratch_state, 0, STATE)
     ch.reasons[ANGLE_JUMP] += 1
-    if g.shadow_ns == 0:
+    if g.shadow_ns == 0 and g.leap_ns == 0:
         copy_row(core.shadow, side, core.state, side)
         g.shadow_ns, g.shadow_angle = ch.last_ns, ch.last_value
         begin_ns = g.still_ns
@@ -260,8 +304,11 @@ def re_anchor(core, side, ch, stamp_ns, value):
         copy_row(core.state, side, core.shadow, side)
         state.saturated = saturated
         begin_ns = g.shadow_ns
+        if g.shadow_ns == 0:  # the leap before was the first jump
+            g.shadow_ns, g.shadow_angle, begin_ns = g.leap_ns, g.leap_angle, g.leap_since_ns
         g.returned = reachable(core, side, begin_ns, stamp_ns, value - g.shadow_angle)
     g.calm = 0.0
+    g.leap_ns = 0
     passed = (stamp_ns - g.shadow_ns) * 1e-9
     if g.returned:
         rate = (value - g.shadow_angle) / ((stamp_ns - begin_ns) * 1e-9)

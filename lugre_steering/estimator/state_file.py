@@ -8,12 +8,14 @@ import hashlib
 import json
 import os
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from lugre_steering.errors import DataError
+from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.estimator.memory import Memory
+from lugre_steering.files import HeldError, lock_file, unlock_file
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.identity import identity
 
@@ -21,6 +23,50 @@ SCHEMA = "lugre_steering/state/1"
 LARGEST_BYTES = 1_000_000
 AHEAD_S = 1.0
 """A state may be this much ahead of the clock: clocks are set."""
+RETRY_S = 0.05
+
+
+class Ownership:
+    """The state file that one node has for itself: of two with one file, each would take the other's past for its own."""
+
+    def __init__(self) -> None:
+        self._file: Path | None = None
+        self._descriptor = -1
+
+    def take(self, file: Path, patience_s: float = 0.0) -> str:
+        """Make the file ours, in place of the one before, or wait so long for who has it; "" or why it cannot be ours."""
+        if file == self._file:
+            return ""
+        self.release()
+        end = time.monotonic() + patience_s
+        trouble, held = self._tried(file)
+        while held and time.monotonic() < end:
+            time.sleep(RETRY_S)
+            trouble, held = self._tried(file)
+        return trouble
+
+    def _tried(self, file: Path) -> tuple[str, bool]:
+        """"" once the file is ours, or why it is not; and whether it is another's now."""
+        try:
+            self._descriptor = lock_file(_lock_of(file))
+        except HeldError as error:
+            return f"{file}: process {error.process} keeps its state there; expected a state_file of its own for each node", True
+        except LugreSteeringError as error:
+            return str(error), False
+        except OSError as error:
+            return f"{file}: cannot be written ({error.strerror or error})", False
+        self._file = file
+        return "", False
+
+    def release(self) -> None:
+        """Let another node have it."""
+        if self._file is not None:
+            unlock_file(_lock_of(self._file), self._descriptor)
+            self._file = None
+
+
+def _lock_of(file: Path) -> Path:
+    return file.with_name(f".{file.name}.lock")
 
 
 def write_state(file: Path, vehicle: Vehicle, memory: Memory) -> None:

@@ -13,6 +13,7 @@ from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.chain.rates import follow
 from lugre_steering.estimator.admission import restart
 from lugre_steering.estimator.doubt import (
+    LEAP_RATE_RAD_S,
     RANGE,
     TABLE,
     angle_doubts,
@@ -21,6 +22,7 @@ from lugre_steering.estimator.doubt import (
     standing_doubts,
     trust,
     watch,
+    watch_leap,
 )
 from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
@@ -154,6 +156,9 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     else:
         rates = core.trust[side]
         rate = believed(rates, ch, c, dt, value, rate)
+        core.guard[side].leap_ns = 0
+        if abs(value - ch.last_value - motion.omega * dt) > LEAP_RATE_RAD_S * dt:  # the call alone costs 0.1 us
+            watch_leap(core, side, ch, dt, value)
         watch(core, side, ch, dt, value)
         before = motion.theta if motion.started != 0.0 else value
         follow(motion, dt, value, rate, noise_of(core, side))

@@ -29,7 +29,7 @@ FORMATS: Mapping[str, Format] = {
 def read_table(file: Path, options: Csv | None = None) -> Table:
     """All columns of numbers of a file; ``options`` count for CSV only."""
     if not file.is_file():
-        raise MapFileError(f"{file}: no such file")
+        raise MapFileError(f"{file}: {'is no regular file' if file.exists() else 'no such file'}")
     if file.suffix.lower() not in FORMATS:
         try:
             return read_text(file, options or Csv())

@@ -21,10 +21,10 @@ from std_srvs.srv import Trigger
 
 from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
-from lugre_steering.estimator.state_file import read_state, write_state
+from lugre_steering.estimator.state_file import Ownership, read_state, write_state
 from lugre_steering.live.console import Console
 from lugre_steering.live.parameters import changed, declare
-from lugre_steering.live.session import TICK_S, Session
+from lugre_steering.live.session import LEAVE_S, TICK_S, Session
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
 
@@ -57,6 +57,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         self.create_service(Trigger, "~/reload", self._reload)
         self.create_service(Trigger, "~/mark", self._mark)
         self._writer: threading.Thread | None = None
+        self._ownership = Ownership()
         change = self._service_change_state
         change.callback = self._answered(change.callback)
         self.add_on_set_parameters_callback(self._check)
@@ -135,6 +136,7 @@ class SteeringTorqueEstimator(LifecycleNode):
             self._report(session, time.monotonic_ns())
             session.withdraw()
         self.save()
+        self._ownership.release()
         self.session = None
         if session is not None:
             session.close()
@@ -266,7 +268,14 @@ class SteeringTorqueEstimator(LifecycleNode):
 
     def _restore(self, session: Session) -> None:
         file = self.settings.state_file
-        if file is None or not file.exists():
+        if file is None:
+            return
+        # The node in whose place this one comes may still be leaving.
+        session.health.state_trouble = self._ownership.take(file, LEAVE_S + 1.0)
+        if session.health.state_trouble:
+            self.get_logger().warning(f"state not used: {session.health.state_trouble}")
+            return
+        if not file.exists():
             return
         try:
             session.estimator.resume(read_state(file, session.vehicle, time.time_ns(), self.settings.state_max_age_s))
@@ -284,8 +293,11 @@ class SteeringTorqueEstimator(LifecycleNode):
         """What writes the present state, if there is to be a file and anything to keep; a failure is told, not raised."""
         self._saved_ns = time.monotonic_ns()
         file, session = self.settings.state_file, self.session
-        memory = session.estimator.memory if session is not None and file is not None else None
-        vehicle = session.vehicle if session is not None else None
+        memory, vehicle = None, None
+        if session is not None:
+            session.health.state_trouble = self._ownership.take(file) if file is not None else ""
+            if file is not None and not session.health.state_trouble:
+                memory, vehicle = session.estimator.memory, session.vehicle
 
         def write() -> None:
             if file is None or vehicle is None or not memory or not memory["sides"]:

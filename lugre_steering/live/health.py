@@ -63,6 +63,7 @@ class Health:
         self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
+        self.state_trouble = ""  # why the state cannot be kept
         self.doubted: Counter[str] = Counter()  # torques whose feed-forward was held back, by reason
         self._then_doubted: Counter[str] = Counter()
         self._kinds = [channel.kind for channel in vehicle.channels]
@@ -298,6 +299,8 @@ class Health:
         doubts = [f"feed-forward to zero: {reason}" for reason in new]
         if not self.active:
             doubts.append("node not active")
+        if self.state_trouble:
+            doubts.append(f"temperatures and bristles will not survive: {self.state_trouble}")
         if self.leaving:
             doubts.append("node stops: feed-forward to zero")
         arrived = [

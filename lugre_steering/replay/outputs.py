@@ -36,7 +36,7 @@ class Outputs:
 
     def of_estimates(self, rows: Records, cause_ns: IntArray) -> Iterator[Part]:
         """Torque, joint states and temperatures; logged right after the message that caused them."""
-        log_ns = cause_ns + 1
+        log_ns = _right_after(cause_ns)
         yield Part(self._number["torque"], log_ns, cdr.encode_wrench(rows["stamp_ns"], FRAME, rows["total"]))
         n = len(self._sides)
         columns = [rows[name][:, :n] for name in ("theta", "omega", "torque", "temperature", "feed_forward")]
@@ -54,4 +54,9 @@ class Outputs:
     def of_residuals(self, rows: Records, cause_ns: IntArray) -> Iterator[Part]:
         """Cylinder torque and residual."""
         for name, field in (("cylinder_torque", "measured_torque"), ("residual", "residual")):
-            yield Part(self._number[name], cause_ns + 1, cdr.encode_wrench(rows["stamp_ns"], FRAME, rows[field]))
+            yield Part(self._number[name], _right_after(cause_ns), cdr.encode_wrench(rows["stamp_ns"], FRAME, rows[field]))
+
+
+def _right_after(log_ns: IntArray) -> IntArray:
+    """The next nanosecond, as far as there is one."""
+    return np.minimum(log_ns, np.iinfo(np.int64).max - 1) + 1

@@ -22,6 +22,7 @@ from lugre_steering.bag import Bag, BagWriter, Block
 from lugre_steering.bag.find import REPLAYED
 from lugre_steering.bag.given import in_stamp_order
 from lugre_steering.bag.load import STRAY_NS
+from lugre_steering.bag.reader import damage_words
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
 from lugre_steering.counted import counted
@@ -32,7 +33,7 @@ from lugre_steering.files import new_folder
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
 from lugre_steering.pool import Progress
 from lugre_steering.provenance import Provenance
-from lugre_steering.recording import AIR_LIMIT_DEGC, COMMAND, Channel, Finding, Kind, Recording
+from lugre_steering.recording import AIR_LIMIT_DEGC, COMMAND, Channel, Finding, IntArray, Kind, Recording
 from lugre_steering.replay.earlier import refuse_foreign
 from lugre_steering.replay.outputs import Outputs
 from lugre_steering.replay.page import write_page
@@ -64,7 +65,8 @@ class Passage:
         self._commands: Counter[str] = Counter()  # feed-forward plans that could not be used, by reason
         self._found: list[Finding] = []
         self._clocks: tuple[Timeline, Timeline] | None = None  # of estimates and of residuals
-        self._log_ns: tuple[int, int] | None = None
+        self._last_log_ns: int | None = None
+        self._lasted_ns = 0  # by log times, without leaps
         self._spans: dict[int, tuple[int, int]] = {}  # first and last stamp by channel
 
     def write(self, out: Path, origin: Provenance, progress: Progress | None) -> ReplayedBag:
@@ -75,7 +77,7 @@ class Passage:
             with BagWriter(result, custom_data=REPLAYED, compressed=True) as writer:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
-            self._check_estimates(samples)
+            self._check_estimates(samples, bag.findings)
             refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
             findings = [*bag.findings, *self._found, *self._last_findings()]
         summary = self._summary(samples, findings)
@@ -92,7 +94,7 @@ class Passage:
             command = self._optional(bag, COMMAND)
             kept = [self._take(block, bag, command) for block in bag.blocks(channels, all_messages=True) if len(block.messages)]
             samples = self._samples(bag, topics)
-            self._check_estimates(samples)
+            self._check_estimates(samples, bag.findings)
             findings = [*bag.findings, *self._found, *self._last_findings()]
         return replace(self._summary(samples, findings), series=self._series(kept))
 
@@ -103,7 +105,7 @@ class Passage:
         estimates, residuals = kept
         self._counts.update(rows=stamp_ns.size, messages=stamp_ns.size, estimates=len(estimates))
         if stamp_ns.size:
-            self._log_ns = int(stamp_ns[0]), int(stamp_ns[-1])
+            self._lasted_ns = int(stamp_ns[-1]) - int(stamp_ns[0])
             self._clocks = Timeline(int(stamp_ns[0])), Timeline(int(stamp_ns[0]))
             for i in np.unique(channel):
                 stamps = stamp_ns[channel == i]
@@ -112,7 +114,7 @@ class Passage:
         samples = {
             label: replace(counts, topic=label if counts.used else None) for label, counts in self._samples(None, {}).items()
         }
-        self._check_estimates(samples)
+        self._check_estimates(samples, recording.findings)
         findings = [*recording.findings, *self._last_findings()]
         return replace(self._summary(samples, findings), series=self._series([kept]))
 
@@ -125,16 +127,17 @@ class Passage:
                 raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
         return topics
 
-    def _check_estimates(self, samples: Mapping[str, InputCounts]) -> None:
+    def _check_estimates(self, samples: Mapping[str, InputCounts], findings: Sequence[Finding]) -> None:
         if not self._counts["estimates"]:
-            raise BagError(f"{self.path}: no torque could be estimated ({self._counted(samples, Kind.ANGLE)})")
+            came = self._counted(samples, Kind.ANGLE)
+            raise BagError(f"{self.path}: no torque could be estimated ({came}){damage_words(findings)}")
 
     def _summary(self, samples: Mapping[str, InputCounts], findings: Sequence[Finding]) -> ReplayedBag:
         fit = self.fit.result()
         return ReplayedBag(
             bag=str(self.path),
             name=self.name,
-            duration_s=(self._log_ns[1] - self._log_ns[0]) * 1e-9 if self._log_ns else 0.0,
+            duration_s=self._lasted_ns * 1e-9,
             messages=self._counts["messages"],
             estimates=self._counts["estimates"],
             fit=fit,
@@ -201,9 +204,16 @@ class Passage:
         estimates, residuals = self._push(block, bag, command)
         self._learn(block, estimates, residuals)
         self._counts.update(rows=block.channel.size, messages=len(block.messages), estimates=len(estimates))
-        first_ns, last_ns = int(block.messages.log_ns[0]), int(block.messages.log_ns[-1])
-        self._log_ns = (self._log_ns[0] if self._log_ns else first_ns, last_ns)
+        self._last(block.messages.log_ns)
         return estimates, residuals
+
+    def _last(self, log_ns: IntArray) -> None:
+        """Add the times at which the next messages were recorded to how long the recording lasts."""
+        since = np.diff(log_ns, prepend=log_ns[0] if self._last_log_ns is None else self._last_log_ns)
+        leaps = since > STRAY_NS
+        self._lasted_ns += int(since[~leaps].sum())
+        self._counts["leaps"] += int(leaps.sum())
+        self._last_log_ns = int(log_ns[-1])
 
     def _push(self, block: Block, bag: Bag, command: str | None) -> tuple[Records, Records]:
         """One block through the estimator; each plan takes effect at its place among the samples, as in the node."""
@@ -321,6 +331,9 @@ class Passage:
         elif is_large(residual, estimate, measured, self.vehicle):
             statement = "the residual is as large as the torque: units, signs, plugs or clocks may be wrong; 'diagnose' tells which"
             yield Finding("large_residual", "", statement)
+        if leaps := self._counts["leaps"]:
+            statement = f"times of recording leap by more than a day {counted(leaps, 'time')}; leaps are not counted as recorded"
+            yield Finding("log_time", "", statement)
         set_back = self._clocks[0].set_back if self._clocks else 0
         if set_back:
             yield Finding("clock_set_back", "", f"stamps jumped back {counted(set_back, 'time')}")

@@ -14,14 +14,17 @@ from functools import cache
 from pathlib import Path
 
 import bag_making as make
+import lz4.frame
 import numpy as np
 import pytest
 import yaml
+import zstandard
 from bag_making import CHANNELS, LEFT, MAIN_A, T0
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
 from lugre_steering.bag import Bag, read_recording
+from lugre_steering.bag.compression import Allowance, expand
 from lugre_steering.errors import BagError
 
 FORMS = [
@@ -110,6 +113,30 @@ def test_flipped_bytes_never_raise_anything_but_bag_errors(
             for signal in (*recording.angle.values(), *recording.pressure.values()):
                 assert (np.diff(signal.time_s) > 0).all()
                 assert np.isfinite(signal.value).all()
+
+
+@pytest.mark.parametrize("kind", ["zstd", "lz4"])
+def test_a_damaged_block_of_compressed_data_costs_nothing_before_it(kind: str) -> None:
+    """Blocks of 20 000 bytes, the third of which says to be of a kind that there is not, or to be longer than any."""
+    plain = np.random.default_rng(1).integers(0, 64, (5, 20_000), np.uint8)
+    packed, sizes = b"", []
+    if kind == "zstd":
+        stream = zstandard.ZstdCompressor().compressobj()
+        for part in plain:
+            packed += stream.compress(part.tobytes()) + stream.flush(zstandard.COMPRESSOBJ_FLUSH_BLOCK)
+            sizes.append(len(packed))
+    else:
+        writer = lz4.frame.LZ4FrameCompressor(block_size=lz4.frame.BLOCKSIZE_MAX64KB, auto_flush=True)
+        packed = writer.begin()
+        for part in plain:
+            packed += writer.compress(part.tobytes())
+            sizes.append(len(packed))
+    spoiled = bytearray(packed)
+    spoiled[sizes[1] : sizes[1] + 3] = b"\xff\xff\xff"
+    kept, damage = expand(spoiled, kind, 1 << 20, Allowance(1 << 20))
+    assert damage
+    assert plain[:2].tobytes().startswith(kept)
+    assert len(kept) >= 2 * 20_000 - 8192
 
 
 def test_overwritten_middle_of_a_checksummed_mcap(tmp_path: Path) -> None:

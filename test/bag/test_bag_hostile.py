@@ -10,6 +10,8 @@ import shutil
 import sqlite3
 import struct
 import time
+import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 
 import bag_making as make
@@ -22,6 +24,7 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
 from lugre_steering.bag import Bag, BagWriter, Part, cdr, read_recording
+from lugre_steering.bag import messages as columns
 from lugre_steering.bag.compression import zstd_decompressor
 from lugre_steering.bag.mcap_records import records
 from lugre_steering.errors import BagError
@@ -350,6 +353,26 @@ def test_an_error_shows_the_damage(tmp_path: Path) -> None:
     file.write_bytes(data)
     with pytest.raises(BagError, match=r"no usable message.*damage: "):
         read_recording(file, CHANNELS)
+
+
+def test_messages_out_of_order_without_end_are_given_up_in_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pieces of 1 MB that all begin at one time, so that none may leave before the last is read; read one by one."""
+    waiting = 32 << 20
+    monkeypatch.setattr(columns, "_WAITING_BYTES", waiting)
+    monkeypatch.setattr(columns, "BLOCK_BYTES", waiting // 4)
+
+    def pieces() -> Iterator[columns.Messages]:
+        while True:
+            yield columns.from_rows([0] * 16, [T0] * 16, [bytes(1 << 16)] * 16)
+
+    tracemalloc.start()
+    try:
+        with pytest.raises(BagError, match="cannot be sorted"):
+            list(columns.merged([(T0, pieces())], 16))
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 2.3 * waiting  # what waits, and all of it once more in order
 
 
 def test_a_nanosecond_part_of_a_second_or_more_is_malformed(tmp_path: Path) -> None:

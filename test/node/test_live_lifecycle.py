@@ -185,3 +185,18 @@ def test_the_state_survives_a_kill_and_a_damaged_one_is_refused(tmp_path: Path) 
         assert "state not used" in node_output(node)
         assert "damaged" in node_output(node)
         assert abs(world.heard["torque"][0].wrench.torque.z) < 1e3
+
+
+def test_two_nodes_with_one_state_file_are_told_and_the_second_leaves_it_alone(tmp_path: Path) -> None:
+    file = tmp_path / "state.json"
+    arguments = ("-p", f"state_file:={file}", "-p", "state_period_s:=0.2")
+    with LiveNode(*arguments) as one, World() as world:
+        steer_until_heard(world, 0.0)
+        with LiveNode(*arguments, "-r", "__node:=other") as two:
+            process = one.process.pid  # type: ignore[attr-defined]
+            world.wait(lambda: f"process {process} keeps its state there" in node_output(two), 30.0)
+            diagnostics = world.heard["diagnostics"]
+            world.wait(lambda: any("will not survive" in status.message for said in diagnostics for status in said.status), 10.0)
+            assert "taken over" not in node_output(two)
+        assert "keeps its state there" not in node_output(one)
+    assert json.loads(file.read_text())["memory"]["sides"]
