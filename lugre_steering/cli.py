@@ -263,7 +263,7 @@ def replay(
         print_json(result)
     else:
         show_replay(output(), result)
-        print(f"results in {out}, for people in {'NAME' if len(result['bags']) > 1 else result['bags'][0]['name']}.html")
+        print(f"results in {out}, for people in {'<recording>' if len(result['bags']) > 1 else result['bags'][0]['name']}.html")
     leave_if(wanted.failures(facts(result)))
 
 
@@ -344,7 +344,8 @@ def vehicle_(
     if new:
         from lugre_steering.sheet.new import begin_sheet
 
-        begin_sheet(file, lambda text, default: default if yes else typer.prompt(text, default, err=True), console().print)
+        written = begin_sheet(file, lambda text, default: default if yes else typer.prompt(text, default, err=True), console().print)
+        console().print(f"written: {', '.join(map(str, written))}", highlight=False, soft_wrap=True)
     elif yes:
         raise DataError("vehicle --yes: answers the questions of --new; expected both")
     read = load(file)
