@@ -20,7 +20,7 @@ def draw_simulation(run: Simulated, label: str, file: Path) -> None:
     scale, unit = SHOWN.get(coordinate.unit, (1.0, coordinate.unit))
     pressures = {c.name: s for c, s in run.signals.items() if c.kind is Kind.PRESSURE}
     torques = [s for c, s in run.signals.items() if c.kind is Kind.TORQUE]
-    effects = ", ".join(e.id for e in vehicle.effects) or "none"
+    effects = ", ".join(units.titles(vehicle)) or "none"
     caption = f"SYNTHETIC recording: {label}. Effects added to the baseline: {effects}."
     with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9, words=partial(units.words, vehicle)) as axes:
         rows = iter(axes[:, 0])
