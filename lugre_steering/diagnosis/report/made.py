@@ -9,7 +9,7 @@ from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.fitting.keys import KEYS
 from lugre_steering.fitting.problem import calibrations_for
 from lugre_steering.report import words
-from lugre_steering.report.markup import code, pairs, table, text
+from lugre_steering.report.markup import pairs, table, text
 from lugre_steering.report.origin import made_by, plain_words
 
 
@@ -23,14 +23,15 @@ def baseline(diagnosis: Diagnosis) -> str:
             continue
         unit, before = units.label(vehicle, key.unit), key.read(sheet) if sheet is not None else None
         change = f"{100.0 * (now / before - 1.0):+.1f} %" if before else ""
-        rows.append([code(key.key), words.number(before), words.number(now), text(change), "" if unit == "1" else text(unit)])
+        name = f'{text(key.title)} <code class="id">{text(key.key)}</code>'
+        rows.append([name, words.number(before), words.number(now), text(change), "" if unit == "1" else text(unit)])
     sentence = (
         "Nothing was fitted: these are the values of the vehicle file, as they were."
         if diagnosis.json["verdict"] == "insufficient_data"
         else "The published model with the fitted values is what missing physics was judged against, so that a wrong friction "
         "level is never reported as physics. They stand in <code>augmented.yaml</code>."
     )
-    header = ["key of the vehicle file", "sheet", "fitted", "change", "unit"]
+    header = ["value of the vehicle file", "sheet", "fitted", "change", "unit"]
     return f"<p>{sentence}</p>\n" + (table(header, rows, (1, 2, 3), narrow=True) if rows else "")
 
 
