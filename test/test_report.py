@@ -604,6 +604,21 @@ def test_the_verdict_on_a_terminal_is_a_table_of_80_columns_with_the_first_sente
     assert "- Look here." in text
 
 
+def test_a_finding_that_the_verdict_has_told_is_not_told_again_on_a_terminal(vehicle: Vehicle) -> None:
+    full, long = insufficient(vehicle), "the sign is flipped, as far as can be told."
+    findings = (
+        BagFinding("sign_flipped", "/topic", "a bag", ((0.0, 1.0),), long),
+        BagFinding("wrong_sheet", "", "", (), f"the vehicle file and the recordings disagree: {long}"),
+        BagFinding("lost_messages", "", "a bag", (), "12 messages are lost"),
+    )
+    console = Console(width=80, file=io.StringIO(), markup=False)
+    show_diagnosis(console, dataclasses.replace(full, statement=f"Put it right. a bag: {long}", data_quality=findings))
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    assert text.count(long) == 1
+    assert "- wrong sheet: the vehicle file and the recordings disagree: see above" in text
+    assert "- a bag: lost messages: 12 messages are lost" in text
+
+
 @pytest.mark.parametrize(("make", "code"), [(consistent, 0), (missing, 3), (unlisted, 4), (insufficient, 5)])
 def test_the_verdict_is_the_exit_code_on_request(
     vehicle: Vehicle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Callable[[Vehicle], Diagnosis], code: int
