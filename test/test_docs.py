@@ -147,7 +147,7 @@ LOG = "time_s,angle_left_deg,angle_right_deg,main_a_bar,main_b_bar,aux_a_bar,aux
 
 
 def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In their order; those on what a diagnosis has written have a vehicle file in its place. They find what the page says."""
+    """In their order; what the first diagnosis writes is a vehicle file in its place. They find what the page says."""
     for name in ("bags", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "out/diagnosis").mkdir(parents=True)
@@ -158,7 +158,7 @@ def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     ran = []
     for arguments in filter(None, map(of_ours, shell_lines(DOCS / "first_hour.md"))):
-        if arguments[0] in QUICK:
+        if arguments[0] in QUICK or "out/named" in arguments:
             done = CliRunner().invoke(app, arguments, input="\n" * 100)
             assert done.exit_code == 0, f"{arguments}: {done.output}"
             ran.append(arguments[0])
@@ -167,7 +167,11 @@ def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: p
                 assert told is not None
                 found = [bag["fit"]["rmse_Nm"] for bag in json.loads(Path("out/summary.json").read_text())["bags"]]
                 assert [float(number) for number in told.groups()] == pytest.approx(found, rel=0.01)
-    assert set(ran) == set(QUICK)
+    assert set(ran) == {*QUICK, "diagnose"}
+    (named_one,) = json.loads(Path("out/named/diagnosis.json").read_text())["effects"]
+    assert named_one["id"] == "backlash"
+    assert named_one["indistinguishable_from"] == []
+    assert named_one["parameters"]["width"]["value"] == pytest.approx(0.02, rel=0.02)
     assert (tmp_path / "my_vehicle_rubber.csv").exists()
     assert (tmp_path / "my_bag/metadata.yaml").exists()
 
