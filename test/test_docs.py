@@ -21,6 +21,7 @@ import pytest
 import typer.main
 import yaml
 from test_packaging import environment
+from test_report import CHROMIUM, needs_chromium
 from typer.testing import CliRunner
 
 from lugre_steering import reference
@@ -46,17 +47,48 @@ def named(page: Path) -> str:
 # --------------------------------------------------------------------- site
 
 
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("mkdocs")
     pytest.importorskip("material")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
+    folder = tmp_path_factory.mktemp("built") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=ROOT, env=environment(NO_MKDOCS_2_WARNING="1"), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    shown = (tmp_path / "site/vehicle_file.html").read_text(encoding="utf-8")
+    return folder
+
+
+def test_the_site_builds_without_a_warning(site: Path) -> None:
+    shown = (site / "vehicle_file.html").read_text(encoding="utf-8")
     assert "load_N" in shown
     assert "<!-- reference" not in shown
-    assert (tmp_path / "site/bags/synthetic_hidden_stop_found.png").is_file()
-    assert not list((tmp_path / "site").rglob("*.py"))
+    assert (site / "bags/synthetic_hidden_stop_found.png").is_file()
+    assert not list(site.rglob("*.py"))
+
+
+WIDTHS = """<script>window.addEventListener("load", function () {
+  document.body.setAttribute("data-told", JSON.stringify(Array.from(document.querySelectorAll("iframe")).map(function (frame) {
+    var page = frame.contentDocument;
+    return [page.documentElement.scrollWidth].concat(Array.from(page.querySelectorAll("table, pre")).map(function (part) {
+      return Math.ceil(part.getBoundingClientRect().right); }));
+  })));
+});</script>"""
+
+
+@needs_chromium
+def test_nothing_of_the_site_is_wider_than_a_phone(site: Path) -> None:
+    pages = sorted(page.name for page in site.glob("*.html") if page.name != "404.html")
+    frames = "".join(f'<iframe style="width:390px;height:800px;border:0" src="{page}"></iframe>' for page in pages)
+    host = site / "all.html"
+    host.write_text(f"<!doctype html><body>{frames}{WIDTHS}</body>", encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", f"--user-data-dir={site / 'profile'}"]
+    command = [str(CHROMIUM), *options, "--virtual-time-budget=10000", "--dump-dom", host.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    told = re.search(r'data-told="([^"]*)"', done.stdout)
+    assert told is not None, done.stderr
+    widest = {page: max(widths) for page, widths in zip(pages, json.loads(told[1]), strict=True)}
+    assert len(widest) > 15
+    assert {page: width for page, width in widest.items() if width > 390} == {}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
