@@ -264,6 +264,18 @@ def test_what_is_missing_is_named(
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_where_nothing_is_there_nothing_is_judged(runs: Path, tmp_path: Path) -> None:
+    arguments = ["--vehicle", str(VEHICLE), "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, ["fleet", str(tmp_path / "nothing"), *arguments])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "no such file or folder" in done.stderr
+    assert not (tmp_path / "out").exists()
+    done = CliRunner().invoke(app, ["fleet", str(runs / "corrupt"), *arguments])
+    assert done.exit_code == 0
+    assert done.stdout.startswith("- No recording tells anything")
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_one_is_diagnosed_and_its_physics_stands(tmp_path: Path) -> None:
     """The bundled hidden stop."""
     out = tmp_path / "out"
