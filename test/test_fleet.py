@@ -100,7 +100,9 @@ def test_the_record_keeps_to_its_schema(done: Path) -> None:
 
 def test_tables_are_what_they_say(done: Path, runs: Path) -> None:
     for name, columns in KINDS.items():
-        assert pq.read_schema(done / f"{name}.parquet").names == list(columns)
+        schema = pq.read_schema(done / f"{name}.parquet")
+        assert schema.names == list(columns)
+        assert hashlib.sha256(VEHICLE.read_bytes()).hexdigest() in schema.metadata[b"lugre_steering"].decode()
     scores = {Path(row["bag"]).name: row for row in table(done, "scores")}
     assert scores["run_0"]["rmse_Nm"] > 0.0
     assert scores["run_0"]["duration_s"] == pytest.approx(5.0, abs=0.1)

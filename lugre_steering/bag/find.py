@@ -92,7 +92,7 @@ def is_folder_of_recordings(path: Path) -> bool:
 
 def is_replayed(bag: Path) -> bool:
     """Whether a replay wrote this folder."""
-    return custom_data(bag) == REPLAYED
+    return REPLAYED.items() <= (custom_data(bag) or {}).items()
 
 
 def custom_data(bag: Path) -> Mapping[str, Any] | None:

@@ -78,8 +78,9 @@ def run(
                 records, members, skipped, options, version, found, earlier=store.earlier(records), together=together, workers=jobs,
                 seconds=time.perf_counter() - begun,
             )  # fmt: skip
-            fleet = replace(fleet, provenance=_provenance(vehicles, members, options, records))
-            write_tables(rows(records, found, fleet.changes), out)
+            made = _provenance(vehicles, members, options, records)
+            fleet = replace(fleet, provenance=made)
+            write_tables(rows(records, found, fleet.changes), out, made)
             write_page(fleet, records, out / PAGE)
             write_record(fleet.json, out / RECORD)
         except OSError as error:
