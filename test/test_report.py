@@ -262,7 +262,7 @@ def test_page_is_small_enough_to_send(written: Written, vehicle: Vehicle) -> Non
 def test_the_page_suits_phone_dark_ground_print_and_keyboard(written: Written) -> None:
     source = written.files[0].read_text(encoding="utf-8")
     assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in source
-    for query in ("(prefers-color-scheme: dark)", "(max-width: 640px)", "print", "(prefers-reduced-motion"):
+    for query in ("screen and (prefers-color-scheme: dark)", "(max-width: 640px)", "print", "(prefers-reduced-motion"):
         assert f"@media {query}" in source
     assert "focus-visible" in source
     body = source[source.index("<body") : source.index('<script type="application/json"')]
