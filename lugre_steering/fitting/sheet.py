@@ -42,6 +42,9 @@ ARMS = (0.5, 0.7, 1.4, 2.0)
 """Factors that are tried on all arms together: measured from the wrong place, or on another vehicle."""
 EXPLAINED, BETTER = 0.8, 0.9
 """Share of what the baseline leaves that a wrong entry must explain, and share of what named physics leaves that it may leave."""
+FAR_BETTER, LITTLE = 0.5, 0.1
+"""Share beyond noise of what is left with the worst suspect put right that names may leave where recalibration without them stops at a
+bound; and share of what the baseline leaves from which they are tried there at all."""
 KEPT = 0.5
 """Share of what named physics takes that it must still take with a suspected entry put right, to be no part of that entry's error."""
 PUT_RIGHT = 0.03
@@ -53,6 +56,8 @@ OFF, SEVERAL = 0.03, 1.1
 TIED = 1.1
 """Cost over the lowest up to which a hypothesis is as good."""
 SHOWN = 5
+SAME_SIZE = 0.1
+"""Share by which torques differ that are told to be of one size."""
 LOAD = SheetValue("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
 LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
@@ -94,19 +99,33 @@ class SheetFinding(BagFinding):
 class WrongSheet:
     """``times``: measured over expected torque; entries most likely wrong, worst first.
 
-    ``certain``: recalibration stopped at its bounds, where no name can be told from what only makes up for it.
+    ``stuck``: recalibration stopped at its bounds, where a name can hardly be told from what only makes up for it; ``rest``: share of
+    what the baseline leaves beyond noise that is left with the worst one put right.
     """
 
     times: float
     suspects: tuple[Suspect, ...]
     why: str | None = None
-    certain: bool = True
+    stuck: bool = True
+    rest: float = 0.0
+
+    @property
+    def certain(self) -> bool:
+        """Whether no physics need be tried in its place."""
+        return self.stuck and self.rest < LITTLE
 
     @property
     def statement(self) -> str:
         check = ", ".join(suspect.words for suspect in self.suspects[:3])
-        said = f"measured torque is {self.times:.2g} times what this sheet can give" if self.why is None else self.why
-        return f"{said}; check {check}"
+        return f"{self._said}; check {check}"
+
+    @property
+    def _said(self) -> str:
+        if self.why is not None:
+            return self.why
+        if abs(self.times - 1.0) < SAME_SIZE:
+            return "friction or stiffness would have to be off by more than nominal values are"
+        return f"measured torque is {self.times:.2g} times what this sheet can give"
 
     def finding(self) -> SheetFinding:
         """As an entry of ``data_quality``."""
@@ -152,16 +171,21 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     fits = best.puts_right or best.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(tried.surprise for tried in found if tried.suspect.cost < TIED * best.cost) > RELIEVED * surprise:
         return None
-    return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), certain=bool(stuck))
+    rest = (best.cost - floor) / max(baseline.cost - floor, 1e-30)
+    return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), stuck=bool(stuck), rest=rest)
 
 
 def physics_instead(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
-    """Whether with ``effects`` the rest of the sheet is no surprise any more, and less is left than with its worst suspect put right."""
+    """Whether with ``effects`` the rest of the sheet is no surprise any more, and less is left than with its worst suspect put right: far
+    less where recalibration without them stops at a bound, which it must not beside them."""
     if wrong.certain or not effects:
         return False
-    thin, _ = _doubted(thinned(problem)[0])
-    named = _fitted(thin, effects=effects)
-    return named.cost < BETTER * wrong.suspects[0].cost and _surprise(thin, named) < SURPRISE
+    thin, doubt = _doubted(thinned(problem)[0])
+    named, worst = _fitted(thin, effects=effects), wrong.suspects[0].cost
+    floor = float(np.count_nonzero(thin.valid)) / doubt
+    if wrong.stuck and (named.cost - floor > FAR_BETTER * (worst - floor) or at_bounds(thin, named.x, LEVELS)):
+        return False
+    return named.cost < BETTER * worst and _surprise(thin, named) < SURPRISE
 
 
 def physics_beside(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
@@ -170,7 +194,7 @@ def physics_beside(problem: Problem, effects: Sequence[tuple[Candidate, Values]]
 
     Both are then to be told; only where recalibration stops at its bounds, nothing can be told from what makes up for it.
     """
-    if wrong.certain or not effects:
+    if wrong.stuck or not effects:
         return False
     thin, _ = _doubted(thinned(problem)[0])
     named, worst = _fitted(thin, effects=effects).cost, wrong.suspects[0].cost

@@ -174,14 +174,19 @@ def is_timed(trial: Trial) -> bool:
     return bool(trial.candidate.since) or any(trial.fit.effects[-1][1].get(edge) for edge in ("time_start", "time_end"))
 
 
-def refine(problem: Problem, weight: Array, trial: Trial) -> Trial:
-    """Let the effect have the optional parts of its family; those that do not earn their place go again."""
+def refine(problem: Problem, weight: Array, trial: Trial, worth: float = np.inf) -> Trial:
+    """Let the effect have the optional parts of its family; those that do not earn their place go again.
+
+    A trial that even so cannot come to a cost ``worth`` anything is left unfinished.
+    """
     *earlier, (candidate, values) = trial.fit.effects
     kept = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
     richer = replace(candidate, free=(*candidate.free, *kept))
-    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit, linearisations=12, tolerance=TRIAL_TOLERANCE)
+    result = fit(problem, weight, [*earlier, (richer, start)], trial.fit, linearisations=12, tolerance=TRIAL_TOLERANCE, worth=worth)
     left = result.cost
+    if left > worth:
+        return trial
     while weak := _weak(result, values, kept, problem.doubt):
         # Two that do the same work are both weak, yet not both superfluous.
         for dropped in (weak, weak[:1]) if len(weak) > 1 else (weak,):

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lugre_steering.proof.campaign import Hiding
+from lugre_steering.proof.campaign import WITHOUT, Hiding
 from lugre_steering.proof.made import Made, Wanted, beside, pooled_noise, pooled_removable, recalibrated, removable_of
 from lugre_steering.proof.measurable import measured
 from lugre_steering.proof.simulator import CaseData
@@ -73,6 +73,8 @@ def run(job: Job) -> Row:
             **described(job, made, wanted), "truth": truth(made, [bag.name for bag in bags]), "diagnosis": diagnosis, "error": error,
             "seconds": {"making": ready - started, "diagnosis": time.perf_counter() - ready},
         }  # fmt: skip
+        if hiding.kind == WITHOUT and error is None:
+            row["without"], row["error"] = diagnose(bags, seen / "vehicle.yaml", out / "without", "--without", *hiding.effects)
         if diagnosis is not None:
             row["measured"] = measured(made, out / "augmented.yaml", diagnosis)
         if diagnosis is not None and LAW in hiding.effects:
@@ -113,9 +115,9 @@ def called(*words: str) -> tuple[str | None, float]:
     return None, time.perf_counter() - begun
 
 
-def diagnose(bags: Sequence[Path], vehicle: Path, out: Path) -> tuple[Row | None, str | None]:
+def diagnose(bags: Sequence[Path], vehicle: Path, out: Path, *more: str) -> tuple[Row | None, str | None]:
     """What scoring needs of a diagnosis, or what went wrong."""
-    error, _ = called("diagnose", *map(str, bags), "--vehicle", str(vehicle), "--out", str(out), "--no-report")
+    error, _ = called("diagnose", *map(str, bags), "--vehicle", str(vehicle), "--out", str(out), "--no-report", *more)
     if error is not None:
         return None, error
     result = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))

@@ -31,6 +31,8 @@ NULLS, REPEATS, PAIRS, TRIPLES, UNLISTED_REPEATS = 102, 2, 24, 12, 3
 LEAST = 32
 """Cases of each disguise at least: fewer say too little."""
 LAWS, DIRTY, SHEETS, FIELD_NULLS, FIELD_PAIRS, FIELD_TRIPLES = 45, 102, 63, 30, 24, 12
+WITHOUT = "without"
+"""Kind of the cases that are diagnosed a second time, with what they hide taken away from the catalogue."""
 PEERS_EVERY = 4
 """The peers, which take about as long as the diagnosis, are compared on one in so many of the cases."""
 WITHOUT_LATE_START = ("mullins_softening",)
@@ -38,7 +40,7 @@ WITHOUT_LATE_START = ("mullins_softening",)
 
 QUICK = {
     "null": 6, "single": 10, "one-bag": 1, "late": 1, "barely": 1, "pair": 2, "triple": 1, "unlisted": 3, "law": 2, "dirty": 4, "sheet": 4,
-    "beside": 4,
+    "beside": 4, "without": 2,
 }  # fmt: skip
 """Cases of each kind, all simulators together."""
 QUICK_RATIO = 1.0
@@ -89,6 +91,7 @@ def _second(seed: int) -> list[Hiding]:
             for effect in UNLISTED_IDS for ratio in RATIOS for i in range(UNLISTED_REPEATS)
         ),
         *(_hiding(seed, f"law/{i:02d}", "law", ("law",), LAW_RATIOS[i % 3]) for i in range(LAWS)),
+        *(_hiding(seed, f"{WITHOUT}/{effect}", WITHOUT, (effect,), RATIOS[-1]) for effect in EFFECT_IDS),
     ]  # fmt: skip
 
 

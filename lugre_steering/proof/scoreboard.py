@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
-from lugre_steering.proof.campaign import DISGUISES, RATIOS
+from lugre_steering.proof.campaign import DISGUISES, RATIOS, WITHOUT
 from lugre_steering.proof.scores import (
     CLEAR_RATIO,
     DETECTED,
@@ -29,6 +29,7 @@ from lugre_steering.proof.scores import (
     proportion,
     ratio_of,
     removed,
+    removed_without,
     sheet_told,
     summary,
     wrong_sheet,
@@ -80,6 +81,7 @@ def part(rows: Sequence[Row]) -> Row:
         "pairs": _together(_of(rows, "pair")), "triples": _together(_of(rows, "triple")),
         "unlisted": _unlisted(unlisted), "laws": _laws(_of(rows, "law")), "dirty": _dirty(_of(rows, "dirty")),
         "sheets": _sheets(_of(rows, "sheet")), "beside": _beside(_of(rows, "beside")),
+        "without": _without(_of(rows, WITHOUT)),
         "seconds_per_case": summary(row["seconds"]["diagnosis"] for row in rows), "peers": _peers(rows),
     }  # fmt: skip
     return {**result, "targets": judged(result)}
@@ -217,6 +219,16 @@ def _beside(rows: Sequence[Row]) -> Row:
     return {
         "named": proportion(answered(row) == 1 for row in clear), "extra_names": proportion(has_wrong_extra(row) for row in clear),
         "outcomes": dict(Counter(outcome(row) for row in clear)),
+    }  # fmt: skip
+
+
+def _without(rows: Sequence[Row]) -> Row:
+    """What stands in the place of an entry that is taken away: a law, or another name."""
+    shares = [(row, share) for row in rows if (share := removed_without(row)) is not None]
+    lawful = [share for row, share in shares if row["without"]["laws"]]
+    return {
+        "enough": proportion(share >= TARGETS["without"].value for _, share in shares), "removed": summary(share for _, share in shares),
+        "by_laws": summary(lawful), "share": {row["truth"]["effects"][0]["id"]: round(share, 3) for row, share in shares},
     }  # fmt: skip
 
 

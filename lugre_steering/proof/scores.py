@@ -277,6 +277,16 @@ def removed(row: Row) -> float | None:
     return (before - after) / removable if removable > 0.1 * noise else None
 
 
+def removed_without(row: Row) -> float | None:
+    """What is removed of the held-out error with the right entry taken away from the catalogue, as a share of what is removed with it;
+    None where the entry was not found, or there was next to nothing to remove."""
+    with_it, instead = heldout(row), heldout({**row, "diagnosis": row["without"]})
+    if with_it is None or instead is None or outcome(row) not in RIGHT:
+        return None
+    before, after, noise = with_it
+    return (before - instead[1]) / (before - after) if before - after > 0.1 * noise else None
+
+
 def foretold(row: Row) -> float | None:
     """Share of the recalibrated baseline's mean square error on an unseen manoeuvre that the diagnosed file removes."""
     unseen = row.get("unseen")

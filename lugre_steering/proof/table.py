@@ -80,6 +80,8 @@ def details(part: Row) -> dict[str, Row]:
     rows["wrong sheets: a finding"] = part["sheets"]["finding"]
     rows["wrong sheets: nothing named"] = part["sheets"]["named_nothing"]
     rows |= {f"wrong sheets: {what}": score for what, score in part["sheets"]["by_mistake"].items()}
+    rows["entry taken away: nine tenths of what it removes are removed without it"] = part["without"]["enough"]
+    rows["entry taken away: removed where laws stand (median)"] = part["without"]["by_laws"]
     rows["coefficients within 10 %"] = part["parameters"]["within_10_percent"]
     rows["measurable quantities within 10 %"] = part["measurable"]["within_10_percent"]
     rows["half width of their intervals (relative, median)"] = part["measurable"]["half_width"]

@@ -46,6 +46,7 @@ TARGETS: dict[str, Target] = {
     "dirty_silent": Target("dirty nulls left alone", 0.97), "sheets_told": Target("wrong sheets told, right entry among three", 0.95),
     "beside_named": Target("effect beside shape errors named", 0.90),
     "beside_extra": Target("false names beside shape errors", 0.05, most=True),
+    "without": Target("with the entry taken away, of the error that it removes (median)", 0.90),
     "seconds": Target("seconds per diagnosis on one thread (median)", 10.0, most=True),
 }  # fmt: skip
 
@@ -91,7 +92,8 @@ def scores_of(part: Row) -> dict[str, Row]:
         "parameter_error": part["parameters"]["all"], "measured_error": part["measurable"]["all"],
         "coverage": part["parameters"]["interval_covers"], "measured_coverage": part["measurable"]["interval_covers"],
         "removed": part["removed"]["from_0.3"], "dirty_silent": part["dirty"]["silent"], "sheets_told": part["sheets"]["told"],
-        "beside_named": part["beside"]["named"], "beside_extra": part["beside"]["extra_names"], "seconds": part["seconds_per_case"],
+        "beside_named": part["beside"]["named"], "beside_extra": part["beside"]["extra_names"],
+        "without": part["without"]["removed"], "seconds": part["seconds_per_case"],
     }  # fmt: skip
 
 

@@ -206,14 +206,16 @@ def test_physics_that_leaves_less_than_a_suspected_entry_is_named_instead() -> N
     problem, mistyped = (synchronised(record(warmed, QUICK, 6), sheet).problem for sheet in (VEHICLE, with_load(0.5)))
     named = [effect("heat_partition", ground_share=0.5)]
 
-    def suspected(cost: float, certain: bool = False) -> WrongSheet:
-        return WrongSheet(1.0, (Suspect("axle.load_N", 1.2, 0.01, cost),), certain=certain)
+    def suspected(cost: float, stuck: bool = False, rest: float = 0.5) -> WrongSheet:
+        return WrongSheet(1.0, (Suspect("axle.load_N", 1.2, 0.01, cost),), stuck=stuck, rest=rest)
 
     assert physics_instead(problem, named, suspected(1e9))
     assert not physics_instead(problem, named, suspected(0.0))
-    assert not physics_instead(problem, named, suspected(1e9, certain=True))
+    assert physics_instead(problem, named, suspected(1e9, stuck=True))  # though recalibration alone stops at its bounds
+    assert not physics_instead(problem, named, suspected(1e9, stuck=True, rest=0.01))  # another entry explains all
     assert not physics_instead(problem, [], suspected(1e9))
     assert not physics_instead(mistyped, named, suspected(1e9))
+    assert not physics_instead(mistyped, named, suspected(1e9, stuck=True))
 
 
 @pytest.mark.parametrize("load", [0.5, 2.0])
@@ -225,11 +227,11 @@ def test_physics_is_told_beside_a_mistyped_load(load: float) -> None:
         problem = synchronised(record(real, QUICK, 6), with_load(load)).problem
         wrong = wrong_sheet(problem)
         assert wrong is not None
-        assert not wrong.certain
+        assert not wrong.stuck
         assert physics_beside(problem, [viscous], wrong) == hidden
         assert not physics_beside(problem, [standin], wrong)
         assert not physics_beside(problem, [], wrong)
-        assert not physics_beside(problem, [viscous], replace(wrong, certain=True))
+        assert not physics_beside(problem, [viscous], replace(wrong, stuck=True))
 
 
 def mistyped(*names: str) -> Vehicle:

@@ -265,6 +265,19 @@ def test_what_stands_is_named_though_as_much_again_is_unlisted(slower: Problem) 
         assert {item.score.candidate.effect.id for item in found.found} == names
 
 
+@pytest.mark.parametrize(("uneven", "names"), [(0.2, ["line_loss_quadratic"]), (0.9, [])])
+def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem, uneven: float, names: list[str]) -> None:
+    """Freedoms that can be the loss of each stretch of time by itself: nearly of one law in all, and by far not."""
+    base = slower.predict_all(slower.start())
+    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=3e4)]) - base
+    stretch = np.arange(loss.size) * 16 // loss.size
+    pieces = np.where(stretch[:, None] == np.arange(16), loss[:, None], 0.0)
+    torque = pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))
+    found = searched(replace_bends(with_torque(slower, base + torque), 3.0 * pieces))
+    assert [item.score.candidate.effect.id for item in found.found] == names
+    assert all(item.in_place for item in found.found)
+
+
 def test_the_error_of_an_arm_counts_in_the_torque_as_measured(problem: Problem) -> None:
     """With both tracks at one angle the true torque is the measured one times the factor; its error is divided by it again."""
     alike = replace(problem.runs[0], theta=np.repeat(problem.runs[0].theta[:1], 2, axis=0))

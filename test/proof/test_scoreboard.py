@@ -220,6 +220,17 @@ def test_generated_laws_and_dirt_have_scores_of_their_own() -> None:
     assert part["dirty"]["named"] == {"relief_saturation": 1}
 
 
+def test_what_stands_in_place_of_an_entry_is_scored_against_it() -> None:
+    """Of a noise of 6 N m, 20 N m before and 10 N m with the entry: 12 N m without it is 256 of 300 (N m)^2, nothing found none of them."""
+    rows, unlisted, silent = [], "unlisted_physics", "consistent"
+    for named, verdict, after in (("end_stop", unlisted, 12.0), ("end_stop", silent, 20.0), ("backlash", silent, 20.0)):
+        case = row(["end_stop"], FOUND, effect(named), kind="without", rmse=(20.0, 10.0))
+        rows.append(case | {"without": row(["end_stop"], verdict, kind="without", rmse=(20.0, after))["diagnosis"]})
+    assert [scores.removed_without(case) for case in rows] == [pytest.approx(256.0 / 300.0), 0.0, None]
+    shown = scoreboard.part(rows)["without"]
+    assert (shown["enough"]["hits"], shown["enough"]["of"], shown["removed"]["of"]) == (0, 2, 2)
+
+
 def test_measured_quantities_are_scored_beside_coefficients() -> None:
     case = row(["end_stop"], FOUND, effect("end_stop")) | {
         "measured": {"end_stop": {"what": "angle", "unit": "rad", "true": 0.5, "value": 0.52, "ci95": [0.51, 0.53]}}
@@ -273,6 +284,7 @@ def test_campaign_covers_every_effect_size_and_disguise(simulator: int) -> None:
         assert len(kinds["null"]) >= 100
         assert {case.noise for case in kinds["null"]} == {"white", "coloured", "ripple"}
         assert {case.effects[0] for case in kinds["unlisted"]} == set(UNLISTED_IDS)
+        assert {case.effects[0] for case in kinds["without"]} == set(effects)
     else:
         assert len(effects) >= 12
         assert len(kinds["dirty"]) >= 100

@@ -26,6 +26,7 @@ from lugre_steering.report import words
 
 BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
+IN_PLACE = "small changes of the form of the friction law, all of them together, would explain as much"
 
 
 def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> list[NamedEffect]:
@@ -96,7 +97,8 @@ def _statement(
         f"{done.title(candidate.effect.id)}: {law}. Up to {done.torque(size)} "
         f"({words.percent(size / done.amplitude)} of the torque amplitude, {label}){_since(done, candidate)}"
         + _lines(done, bent, index, item)
-        + (f"; the data cannot tell it from {' or '.join(inside(done.title(rival)) for rival in rivals)}." if rivals else ".")
+        + (f"; the data cannot tell it from {' or '.join(inside(done.title(rival)) for rival in rivals)}" if rivals else "")
+        + (f"; {IN_PLACE}." if item.in_place else ".")
     )
 
 

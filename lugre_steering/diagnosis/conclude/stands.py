@@ -76,7 +76,8 @@ def _tested(done: Finished, seed: int) -> _Tested:
     problem, found, there = done.problem, done.found, done.compared
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
     beside = judged
-    if found.found and done.needs_form and judged.gain > -CONTRADICTED:
+    beside_form = done.needs_form and not any(item.in_place for item in found.found)
+    if found.found and beside_form and judged.gain > -CONTRADICTED:
         beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
     clock = _clocks_alone(found.final, len(problem.runs))
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.

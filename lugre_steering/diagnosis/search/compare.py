@@ -14,9 +14,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, form_energy
+from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, beyond_calibration, form_energy
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
+from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal
+from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import TYPICAL, Problem
@@ -28,6 +30,8 @@ SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
+TAKEN_OF_SETTLING = 0.06
+"""What FORM_TAKEN is of names that settle with time: how rubber, oil and sensors do is known less well than how they act."""
 ROUNDS, ALIKE = 3, 0.1
 """Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -103,12 +107,31 @@ def _volume(problem: Problem, gram: Array) -> float:
 
 
 def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) -> float:
-    """Energy that a name must take to be believed, where ``result`` has it; ``stands``: what the names before it took.
+    """Energy that a name must take to be believed, where ``result`` has it; ``stands``: ``may_differ`` of the names before it.
 
     Of what freedoms and names do, some part is always of another form than nature.
     """
     own = OWN_ERROR * float(np.count_nonzero(weight)) * (OWN_SHARE if problem.bends.shape[1] else 1.0)
-    return SURE * problem.doubt + FORM_TAKEN * (form_energy(problem, result, weight) + stands) + own
+    return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + stands + own
+
+
+def may_differ(problem: Problem, result: Fit, gains: Sequence[float]) -> float:
+    """Energy that another form of the last names of ``result`` may make; ``gains``: what each of them took.
+
+    Shares of these, as beside a name its own law may bend along its coordinate; and where time is that, of all that its torque does
+    beyond a recalibration.
+    """
+    first, found = len(result.effects) - len(gains), 0.0
+    for i, gain in enumerate(gains, first):
+        if _settles(result.effects[i][0].effect):
+            found += TAKEN_OF_SETTLING * beyond_calibration(problem, result, contribution(problem, result, i))
+        else:
+            found += FORM_TAKEN * gain
+    return found
+
+
+def _settles(effect: Effect) -> bool:
+    return effect.coordinate == "dwell" or "lag" in effect.hooks
 
 
 def tied(

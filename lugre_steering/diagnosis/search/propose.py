@@ -73,12 +73,15 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
         leading |= {trial.candidate.label: trial for trial in own.trials if own.before - trial.cost > LEADING * best}
     trials, best = list[Trial](), current.cost
     for trial in sorted(leading.values(), key=lambda each: each.cost):
-        worth = worth_of(current.cost, best)
-        again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE, worth=worth)
+        again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE, worth=worth_of(current.cost, best))
         trials.append(replace(trial, fit=again, cost=again.cost))
-        if again.cost <= worth:
-            trials[-1] = refine(problem, weight, trials[-1])
-        best = min(best, trials[-1].cost)
+        best = min(best, again.cost)
+    # Which law has the better simplest form says little about their whole forms.
+    near, best = worth_of(current.cost, best), current.cost
+    for i, trial in enumerate(trials):
+        if trial.cost <= near:
+            trials[i] = refine(problem, weight, trial, worth_of(current.cost, best))
+            best = min(best, trials[i].cost)
     return Proposal(problem, current, seen[0].scores, ranked(trials, current.cost))
 
 

@@ -10,11 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering.diagnosis.search import flexible
-from lugre_steering.diagnosis.search.compare import clearest, foreign, left, needed, settled, simplest, tied, worlds
+from lugre_steering.diagnosis.search.compare import (
+    clearest,
+    foreign,
+    left,
+    may_differ,
+    needed,
+    settled,
+    simplest,
+    tied,
+    worlds,
+)
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
 from lugre_steering.fitting import rig
@@ -31,6 +42,8 @@ MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
 """Most names, most rivals told of one, and how many of the best fingerprints are tried in place of what every joint has."""
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
+REST = 0.1
+"""Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -39,7 +52,8 @@ BENT = 0.3
 class Found:
     """An accepted effect: its screen score, its rivals that fit as well, the trials of its round and the energy [noise variances] it took.
 
-    ``given``: it is what every joint may have, and was not looked for.
+    ``given``: it is what every joint may have, and was not looked for. ``in_place``: small changes of the friction law's form would
+    explain as much, all of them together.
     """
 
     score: Score
@@ -47,6 +61,7 @@ class Found:
     trials: tuple[Trial, ...]
     gain: float
     given: bool = False
+    in_place: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,29 +93,26 @@ def search(
         further = len(found) > given
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
-        there, best = clearest(weight, seen)
-        stands = sum(item.gain for item in found[given:])
-        nothing = not best.effects[len(current.effects) :]
-        if nothing or _taken(there, weight, current, best) < HOPELESS * needed(there, best, weight, stands):
+        stands = may_differ(now, current, [item.gain for item in found[given:]])
+        step = _step(seen, current, stands, weight, split, progress)
+        if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
             break
-        progress(f"a closer look at {best.effects[-1][0].label}")
-        there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
-        short = one.gain < needed(there, best, weight, stands)
-        if short and (waiting or len(found) + 1 == given + MAX_EFFECTS):
-            break
-        both = [*found, one]
-        found, current = (both, best) if short else _pruned(there, weight, both, best)
+        there, both = step.problem, [*found, step.name]
+        if step.instead is not None:
+            problem, baseline = step.instead.problem, step.instead.current
+        found, current = (both, step.fit) if step.short else _pruned(there, weight, both, step.fit)
         now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
         if waiting and len(found) < len(both):
             break
-        waiting = short  # what another one keeps in doubt may stand beside that one
+        waiting = step.short  # what another one keeps in doubt may stand beside that one
         if not waiting:
             sure = found, now, current
     found, now, current = sure
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
             found[i] = _told(item, _rivals(now, noise, weight, split, current, item, i))
-    problem, baseline = settled(problem, weight, baseline, now.doubt)
+    if not any(item.in_place for item in found):
+        problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
     if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
         rest = current.effects[:given]
@@ -108,6 +120,35 @@ def search(
         found = found[:given]
     more = np.zeros(now.nuisances - baseline.x.size)
     return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), pattern)
+
+
+class _Step(NamedTuple):
+    """A name that may come next, in its problem and fit; whether it is ``short`` of what it needs; and the round without freedoms if it
+    stands there ``instead`` of them."""
+
+    problem: Problem
+    fit: Fit
+    name: Found
+    short: bool
+    instead: Proposal | None = None
+
+
+def _step(
+    seen: Sequence[Proposal], current: Fit, stands: float, weight: Array, split: Split, progress: Callable[[str], None]
+) -> _Step | None:
+    """The best of what is proposed beside ``current``, unless it takes far too little; ``stands``: ``may_differ`` of names there."""
+    there, best = clearest(weight, seen)
+    further = stands > 0.0
+    instead = None if further else _in_place_of_form(seen, weight)
+    named = bool(best.effects[len(current.effects) :])
+    step = None
+    if named and _taken(there, weight, current, best) >= HOPELESS * needed(there, best, weight, stands):
+        progress(f"a closer look at {best.effects[-1][0].label}")
+        there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
+        step = _Step(there, best, one, one.gain < needed(there, best, weight, stands))
+    if instead is not None and (step is None or step.short):
+        step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
+    return step
 
 
 def _given(
@@ -132,8 +173,31 @@ def _closest(
     rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
     chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
     there, best = settled(own.problem, weight, chosen.fit)
-    names = tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
-    return there, best, Found(chosen.score, names, tuple(own.trials), _taken(there, weight, current, best))
+    return there, best, Found(chosen.score, _names(rivals), tuple(own.trials), _taken(there, weight, current, best))
+
+
+def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
+    """The round without freedoms, if one name does there nearly all that the freedoms do without it."""
+    free, exact = seen[0], seen[-1]
+    if free is exact or not exact.trials:
+        return None
+    best = exact.trials[0]
+    if exact.before - best.cost < needed(exact.problem, best.fit, weight):
+        return None
+    return exact if best.cost - free.before < REST * (exact.before - free.before) else None
+
+
+def _simplest(exact: Proposal, weight: Array, split: Split) -> tuple[Problem, Fit, Found]:
+    """Of the names that do what the freedoms do the simplest that ties, without them."""
+    own = closer(exact.problem, weight, [exact])
+    rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
+    chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
+    found = Found(chosen.score, _names(rivals), tuple(own.trials), own.before - chosen.cost, in_place=True)
+    return own.problem, chosen.fit, found
+
+
+def _names(rivals: Sequence[Trial]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(rival.candidate.effect.id for rival in rivals))[:MOST_RIVALS]
 
 
 def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
