@@ -263,7 +263,7 @@ def replay(
         print_json(result)
     else:
         show_replay(output(), result)
-        print(f"results in {out}, for people in {'NAME' if len(result['bags']) > 1 else result['bags'][0]['name']}.html")
+        print(f"results in {out}, for people in {'<recording>' if len(result['bags']) > 1 else result['bags'][0]['name']}.html")
     leave_if(wanted.failures(facts(result)))
 
 
@@ -315,14 +315,15 @@ def simulate(
         "seed": seed,
     }
     chosen = simulation.load_vehicle(vehicle, effect or [])
+    origin = simulation.origin(what, vehicle, {"effect": effect, **sensing})
     if simulation.is_experiment(what):
         if any(value is not None for value in (storage, *sensing.values())):
             raise DataError(f"simulate {what}: has its own sampling and noise and writes no bag; expected no such option")
         outcomes = simulation.run_experiments(what, chosen)
-        result = simulation.write_outcomes(what, outcomes, out)
+        result = simulation.write_outcomes(what, outcomes, out, origin)
         print_json(result) if as_json else simulation.show_outcomes(output(), outcomes, out)
         raise typer.Exit(0 if result["passed"] else 1)
-    result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap")
+    result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap", origin)
     print_json(result) if as_json else simulation.show_run(output(), result, chosen)
 
 
@@ -337,6 +338,7 @@ def vehicle_(
     """Check a vehicle file and say what it amounts to, or begin one.
 
     Loads, friction, heat, inputs and effects."""
+    from lugre_steering.effects.registry import made
     from lugre_steering.sheet.derived import derive
     from lugre_steering.sheet.show import draw_footprint, show_vehicle
     from lugre_steering.vehicle import load
@@ -344,11 +346,12 @@ def vehicle_(
     if new:
         from lugre_steering.sheet.new import begin_sheet
 
-        begin_sheet(file, lambda text, default: default if yes else typer.prompt(text, default, err=True), console().print)
+        written = begin_sheet(file, lambda text, default: default if yes else typer.prompt(text, default, err=True), console().print)
+        console().print(f"written: {', '.join(map(str, written))}", highlight=False, soft_wrap=True)
     elif yes:
         raise DataError("vehicle --yes: answers the questions of --new; expected both")
     read = load(file)
-    picture = draw_footprint(read, out) if out is not None else None
+    picture = draw_footprint(read, out, made("vehicle", {}, file, [])) if out is not None else None
     result = {**derive(read), "picture": picture and str(picture)}
     print_json(result) if as_json else show_vehicle(output(), result)
 

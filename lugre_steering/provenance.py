@@ -18,6 +18,8 @@ from lugre_steering.version import __version__
 _CHUNK = 1 << 20
 EPOCH = "SOURCE_DATE_EPOCH"
 """Environment variable, see reproducible-builds.org."""
+MADE = "made"
+"""Under this key the metadata of a bag tells it."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 NEAREST = {
-    "…": "...", "→": "->", "–": "-", "—": "-", "−": "-", "·": ".", "±": "+-", "²": "2", "³": "3", "°": " deg", "µ": "u", "\u2009": " ",
+    "…": "...", "→": "->", "–": "-", "—": "-", "−": "-", "·": ".", "±": "+-", "²": "2", "³": "3", "°": " deg", "µ": "u", "\u202f": " ",
     "\u00a0": " ", "•": "*", "✓": "ok", "✗": "x",
 }  # fmt: skip
 """Letters of ours and of our libraries, and what stands for them where only ASCII is known."""

@@ -12,6 +12,7 @@ import re
 from typing import Any
 
 from lugre_steering.effects.entry import Effect
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.serialise import mapped
 from lugre_steering.vehicle import Vehicle
 
@@ -95,3 +96,8 @@ def in_words(vehicle: Vehicle, tree: Any) -> Any:
 def title(vehicle: Vehicle, effect: Effect) -> str:
     """The title of a catalogue entry in words that fit this vehicle: a single joint has no tracks and no kingpin."""
     return effect.title if vehicle.contact is None else effect.joint_title or effect.title
+
+
+def titles(vehicle: Vehicle) -> list[str]:
+    """Those of the effects that stand in a vehicle file."""
+    return [title(vehicle, CATALOGUE[effect.id]) for effect in vehicle.effects]

@@ -195,6 +195,10 @@ def test_out_in_a_folder_of_bags_is_told(tmp_path: Path) -> None:
     write_cycle(tmp_path / "run", 1.0)
     with pytest.raises(BagError, match=rf"such as {tmp_path}_results$"):
         find([tmp_path / "run"], tmp_path)
+    (tmp_path / "monday").mkdir()
+    (tmp_path / "run").rename(tmp_path / "monday" / "run")
+    with pytest.raises(BagError, match=rf"such as {tmp_path}_results$"):
+        find([tmp_path], tmp_path)
 
 
 def test_recordings_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:

@@ -238,7 +238,7 @@ def test_the_nearest_letters() -> None:
     from lugre_steering.terminal import nearest
 
     codecs.register_error("test.nearest", nearest)
-    assert "1\u2009750 … 2 → 3 Ω".encode("ascii", "test.nearest") == b"1 750 ... 2 -> 3 ?"
+    assert "1\u202f750 … 2 → 3 Ω".encode("ascii", "test.nearest") == b"1 750 ... 2 -> 3 ?"
 
 
 def test_the_list_of_effects_fits_80_columns_and_one_screen_or_so(here: Callable[..., Result]) -> None:

@@ -21,6 +21,7 @@ import pytest
 import typer.main
 import yaml
 from test_packaging import environment
+from test_report import CHROMIUM, needs_chromium
 from typer.testing import CliRunner
 
 from lugre_steering import reference
@@ -46,17 +47,48 @@ def named(page: Path) -> str:
 # --------------------------------------------------------------------- site
 
 
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("mkdocs")
     pytest.importorskip("material")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
+    folder = tmp_path_factory.mktemp("built") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=ROOT, env=environment(NO_MKDOCS_2_WARNING="1"), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    shown = (tmp_path / "site/vehicle_file.html").read_text(encoding="utf-8")
+    return folder
+
+
+def test_the_site_builds_without_a_warning(site: Path) -> None:
+    shown = (site / "vehicle_file.html").read_text(encoding="utf-8")
     assert "load_N" in shown
     assert "<!-- reference" not in shown
-    assert (tmp_path / "site/bags/synthetic_hidden_stop_found.png").is_file()
-    assert not list((tmp_path / "site").rglob("*.py"))
+    assert (site / "bags/synthetic_hidden_stop_found.png").is_file()
+    assert not list(site.rglob("*.py"))
+
+
+WIDTHS = """<script>window.addEventListener("load", function () {
+  document.body.setAttribute("data-told", JSON.stringify(Array.from(document.querySelectorAll("iframe")).map(function (frame) {
+    var page = frame.contentDocument;
+    return [page.documentElement.scrollWidth].concat(Array.from(page.querySelectorAll("table, pre")).map(function (part) {
+      return Math.ceil(part.getBoundingClientRect().right); }));
+  })));
+});</script>"""
+
+
+@needs_chromium
+def test_nothing_of_the_site_is_wider_than_a_phone(site: Path) -> None:
+    pages = sorted(page.name for page in site.glob("*.html") if page.name != "404.html")
+    frames = "".join(f'<iframe style="width:390px;height:800px;border:0" src="{page}"></iframe>' for page in pages)
+    host = site / "all.html"
+    host.write_text(f"<!doctype html><body>{frames}{WIDTHS}</body>", encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", f"--user-data-dir={site / 'profile'}"]
+    command = [str(CHROMIUM), *options, "--virtual-time-budget=10000", "--dump-dom", host.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    told = re.search(r'data-told="([^"]*)"', done.stdout)
+    assert told is not None, done.stderr
+    widest = {page: max(widths) for page, widths in zip(pages, json.loads(told[1]), strict=True)}
+    assert len(widest) > 15
+    assert {page: width for page, width in widest.items() if width > 390} == {}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
@@ -147,7 +179,7 @@ LOG = "time_s,angle_left_deg,angle_right_deg,main_a_bar,main_b_bar,aux_a_bar,aux
 
 
 def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In their order; those on what a diagnosis has written have a vehicle file in its place. They find what the page says."""
+    """In their order; what the first diagnosis writes is a vehicle file in its place. They find what the page says."""
     for name in ("bags", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "out/diagnosis").mkdir(parents=True)
@@ -158,7 +190,7 @@ def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     ran = []
     for arguments in filter(None, map(of_ours, shell_lines(DOCS / "first_hour.md"))):
-        if arguments[0] in QUICK:
+        if arguments[0] in QUICK or "out/named" in arguments:
             done = CliRunner().invoke(app, arguments, input="\n" * 100)
             assert done.exit_code == 0, f"{arguments}: {done.output}"
             ran.append(arguments[0])
@@ -167,7 +199,11 @@ def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: p
                 assert told is not None
                 found = [bag["fit"]["rmse_Nm"] for bag in json.loads(Path("out/summary.json").read_text())["bags"]]
                 assert [float(number) for number in told.groups()] == pytest.approx(found, rel=0.01)
-    assert set(ran) == set(QUICK)
+    assert set(ran) == {*QUICK, "diagnose"}
+    (named_one,) = json.loads(Path("out/named/diagnosis.json").read_text())["effects"]
+    assert named_one["id"] == "backlash"
+    assert named_one["indistinguishable_from"] == []
+    assert named_one["parameters"]["width"]["value"] == pytest.approx(0.02, rel=0.02)
     assert (tmp_path / "my_vehicle_rubber.csv").exists()
     assert (tmp_path / "my_bag/metadata.yaml").exists()
 

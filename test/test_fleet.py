@@ -100,7 +100,9 @@ def test_the_record_keeps_to_its_schema(done: Path) -> None:
 
 def test_tables_are_what_they_say(done: Path, runs: Path) -> None:
     for name, columns in KINDS.items():
-        assert pq.read_schema(done / f"{name}.parquet").names == list(columns)
+        schema = pq.read_schema(done / f"{name}.parquet")
+        assert schema.names == list(columns)
+        assert hashlib.sha256(VEHICLE.read_bytes()).hexdigest() in schema.metadata[b"lugre_steering"].decode()
     scores = {Path(row["bag"]).name: row for row in table(done, "scores")}
     assert scores["run_0"]["rmse_Nm"] > 0.0
     assert scores["run_0"]["duration_s"] == pytest.approx(5.0, abs=0.1)
@@ -261,6 +263,18 @@ def test_what_is_missing_is_named(
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 2
     assert "lugre_steering[fleet]" in done.stderr
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_where_nothing_is_there_nothing_is_judged(runs: Path, tmp_path: Path) -> None:
+    arguments = ["--vehicle", str(VEHICLE), "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, ["fleet", str(tmp_path / "nothing"), *arguments])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "no such file or folder" in done.stderr
+    assert not (tmp_path / "out").exists()
+    done = CliRunner().invoke(app, ["fleet", str(runs / "corrupt"), *arguments])
+    assert done.exit_code == 0
+    assert done.stdout.startswith("- No recording tells anything")
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -66,12 +66,12 @@ def test_units_are_told_from_numbers_alone(tmp_path: Path, angle_unit: str, rate
 def test_stated_units_are_taken_and_commands_are_not(tmp_path: Path) -> None:
     columns = {
         "t [ms]": 1e3 * T, "angle left [mrad]": 1e3 * ANGLE, "angle_right_deg": np.degrees(ANGLE), "target angle": ANGLE,
-        "Force (kN)": T, "p cap (MPa)": T, "motor_enabled": np.ones_like(T), "foo": T[::-1],
+        "Force (kN)": T, "p cap (MPa)": T, "T air [C]": np.full_like(T, 15.0), "motor_enabled": np.ones_like(T), "foo": T[::-1],
     }  # fmt: skip
     found = proposal(csv_of(tmp_path, columns, ";", ","))
     assert units(found) == {
         "time": ("t [ms]", "ms"), "angle/left": ("angle left [mrad]", "mrad"), "angle/right": ("angle_right_deg", "deg"),
-        "measured_torque": ("Force (kN)", "kN"), "pressure/p_cap": ("p cap (MPa)", "MPa"),
+        "measured_torque": ("Force (kN)", "kN"), "pressure/cap": ("p cap (MPa)", "MPa"), "air_temperature": ("T air [C]", "degC"),
     }  # fmt: skip
     assert {row["column"] for row in found["unused"]} == {"target angle", "motor_enabled", "foo"}
     assert "the name tells nothing known; 0 ... 19.99" in found["text"]

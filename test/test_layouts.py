@@ -91,3 +91,4 @@ def test_both_are_named_where_a_user_looks() -> None:
     for file in LAYOUTS.iterdir():
         assert file.name in said or file.name == "README.md"
         assert Path(file).stat().st_size > 100
+    assert "[layouts for PlotJuggler and Foxglove](config/layouts/README.md)" in (Path(__file__).parents[1] / "README.md").read_text()

@@ -35,6 +35,7 @@ def begun(file: Path, **answers: str | list[str]) -> tuple[Vehicle, list[str]]:
 def test_the_proposed_values_are_the_reference_vehicle_and_replay_anywhere(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["vehicle", str(tmp_path / "own.yaml"), "--new", "--yes", "--json"])
     assert done.exit_code == 0, done.output
+    assert done.stderr.splitlines()[-1] == f"written: {tmp_path / 'own.yaml'}, {tmp_path / 'own_rubber.csv'}"
     assert json.loads(done.stdout)["warnings"] == []
     moved = tmp_path / "moved"
     moved.mkdir()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 import lugre_steering
@@ -87,3 +88,38 @@ def test_names_of_files_cannot_break_out_of_a_comment(tmp_path: Path) -> None:
     written = tmp_path / "own.yaml"
     save(load(VEHICLE_FILE), written, provenance("calibrate", {}, sheet).lines())
     assert load(written).name == load(VEHICLE_FILE).name
+
+
+def test_recordings_tell_it(out: Path, tmp_path: Path) -> None:
+    """Those that are simulated, imported and replayed, in their metadata."""
+    table, mapped = tmp_path / "log.csv", tmp_path / "map.yaml"
+    table.write_text("time [s],angle left [deg],p main a [bar]\n" + "".join(f"{0.01 * i:.2f},{0.1 * i:.1f},50\n" for i in range(200)))
+    for arguments in (
+        ["simulate", "chirp", "--vehicle", VEHICLE_FILE, "--seed", "3", "--effect", "yaw_inertia:inertia=500", "--out", tmp_path],
+        ["import", table, "--propose", "--map", mapped],
+        ["import", table, "--map", mapped, "--out", tmp_path / "imported"],
+    ):
+        done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+        assert done.exit_code == 0, done.output
+    for folder, told in (
+        (tmp_path / "synthetic_chirp", ("simulate", "seed = 3", "yaw_inertia:inertia=500", sha256(VEHICLE_FILE))),
+        (tmp_path / "imported", ("import", sha256(table), sha256(mapped))),
+        (out / "replay" / "synthetic_double_cycle", ("replay", "feed_forward_horizon_s = 0.25", sha256(VEHICLE_FILE))),
+    ):
+        made = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]["custom_data"]["made"]
+        for words in (f"lugre_steering {lugre_steering.__version__}", *told):
+            assert words in made
+
+
+def test_pictures_of_simulations_sheets_and_effects_tell_it(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("matplotlib")
+    for command, name in (
+        (["vehicle", VEHICLE_FILE], "footprint.png"), (["effects", "end_stop"], "end_stop.png"),
+        (["simulate", "chirp", "--vehicle", VEHICLE_FILE], "synthetic_chirp.png"),
+    ):  # fmt: skip
+        done = CliRunner().invoke(app, [*map(str, command), "--out", str(tmp_path / command[0])])
+        assert done.exit_code == 0, done.output
+        with image.open(tmp_path / command[0] / name) as picture:
+            assert f"lugre_steering {lugre_steering.__version__} {command[0]}" in picture.info["Comment"]
+            assert VEHICLE_FILE not in command or sha256(VEHICLE_FILE) in picture.info["Comment"]

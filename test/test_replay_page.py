@@ -35,9 +35,8 @@ def vehicle() -> Vehicle:
     return load(VEHICLE_FILE)
 
 
-@pytest.fixture(scope="module")
-def page(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One hour at 100 Hz with a torque peak of a single sample."""
+def write_hour(vehicle: Vehicle, file: Path) -> None:
+    """Page of one hour at 100 Hz with a torque peak of a single sample."""
     time = np.arange(0.0, HOUR_S, 0.01)
     angle = 0.5 * np.sin(0.2 * time)
     torque = 45e3 * np.tanh(8.0 * np.cos(0.2 * time))
@@ -52,8 +51,13 @@ def page(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Path:
     samples = {"angle/left": InputCounts("/steering/left/joint_state", 360_000, {"spike": 2}, {})}
     findings = (Finding("clock_set_back", "/<b>", "stamps jumped back 2 times"),)
     bag = ReplayedBag("long", "long", HOUR_S, 1_000_000, 360_000, fit.result(), None, samples, 0, findings)
+    write_page(bag, vehicle, motion, check, provenance("replay", {"horizon": 0.5, "initial_temperature": None}, VEHICLE_FILE), file)
+
+
+@pytest.fixture(scope="module")
+def page(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("page") / "long.html"
-    write_page(bag, vehicle, motion, check, provenance("replay", {"horizon": 0.5}, VEHICLE_FILE), file)
+    write_hour(vehicle, file)
     return file
 
 
@@ -83,7 +87,9 @@ def test_an_hour_is_thinned_and_its_peak_stays(page: Path) -> None:
 def test_first_screen_findings_samples_and_origin(page: Path) -> None:
     source = page.read_text(encoding="utf-8").replace("\u00a0", " ")
     text = re.sub(r"<[^>]*>", " ", source[source.index("<main>") : source.index("</main>")])
-    for words in ("root mean square error", "91.2 kN m", "stamps jumped back 2 times", "2 spike", "/&lt;b&gt;", "horizon = 0.5", "sha256"):
+    told = ("root mean square error", "91.2 kN m", "stamps jumped back 2 times", "2 spike", "/&lt;b&gt;")
+    made = ("horizon: 0.5", "initial_temperature: none", "SHA-256")
+    for words in (*told, *made):
         assert words in text, words
     assert "<b>" not in source
 

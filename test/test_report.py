@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import html
 import importlib.util
 import io
 import json
@@ -263,7 +262,7 @@ def test_page_is_small_enough_to_send(written: Written, vehicle: Vehicle) -> Non
 def test_the_page_suits_phone_dark_ground_print_and_keyboard(written: Written) -> None:
     source = written.files[0].read_text(encoding="utf-8")
     assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in source
-    for query in ("(prefers-color-scheme: dark)", "(max-width: 640px)", "print", "(prefers-reduced-motion"):
+    for query in ("screen and (prefers-color-scheme: dark)", "(max-width: 640px)", "print", "(prefers-reduced-motion"):
         assert f"@media {query}" in source
     assert "focus-visible" in source
     body = source[source.index("<body") : source.index('<script type="application/json"')]
@@ -325,7 +324,7 @@ def test_bags_of_one_name_do_not_overwrite_each_others_pictures(vehicle: Vehicle
 def test_every_verdict_has_a_page(vehicle: Vehicle, make: Callable[[Vehicle], Diagnosis]) -> None:
     diagnosis = make(vehicle)
     page = page_of(diagnosis)
-    assert diagnosis.json["verdict"] in page.text
+    assert diagnosis.json["verdict"].replace("_", " ") in page.text
     assert "effects" not in page.ids
     assert len(specs(page)) == len(diagnosis.traces)  # torque only: nothing was found that could be drawn
     assert "nan" not in re.sub(r"\w{4,}", "", page.text).lower()
@@ -408,8 +407,8 @@ def test_errors_have_the_digits_of_their_machine(value: float, beside: float, te
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (None, "-"), (float("inf"), "-"), (1.0, "1"), (-0.41999, "-0.42"), (12345.6, "12\u2009350"), (3317.4, "3317"),
-     (3.1234e-7, "3.123e-07"), (99999.0, "100\u2009000"), (0.00123456, "0.001235")],
+    [(0.0, "0"), (None, "-"), (float("inf"), "-"), (1.0, "1"), (-0.41999, "-0.42"), (12345.6, "12\u202f350"), (3317.4, "3317"),
+     (3.1234e-7, "3.123e-07"), (99999.0, "100\u202f000"), (0.00123456, "0.001235")],
 )  # fmt: skip
 def test_numbers_are_readable(value: float | None, text: str) -> None:
     assert words.number(value) == text
@@ -500,54 +499,6 @@ def test_browser_check_would_see_errors_and_requests(tmp_path: Path) -> None:
     seen = browse(file, tmp_path)
     assert any("broken" in line for line in seen.console)
     assert "http://127.0.0.1:9/x.png" in seen.requests
-
-
-def measured_in_browser(page: str, width: int, dark: bool, folder: Path) -> dict[str, Any]:
-    """What a browser makes of a page ``width`` pixels wide: width needed, narrowest cell and its text, size of the charts, ground."""
-    assert CHROMIUM is not None
-    script = """
-    <script>document.querySelector("iframe").addEventListener("load", function () {
-      var d = this.contentDocument, w = this.contentWindow, cells = Array.from(d.querySelectorAll("td")).filter(function (c) {
-        return c.offsetParent !== null && c.textContent.trim().length > 3; });
-      var told = { needs: d.documentElement.scrollWidth, ground: w.getComputedStyle(d.body).backgroundColor,
-        ink: w.getComputedStyle(d.body).color, cell: Math.min.apply(null, cells.map(function (c) { return c.offsetWidth; })),
-        charts: Array.from(d.querySelectorAll("svg.chart")).map(function (s) { return s.getBoundingClientRect().width; }),
-        focus: d.querySelectorAll("figure [tabindex='0'][aria-label], figure button").length };
-      document.body.setAttribute("data-told", JSON.stringify(told)); });</script>"""
-    file = folder / f"frame-{width}-{dark}.html"
-    frame = f'<iframe style="width:{width}px;height:3000px;border:0" srcdoc="{html.escape(page)}"></iframe>'
-    file.write_text(f"<body>{frame}{script}</body>", encoding="utf-8")
-    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}", "--window-size=1400,1000"]
-    scheme = f"--blink-settings=preferredColorScheme={0 if dark else 1}"
-    done = subprocess.run(
-        [CHROMIUM, *options, scheme, "--virtual-time-budget=10000", "--dump-dom", file.as_uri()],
-        capture_output=True, text=True, check=True, timeout=120,
-    )  # fmt: skip
-    told = re.search(r'data-told="([^"]*)"', done.stdout)
-    assert told is not None, done.stderr
-    result: dict[str, Any] = json.loads(html.unescape(told[1]))
-    return result
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance of ``rgb(r, g, b)`` after WCAG 2."""
-    parts = np.array([int(n) / 255.0 for n in re.findall(r"\d+", colour)[:3]])
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    return float(linear @ np.array([0.2126, 0.7152, 0.0722]))
-
-
-@needs_chromium
-@pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, False), (1280, True)])
-def test_phone_and_desktop_on_light_and_dark_ground(vehicle: Vehicle, tmp_path: Path, width: int, dark: bool) -> None:
-    told = measured_in_browser(render(missing(vehicle, "a_long_name_of_a_run_2026-05-04")), width, dark, tmp_path)
-    assert told["needs"] <= width  # nothing to push aside
-    assert told["cell"] >= 60  # no column one letter wide
-    assert len(told["charts"]) == 3
-    assert min(told["charts"]) > 0.6 * min(width, 780)
-    ground, ink = luminance(told["ground"]), luminance(told["ink"])
-    assert (ground < ink) == dark
-    assert (max(ground, ink) + 0.05) / (min(ground, ink) + 0.05) > 7.0  # contrast, WCAG AAA
-    assert told["focus"] > 10
 
 
 # ----------------------------------------------------------------- the catalogue on the command line
@@ -651,6 +602,21 @@ def test_the_verdict_on_a_terminal_is_a_table_of_80_columns_with_the_first_sente
     assert "held-out data 2100 N m 84 N m 80 N m" in text
     assert "improvement 96 % 94 % to 97 %" in text
     assert "- Look here." in text
+
+
+def test_a_finding_that_the_verdict_has_told_is_not_told_again_on_a_terminal(vehicle: Vehicle) -> None:
+    full, long = insufficient(vehicle), "the sign is flipped, as far as can be told."
+    findings = (
+        BagFinding("sign_flipped", "/topic", "a bag", ((0.0, 1.0),), long),
+        BagFinding("wrong_sheet", "", "", (), f"the vehicle file and the recordings disagree: {long}"),
+        BagFinding("lost_messages", "", "a bag", (), "12 messages are lost"),
+    )
+    console = Console(width=80, file=io.StringIO(), markup=False)
+    show_diagnosis(console, dataclasses.replace(full, statement=f"Put it right. a bag: {long}", data_quality=findings))
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    assert text.count(long) == 1
+    assert "- wrong sheet: the vehicle file and the recordings disagree: see above" in text
+    assert "- a bag: lost messages: 12 messages are lost" in text
 
 
 @pytest.mark.parametrize(("make", "code"), [(consistent, 0), (missing, 3), (unlisted, 4), (insufficient, 5)])

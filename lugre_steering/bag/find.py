@@ -60,6 +60,8 @@ def find(given: Sequence[Path], out: Path | None = None) -> FoundBag:
             matches = [Path(name) for name in sorted(glob(str(path), recursive=True))]
             inside = [bag for match in matches if is_recording(match) or match.is_dir() for bag in _inside(match, out)]
         elif is_folder_of_recordings(path):
+            if out is not None and path.resolve() == out.resolve():
+                raise _mixed(out, "the folder of the recordings")
             inside = list(_inside(path, out))
         else:
             bags.append(path)
@@ -90,7 +92,7 @@ def is_folder_of_recordings(path: Path) -> bool:
 
 def is_replayed(bag: Path) -> bool:
     """Whether a replay wrote this folder."""
-    return custom_data(bag) == REPLAYED
+    return REPLAYED.items() <= (custom_data(bag) or {}).items()
 
 
 def custom_data(bag: Path) -> Mapping[str, Any] | None:
@@ -143,7 +145,9 @@ def _refuse_among(bags: Sequence[Path], out: Path) -> None:
     """Results between recordings are hard to find again, and to tell apart."""
     for bag in bags:
         if bag.exists() and out.resolve() in (bag.resolve(), bag.resolve().parent):
-            raise BagError(
-                f"--out {out}: is where the recording {bag.name} lies, and results would be mixed with recordings; choose another --out, "
-                f"such as {out}_results"
-            )
+            raise _mixed(out, f"where the recording {bag.name} lies")
+
+
+def _mixed(out: Path, what: str) -> BagError:
+    told = "results would be mixed with recordings; choose another --out, such as"
+    return BagError(f"--out {out}: is {what}, and {told} {out}_results")

@@ -158,8 +158,8 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
         f"{values} (SI). Law: {effect.equation}. How it shows: {effect.trace}. Thin line: the part of the difference that "
         "recalibrating the baseline cannot imitate; only that part can be seen in a recording."
     )
-    file = out / f"{effect.id}.png"
-    with output_folder(out), figure(3 if along else 2, 1, caption, file, row_inches=2.2) as axes:
+    file, origin = out / f"{effect.id}.png", registry.made("effects", {"id": effect.id}, None, [])
+    with output_folder(out), figure(3 if along else 2, 1, caption, file, row_inches=2.2, made=origin) as axes:
         top, middle = axes[0, 0], axes[1, 0]
         top.plot(run.time, best.without * torque.scale, **MEASURED, label="without")
         top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label=f"with {effect.id}")

@@ -68,8 +68,8 @@ class Finished:
         return units.label(self.problem.vehicle, unit)
 
     def title(self, effect: str) -> str:
-        """Title of an effect of the catalogue, likewise."""
-        return units.title(self.problem.vehicle, CATALOGUE[effect])
+        """Title of an effect of the catalogue, likewise; what is none keeps its name."""
+        return units.title(self.problem.vehicle, CATALOGUE[effect]) if effect in CATALOGUE else effect
 
     @cached_property
     def amplitude(self) -> float:

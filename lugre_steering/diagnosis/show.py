@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -35,10 +38,23 @@ def show_diagnosis(console: Console, diagnosis: Diagnosis) -> None:
     for remark in words.sentences(result["statement"].removeprefix(first).strip()):
         if not remark.startswith(IN_TABLE):
             console.print(point(remark))
-    for finding in result["data_quality"]:
-        console.print(point(f"{finding['bag']}: {finding['finding'].replace('_', ' ')}: {finding['statement']}"))
+    for remark in _findings(result):
+        console.print(point(remark))
     if result["next_experiment"]:
         console.print(point(f"Next experiment: {result['next_experiment']['manoeuvre']}"))
+
+
+def _findings(result: Mapping[str, Any]) -> Iterator[str]:
+    """What was found about the recordings, each once: the verdict, or a finding before, may have said it in full."""
+    said = []
+    for finding in result["data_quality"]:
+        statement = finding["statement"]
+        if statement in result["statement"]:
+            said.append(statement)
+            continue
+        for before in said:
+            statement = statement.replace(before, "see above")
+        yield ": ".join(part for part in (finding["bag"], finding["finding"].replace("_", " "), statement) if part)
 
 
 def _found(diagnosis: Diagnosis) -> Table:

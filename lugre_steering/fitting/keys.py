@@ -12,10 +12,11 @@ from lugre_steering.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Key:
-    """One key of the vehicle file: how to read it and which calibration value decides about it."""
+    """One key of the vehicle file: what people call it, how to read it and which calibration value decides about it."""
 
     calibration: str
     key: str
+    title: str
     unit: str
     read: Callable[[Vehicle], float | None]
 
@@ -25,17 +26,17 @@ def _of(section: str, name: str) -> Callable[[Vehicle], float | None]:
 
 
 KEYS = tuple(
-    Key(calibration, f"{section}.{name}", unit, _of(section, name))
-    for calibration, section, name, unit in (
-        ("friction_level", "friction", "coulomb", "1"),
-        ("static_ratio", "friction", "static", "1"),
-        ("friction_level", "contact", "coulomb_torque_Nm", "N m"),
-        ("static_ratio", "contact", "static_torque_Nm", "N m"),
-        *(("stiffness", section, "stiffness_Nm_per_deg", "N m/deg") for section in ("friction", "contact")),
-        *(("stribeck_speed", section, "stribeck_speed_deg_s", "deg/s") for section in ("friction", "contact")),
-        ("heat_capacity", "rubber", "specific_heat_J_kgK", "J/(kg K)"),
-        ("cooling", "rubber", "heat_transfer_W_m2K", "W/(m2 K)"),
-        ("kingpin_arm", "axle", "kingpin_lever_arm_m", "m"),
-        ("pressure_gain", "sensors", "pressure_gain", "1"),
+    Key(calibration, f"{section}.{name}", title, unit, _of(section, name))
+    for calibration, section, name, title, unit in (
+        ("friction_level", "friction", "coulomb", "sliding friction", "1"),
+        ("static_ratio", "friction", "static", "static friction", "1"),
+        ("friction_level", "contact", "coulomb_torque_Nm", "sliding friction torque", "N m"),
+        ("static_ratio", "contact", "static_torque_Nm", "static friction torque", "N m"),
+        *(("stiffness", section, "stiffness_Nm_per_deg", "presliding stiffness", "N m/deg") for section in ("friction", "contact")),
+        *(("stribeck_speed", section, "stribeck_speed_deg_s", "Stribeck speed", "deg/s") for section in ("friction", "contact")),
+        ("heat_capacity", "rubber", "specific_heat_J_kgK", "specific heat of the rubber", "J/(kg K)"),
+        ("cooling", "rubber", "heat_transfer_W_m2K", "heat transfer to the air", "W/(m2 K)"),
+        ("kingpin_arm", "axle", "kingpin_lever_arm_m", "kingpin lever arm", "m"),
+        ("pressure_gain", "sensors", "pressure_gain", "gain of the pressure sensors", "1"),
     )
 )

@@ -25,7 +25,9 @@ def show_fleet(console: Console, fleet: Fleet, out: Path) -> None:
         console.print(point(_sentence(one)))
     if len(found) > MOST_LINES:
         console.print(f"{len(found) - MOST_LINES} more in {out / 'report.html'}", highlight=False)
-    if not found and fleet.options.diagnose:
+    if not any(vehicle.recordings for vehicle in fleet.vehicles):
+        console.print(point("No recording tells anything; the reasons stand below."))
+    elif not found and fleet.options.diagnose:
         console.print(point("No missing physics is seen, in single recordings or in all together."))
     console.print(Text(""), _vehicles(fleet))
     for claim in fleet.claims:

@@ -21,7 +21,7 @@ from lugre_steering.fleet.told import ALL, best, commands, day, size, title, tol
 from lugre_steering.fleet.work import Record
 from lugre_steering.report import words
 from lugre_steering.report.chart import Chart, Panel, Series
-from lugre_steering.report.markup import Row, code, facts, table, text
+from lugre_steering.report.markup import Row, code, dated, facts, table, text
 from lugre_steering.report.origin import made_by
 from lugre_steering.report.page import Charts, Section, Tone, render
 
@@ -49,7 +49,7 @@ def write_page(fleet: Fleet, records: Sequence[Record], file: Path) -> None:
     ]
     head = (
         f'<header id="verdict"><p class="over">{text(_scope(fleet))}</p>\n<h1>{text(title)}</h1>\n'
-        f'<div class="verdict"><p>{text(first)}</p></div>\n{_acting(fleet)}{facts(_numbers(fleet))}</header>'
+        f'<div class="verdict"><p>{dated(first)}</p></div>\n{_acting(fleet)}{facts(_numbers(fleet))}</header>'
     )
     maker = f"lugre_steering {fleet.version}, {fleet.date}"
     write_text(render("Fleet report", tone, head, sections, charts, maker), file)
@@ -82,7 +82,7 @@ def _verdict(fleet: Fleet) -> tuple[Tone, str, str]:
 
 def _acting(fleet: Fleet) -> str:
     """The first table: what an engineer acts on."""
-    rows = [Row([text(cell) for cell in (one.vehicle, one.what, one.size, one.since, one.seen, one.do)], LEADS) for one in told(fleet)]
+    rows = [Row([dated(cell) for cell in (one.vehicle, one.what, one.size, one.since, one.seen, one.do)], LEADS) for one in told(fleet)]
     return _limited(("vehicle", "what the model leaves out", "how much", "since", "seen in", "what to do"), rows, (), "claims.parquet")
 
 
@@ -142,7 +142,7 @@ def _rank(claims: Sequence[Claim]) -> tuple[bool, int, float]:
 
 def _since(fleet: Fleet) -> str:
     rows = [
-        (text(claim.vehicle), text(title(fleet, claim)), text(day(claim.since)),
+        (text(claim.vehicle), text(title(fleet, claim)), dated(day(claim.since)),
          f"{text(claim.parameter.replace('_', ' '))} by {_slope(claim)}",
          text(size(fleet, claim)), str(claim.recordings), text(words.chance(claim.q_value)))
         for claim in fleet.claims if claim.kind == "since"
@@ -213,8 +213,8 @@ def _outliers(fleet: Fleet) -> str:
 
 def _vehicles(fleet: Fleet) -> str:
     rows = [
-        (text(one.name), str(one.recordings), str(one.quarantined), text(words.number(one.hours, 3)), text(day(one.first)),
-         text(day(one.last)), text("-" if one.median_rmse_Nm is None else words.torque(one.vehicle, one.median_rmse_Nm)),
+        (text(one.name), str(one.recordings), str(one.quarantined), text(words.number(one.hours, 3)), dated(day(one.first)),
+         dated(day(one.last)), text("-" if one.median_rmse_Nm is None else words.torque(one.vehicle, one.median_rmse_Nm)),
          text(", ".join(f"{VERDICTS[verdict][0].lower() if verdict in VERDICTS else verdict}: {count}"
                         for verdict, count in one.verdicts.items()) or "-"))
         for one in fleet.vehicles
@@ -243,9 +243,9 @@ def _origin(fleet: Fleet) -> str:
 
 def _reading(fleet: Fleet) -> str:
     return (
-        f"<p>All claims of this page share one budget: on average at most {fleet.budget:.0%} of those that stand ({len(fleet.claims)} of "
-        f"{fleet.considered}) are false, however they hang together (Benjamini and Yekutieli); q is the share at which a claim would just "
-        "stand. What was looked for in vain counts.</p>\n"
+        f"<p>All claims of this page share one budget: on average at most {100.0 * fleet.budget:.0f}&nbsp;% of those that stand "
+        f"({len(fleet.claims)} of {fleet.considered}) are false, however they hang together (Benjamini and Yekutieli); q is the share at "
+        "which a claim would just stand. What was looked for in vain counts.</p>\n"
         "<p>Joint evidence adds up how much of an effect each recording shows, with sign and error, whether or not it is enough to be "
         "named there. Where all hint at something and most name nothing, the recordings that say most are diagnosed together. Effects are "
         "taken one at a time in joint evidence, so what is there shows in its rivals too: what leads is the finding, others that fit are "

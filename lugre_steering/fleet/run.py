@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.bag.find import Skipped
 from lugre_steering.effects.registry import made
-from lugre_steering.errors import DataError
+from lugre_steering.errors import BagError, DataError
 from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.fleet.changes import differences
 from lugre_steering.fleet.claims import BUDGET, Claim, by_vehicle, claims, shared, unusual, worth_pooling
@@ -55,6 +55,8 @@ def run(
     ``skipped``: what has been left out before; ``version``: that of the program, under which records are kept.
     """
     need_parquet()
+    if bags and not any(bag.exists() for bag in bags):
+        raise BagError(f"{bags[0]}: no such file or folder")
     options, version, begun = options or FleetOptions(), version or code_version(), time.perf_counter()
     members = read_members(vehicles)
     jobs = jobs or processors()
@@ -76,8 +78,9 @@ def run(
                 records, members, skipped, options, version, found, earlier=store.earlier(records), together=together, workers=jobs,
                 seconds=time.perf_counter() - begun,
             )  # fmt: skip
-            fleet = replace(fleet, provenance=_provenance(vehicles, members, options, records))
-            write_tables(rows(records, found, fleet.changes), out)
+            made = _provenance(vehicles, members, options, records)
+            fleet = replace(fleet, provenance=made)
+            write_tables(rows(records, found, fleet.changes), out, made)
             write_page(fleet, records, out / PAGE)
             write_record(fleet.json, out / RECORD)
         except OSError as error:

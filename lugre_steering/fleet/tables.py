@@ -6,15 +6,16 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
 from lugre_steering.errors import LugreSteeringError
-from lugre_steering.files import replacing
+from lugre_steering.files import MAKER, replacing
 from lugre_steering.fleet.changes import Difference
 from lugre_steering.fleet.claims import Claim
 from lugre_steering.fleet.work import Record
+from lugre_steering.provenance import Provenance
 
 Columns = Mapping[str, str]
 """Type of each column: text, number, whole or truth."""
@@ -68,14 +69,15 @@ def rows(records: Sequence[Record], claims: Sequence[Claim], changes: Sequence[D
     }
 
 
-def write_tables(tables: Mapping[str, Sequence[Mapping[str, Any]]], out: Path) -> None:
-    """Each as NAME.parquet, whole or not at all; an empty one has its columns too."""
+def write_tables(tables: Mapping[str, Sequence[Mapping[str, Any]]], out: Path, made: Provenance) -> None:
+    """Each as NAME.parquet, whole or not at all; an empty one has its columns too. Its metadata tells how it was ``made``, but for the
+    bags, which fleet.json names."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     types = {"text": pa.string(), "number": pa.float64(), "whole": pa.int64(), "truth": pa.bool_()}
     for name, columns in KINDS.items():
-        schema = pa.schema([(column, types[kind]) for column, kind in columns.items()])
+        schema = pa.schema([(column, types[kind]) for column, kind in columns.items()], {MAKER: "\n".join(replace(made, bags=()).lines())})
         data = {column: [row.get(column) for row in tables[name]] for column in columns}
         with replacing(out / f"{name}.parquet") as stream:
             pq.write_table(pa.table(data, schema=schema), stream)

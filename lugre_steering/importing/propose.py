@@ -20,12 +20,13 @@ from lugre_steering.importing.plausible import DEGREES, check_units
 from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import tells, unit_in
+from lugre_steering.importing.words import WORDS, tells, unit_in
 from lugre_steering.recording import Array
 
 _FEW = 5
 _UNIX = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Above so much a time counts from 1970, in this unit."""
+_OF_PRESSURE = re.compile(rf"^(?:{'|'.join(WORDS['pressure'])})_(?=[a-z]{{2}})")
 
 
 @dataclass(frozen=True)
@@ -175,6 +176,8 @@ def _kind(table: Table, name: str) -> str | None:
         if tells(name, kind):
             return kind
     dimension = READABLE_UNITS[unit][0] if (unit := _stated(table, name, None)) else None
+    if dimension == "temperature" and tells(name, "air"):
+        return "air_temperature"
     by_unit = {"angle": "angle", "angular speed": "rate", "pressure": "pressure", "torque": "torque", "force": "torque"}
     return by_unit.get(dimension or "")
 
@@ -190,6 +193,7 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
     if kind == "pressure":
         plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1])
         line = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_").lower()
+        line = _OF_PRESSURE.sub("", line)  # 'p main A' and 'pressure_main_a' are the line main_a of a vehicle file
         return f"pressure/{line if line[:1].isalpha() else f'line_{line}'}", "the name or unit tells of pressure"
     if kind == "torque":
         return "measured_torque", "the name or unit tells of torque or force"

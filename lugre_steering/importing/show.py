@@ -11,20 +11,24 @@ from rich.console import Console
 from rich.table import Table
 
 from lugre_steering.counted import counted
+from lugre_steering.terminal import point
 
 
 def show_import(console: Console, result: Mapping[str, Any]) -> None:
-    """One row per channel: samples, rate, range, and what is worth a look."""
-    table = Table(title=f"{result['table']} -> {result['bag']}", title_justify="left")
-    for heading in ("channel", "samples", "rate", "time", "range", "worth a look"):
+    """One row per channel: samples, rate, range; below, what is worth a look."""
+    look: Any = {"box": None, "padding": (0, 2, 0, 0), "header_style": "bold"}  # rows whole at 80 columns
+    table = Table(title=f"{result['table']} -> {result['bag']}", title_justify="left", **look)
+    for heading in ("channel", "samples", "rate", "time", "range"):
         table.add_column(heading, overflow="fold", no_wrap=heading == "channel")
     for channel in result["channels"]:
         rate = "-" if channel["rate_Hz"] is None else f"{channel['rate_Hz']:.4g} Hz"
         time = f"{channel['from_s']:.4g} ... {channel['to_s']:.4g} s"
         value = f"{channel['lowest']:.4g} ... {channel['highest']:.4g} {channel['unit']}"
-        notes = "; ".join(_notes(channel)) or "-"
-        table.add_row(channel["channel"], str(channel["samples"]), rate, time, value, notes)
+        table.add_row(channel["channel"], str(channel["samples"]), rate, time, value)
     console.print(table)
+    for channel in result["channels"]:
+        for note in _notes(channel):
+            console.print(point(f"{channel['channel']}: {note}"))
     for what, count in result["left_out"].items():
         console.print(f"left out: {count} {what}")
 

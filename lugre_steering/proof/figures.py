@@ -67,8 +67,8 @@ def draw_power(board: Board, file: Path, made: str) -> None:
         axis.plot([0.1, 0.3], wanted, "k_", markersize=16, label="target for names")
         axis.set(xscale="log", ylim=(-0.02, 1.04), title="Detection power")
         axis.set_xticks(ratios)
-        axis.set(xlabel="effect-to-noise variance ratio (1)", ylabel="share of cases (1)")
-        axis.legend(loc="lower right")
+        axis.set(xlabel="effect-to-noise variance ratio", ylabel="share of cases")
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)  # bars may be anywhere inside
 
 
 def draw_confusion(board: Board, file: Path, made: str) -> None:
@@ -105,7 +105,7 @@ def draw_location(board: Board, file: Path, made: str) -> None:
         axes[0, 0].hist(board["location"]["values"], np.linspace(0.0, 1.0, 21), color=SERIES[0])
         whole_ticks(axes[0, 0].yaxis)
         axes[0, 0].axvline(TARGETS["location_iou"].value, color="k", linestyle="--", label="target")
-        axes[0, 0].set(xlabel="intersection over union (1)", ylabel="cases", title="Place in time")
+        axes[0, 0].set(xlabel="intersection over union", ylabel="cases", title="Place in time")
         axes[0, 0].legend()
 
 
@@ -120,7 +120,7 @@ def draw_parameters(board: Board, file: Path, made: str) -> None:
             axes[0, 0].annotate(str(entry["of"]), (1.01, i), xycoords=("axes fraction", "data"), fontsize=7.5, va="center")
         axes[0, 0].axvline(TARGETS["parameter_error"].value, color="k", linestyle="--")
         axes[0, 0].set_yticks(range(len(errors)), list(errors), fontsize=7.5)
-        axes[0, 0].set(xscale="log", ylim=(len(errors) - 0.5, -0.5), xlabel="relative error (1)")
+        axes[0, 0].set(xscale="log", ylim=(len(errors) - 0.5, -0.5), xlabel="relative error")
         axes[0, 0].set_title("Parameters against the truth (dashed: 10 %)")
 
 
@@ -149,7 +149,7 @@ def draw_peers(board: Board, file: Path, made: str) -> None:
             x, y = entry["false_alarms"]["share"], entry["removed"]["median"]
             if x is not None and y is not None:
                 axes[0, 0].plot(x, y, "o", color=SERIES[k % len(SERIES)], label=name)
-        axes[0, 0].set(xlim=(-0.03, 1.03), xlabel="false alarms on nulls (1)", ylabel="held-out error removed (1)")
+        axes[0, 0].set(xlim=(-0.03, 1.03), xlabel="false alarms on nulls", ylabel="held-out error removed")
         axes[0, 0].set_title("Peers on the same recordings")
         axes[0, 0].legend(loc="best")
 

@@ -54,8 +54,8 @@ def refuse_foreign(folder: Path) -> None:
         content: Any = yaml_text.parse(read_text(folder / "metadata.yaml", yaml_text.LONGEST))
         described = content["rosbag2_bagfile_information"]
         own = {"metadata.yaml", *described["relative_file_paths"]}
-        ours = described["custom_data"] == REPLAYED
-    except (OSError, ValueError, yaml.YAMLError, LookupError, TypeError):
+        ours = REPLAYED.items() <= described["custom_data"].items()
+    except (OSError, ValueError, yaml.YAMLError, LookupError, TypeError, AttributeError):
         ours = False
     if not ours or folder.is_symlink():
         raise _not_ours(folder)

@@ -78,7 +78,7 @@ def _temperatures(ax: Any, vehicle: Vehicle, time: Array, temperatures: Array) -
 def _caption(name: str, vehicle: Vehicle, fit: Agreement | None) -> str:
     text = f"Bag {name}. Vehicle: {vehicle.name}. "
     if vehicle.effects:
-        text += f"Effects added to the baseline: {', '.join(effect.id for effect in vehicle.effects)}. "
+        text += f"Effects added to the baseline: {', '.join(units.titles(vehicle))}. "
     if fit is None:
         return text + "No residual: the torque was not measured."
     unit = vehicle.coordinate.force_unit

@@ -17,7 +17,8 @@ from lugre_steering.recording import Array
 from lugre_steering.replay.result import ReplayedBag
 from lugre_steering.report import words
 from lugre_steering.report.chart import Chart, Panel, Series
-from lugre_steering.report.markup import code, facts, pairs, table, text
+from lugre_steering.report.markup import code, facts, table, text
+from lugre_steering.report.origin import made_by
 from lugre_steering.report.page import Charts, Section, Tone, in_words_of, render
 from lugre_steering.vehicle import Vehicle
 
@@ -35,7 +36,7 @@ def write_page(bag: ReplayedBag, vehicle: Vehicle, motion: Curves, check: Curves
         Section("curves", "Curves", "Torque, measured and estimated", hint + curves),
         Section("findings", "Findings", "About the recording", _findings(bag)),
         Section("samples", "Samples", "Samples used and rejected", _samples(bag)),
-        Section("origin", "Origin", "How this result came about", pairs([("", code(line)) for line in made.lines()])),
+        Section("origin", "Origin", "How this result came about", made_by(made)),
     ]
     said = in_words_of(vehicle, [vehicle.name, bag.name])
     tone: Tone = "unsure" if bag.findings or bag.fit is None else "plain"

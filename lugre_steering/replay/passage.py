@@ -32,7 +32,7 @@ from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.files import new_folder
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
 from lugre_steering.pool import Progress
-from lugre_steering.provenance import Provenance
+from lugre_steering.provenance import MADE, Provenance
 from lugre_steering.recording import AIR_LIMIT_DEGC, COMMAND, Channel, Finding, IntArray, Kind, Recording
 from lugre_steering.replay.earlier import refuse_foreign
 from lugre_steering.replay.outputs import Outputs
@@ -74,7 +74,7 @@ class Passage:
         with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
             topics = self._topics(bag, channels)
-            with BagWriter(result, custom_data=REPLAYED, compressed=True) as writer:
+            with BagWriter(result, custom_data={**REPLAYED, MADE: "\n".join(origin.lines())}, compressed=True) as writer:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
             self._check_estimates(samples, bag.findings)

@@ -9,12 +9,19 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_UNIT = re.compile(r"(?<=\d) (?=(?:[kM]?N m|%|deg|rad|s|kN|N|mm)\b|%)")
+from lugre_steering.report import words
+
+_DATE = re.compile(r"\b\d{4}-\d\d-\d\d\b")
 
 
 def text(value: object) -> str:
     """Any words as HTML; numbers are not parted from their unit."""
-    return _UNIT.sub("\u00a0", html.escape(str(value), quote=True)).replace("N m", "N\u00a0m")
+    return words.unparted(html.escape(str(value), quote=True))
+
+
+def dated(value: object) -> str:
+    """Any words as HTML, whose dates are not parted."""
+    return _DATE.sub(r'<span class="whole">\g<0></span>', text(value))
 
 
 def code(value: object) -> str:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 
 from lugre_steering.provenance import Provenance
 from lugre_steering.report import words
@@ -22,7 +22,11 @@ def made_by(by: Provenance, note: str = "") -> str:
 
 
 def plain_words(value: object) -> str:
-    """Anything that JSON holds as words (HTML)."""
+    """Anything that JSON holds as words (HTML); 'none' where there is nothing."""
+    if value is None or (isinstance(value, Sized) and len(value) == 0):
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, Mapping):
         return ", ".join(f"{text(key)}: {plain_words(item)}" for key, item in value.items())
     if isinstance(value, (list, tuple)):

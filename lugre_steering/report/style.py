@@ -17,6 +17,7 @@ import numpy as np
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.files import MAKER, refuse_foreign, replacing
 from lugre_steering.provenance import Provenance, provenance
+from lugre_steering.report.words import unparted
 
 try:
     import matplotlib as mpl
@@ -96,9 +97,8 @@ def figure(
     line of it is ever cut off.
     """
     refuse_foreign([file])
-    lines = [
-        line for paragraph in words(caption).split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]
-    ]
+    said = unparted(words(caption))
+    lines = [line for paragraph in said.split("\n") for line in textwrap.wrap(paragraph, int(width * 15.5)) or [""]]
     below = _LINE_INCHES * len(lines) + 0.15
     height = rows * row_inches + below
     with mpl.rc_context(RC):

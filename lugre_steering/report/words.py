@@ -18,6 +18,9 @@ from lugre_steering.vehicle import Vehicle
 _HANDIER = (("rad", "deg", 180.0 / math.pi), ("m", "mm", 1e3), ("Pa", "MPa", 1e-6))
 
 
+_UNIT = re.compile(r"(?<=\d) (?=(?:[kM]?N m|%|deg|rad|s|kN|N|mm)\b|%)")
+
+
 @dataclass(frozen=True)
 class Axis:
     """A quantity on an axis: its name and unit, and what to multiply SI values by."""
@@ -78,7 +81,7 @@ def number(value: float | None, digits: int = 4) -> str:
         return f"{value:.{digits - 1}e}"
     text = f"{round(value, decimals):.{max(decimals, 0)}f}"
     if abs(value) >= 1e4:  # four digits read well without a gap
-        text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u2009")
+        text = f"{round(value, decimals):,.{max(decimals, 0)}f}".replace(",", "\u202f")
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
@@ -88,6 +91,11 @@ def tenths(value: float, sign: str = "", beside: float = 0.0) -> str:
     size = max(abs(value), beside)
     decimals = 1 if size >= 10.0 or size == 0.0 else min(2 - math.floor(math.log10(size)), 12)
     return f"{value:{sign}.{decimals}f}"
+
+
+def unparted(text: str) -> str:
+    """Prose in which no line ends between a number and its unit."""
+    return _UNIT.sub("\u00a0", text).replace("N m", "N\u00a0m")
 
 
 def quantity(value: float | None, unit: str) -> str:
@@ -149,7 +157,7 @@ def thin(values: Array, limit: int) -> tuple[Array, int]:
 
 def sentences(text: str) -> list[str]:
     """A paragraph sentence by sentence."""
-    return [sentence for sentence in re.split(r"(?<=[.)]) (?=[A-Z]|[a-z]+[._][a-z_]+\b)", text) if sentence]
+    return [sentence for sentence in re.split(r"(?<=[.)]) (?=[A-Z]|[a-z]+[._]\w+)", text) if sentence]
 
 
 def broken(x: Array, y: Array) -> tuple[Array, Array]:

@@ -56,8 +56,8 @@ ALONG_AN_AXIS = {"N m": "N", "N m s": "N s/m", "N m/deg": "N per 0.01745 m", "de
 """What the units of a vehicle file mean for a linear axis, where 1 m counts as 1 rad."""
 
 
-def begin_sheet(file: Path, ask: Ask, say: Say) -> None:
-    """Ask for what a sheet needs and write ``file``, its rubber table beside it; ``DataError`` if there is such a file."""
+def begin_sheet(file: Path, ask: Ask, say: Say) -> list[Path]:
+    """Ask for what a sheet needs and write ``file``, its rubber table beside it; the files written. ``DataError`` if there is one."""
     table = file.with_name(f"{file.stem}_rubber.csv")
     for path in (file, table):
         if os.path.lexists(path):
@@ -77,6 +77,7 @@ def begin_sheet(file: Path, ask: Ask, say: Say) -> None:
         sheet["rubber"]["dma_csv"] = table.name
     begun = "# Vehicle sheet, begun by 'lugre-steering vehicle --new'; check it with 'lugre-steering vehicle FILE'."
     write_text("\n".join([begun, *_lines(sheet, Vehicle), ""]), file)
+    return [file, table] if kind == "tracks" else [file]
 
 
 def _begin(kind: str) -> tuple[Sheet, tuple[tuple[str, ...], ...]]:

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from lugre_steering.errors import DataError
 from lugre_steering.files import output_folder
+from lugre_steering.provenance import Provenance
 from lugre_steering.report import words
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.footprint import contact_lengths, ground_pressure, peak_pressure
@@ -43,7 +44,7 @@ def show_vehicle(console: Console, result: Mapping[str, Any]) -> None:
         console.print(f"picture in {result['picture']}", highlight=False, soft_wrap=True)
 
 
-def draw_footprint(vehicle: Vehicle, out: Path) -> Path:
+def draw_footprint(vehicle: Vehicle, out: Path, made: Provenance) -> Path:
     """Picture, in the folder ``out``, of the ground pressure under the left track from above; the right one is its mirror image."""
     from lugre_steering.report.style import SERIES, figure  # needs matplotlib
 
@@ -61,7 +62,7 @@ def draw_footprint(vehicle: Vehicle, out: Path) -> Path:
         f"{track.ground_pressure_exponent:g} along the track, linear across it; peak {peak_pressure(axle, track, area) / 1e5:.3g} bar. "
         "The torque counts each roller's load at its centre (lines from the hinge)."
     )
-    with output_folder(out), figure(1, 1, caption, file, row_inches=3.6) as axes:
+    with output_folder(out), figure(1, 1, caption, file, row_inches=3.6, made=made) as axes:
         ax = axes[0, 0]
         filled = ax.contourf(x, track.hinge_offset_m + y, pressure / 1e5, levels=12, cmap="Blues")
         ax.figure.colorbar(filled, ax=ax, label="ground pressure (bar)")

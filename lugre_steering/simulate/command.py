@@ -18,13 +18,16 @@ from lugre_steering import units
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.bag.reader import bag_name
+from lugre_steering.effects import registry
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError
 from lugre_steering.files import output_folder, refuse_foreign, write_record
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Kind
 from lugre_steering.report import words
 from lugre_steering.report.available import no_pictures
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import plain
 from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
 from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench
@@ -36,6 +39,7 @@ from lugre_steering.simulate.write import STORAGES, write_bag
 from lugre_steering.vehicle import Vehicle
 
 SCHEMA = "lugre_steering/experiment/1"
+SHIPPED = "test_vehicle.yaml"
 
 
 def catalogue() -> list[tuple[str, str, str]]:
@@ -55,8 +59,15 @@ def is_experiment(what: str) -> bool:
 
 def load_vehicle(file: Path | None, effects: Sequence[str] = ()) -> Vehicle:
     """The vehicle file, or the shipped test vehicle, with effects added."""
-    vehicle = vehicle_file.load(file or config_folder() / "test_vehicle.yaml")
+    vehicle = vehicle_file.load(file or config_folder() / SHIPPED)
     return plant.with_effects(vehicle, list(effects))
+
+
+def origin(what: str, file: Path | None, options: Mapping[str, Any]) -> Provenance:
+    """How a simulation comes about; ``options`` that are not given do not stand in it."""
+    given = {name: value for name, value in options.items() if value not in (None, [])}
+    path = Path(what)
+    return registry.made("simulate", {"what": what, **given}, file or config_folder() / SHIPPED, [path] if path.exists() else [])
 
 
 def motion_named(what: str, vehicle: Vehicle) -> Motion:
@@ -76,10 +87,15 @@ def motion_named(what: str, vehicle: Vehicle) -> Motion:
 
 
 def run_manoeuvre(
-    what: str, vehicle: Vehicle, out: Path, sensing: Mapping[str, float | int | None], storage: str = "mcap"
+    what: str,
+    vehicle: Vehicle,
+    out: Path,
+    sensing: Mapping[str, float | int | None],
+    storage: str = "mcap",
+    made: Provenance | None = None,
 ) -> dict[str, Any]:
     """Simulate one manoeuvre; write the bag ``out/synthetic_<name>`` and its picture. ``sensing`` overrides fields of
-    ``Sensing``; None means the vehicle's own."""
+    ``Sensing``; None means the vehicle's own. ``made``: how both come about."""
     if storage not in STORAGES:
         raise DataError(f"storage: got '{storage}', expected {' or '.join(STORAGES)}")
     folder = out / f"synthetic_{bag_name(Path(what)).replace('-', '_')}"
@@ -94,8 +110,8 @@ def run_manoeuvre(
         if note is None:
             from lugre_steering.simulate.figure import draw_simulation  # plotting is loaded only where it is used
 
-            draw_simulation(done.run, label, picture)
-        write_bag(folder, done.run, label, storage)  # last: a bag that is there stands in the way of another run
+            draw_simulation(done.run, label, picture, made)
+        write_bag(folder, done.run, label, storage, made=made)  # last: a bag that is there stands in the way of another run
     done = dataclasses.replace(done, bag=str(folder), picture=str(picture) if note is None else None, picture_note=note)
     return done.json
 
@@ -114,20 +130,21 @@ def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:
     return [EXPERIMENTS[name][1](prepared) for name in names]
 
 
-def write_outcomes(what: str, outcomes: list[Outcome], out: Path) -> dict[str, Any]:
-    """Table (CSV), result (JSON) and figure (PNG) of each experiment into ``out``; with several also a JSON of all."""
+def write_outcomes(what: str, outcomes: list[Outcome], out: Path, made: Provenance | None = None) -> dict[str, Any]:
+    """Table (CSV), result (JSON) and figure (PNG) of each experiment into ``out``; with several also a JSON of all. ``made``: how they
+    come about."""
     results, note = [], no_pictures()
     names = [*(outcome.name for outcome in outcomes), *([ALL] if what == ALL else [])]
     with output_folder(out):
         refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png"))
         for outcome in outcomes:
-            results.append({"schema": SCHEMA, **outcome.to_json()})
+            results.append({"schema": SCHEMA, **outcome.to_json(), "provenance": plain(made)})
             write_table(outcome, out / f"{outcome.name}.csv")
             if note is None:
-                draw_outcome(outcome, out / f"{outcome.name}.png")
+                draw_outcome(outcome, out / f"{outcome.name}.png", made)
             write_record(results[-1], out / f"{outcome.name}.json")
         passed = all(outcome.passed for outcome in outcomes)
-        result = {"schema": SCHEMA, "passed": passed, "picture_note": note, "experiments": results}
+        result = {"schema": SCHEMA, "passed": passed, "picture_note": note, "experiments": results, "provenance": plain(made)}
         if what == ALL:
             write_record(result, out / f"{ALL}.json")
     return result

@@ -8,21 +8,22 @@ from functools import partial
 from pathlib import Path
 
 from lugre_steering import units
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Kind
 from lugre_steering.report.style import IMPROVED, MEASURED, SHOWN, figure
 from lugre_steering.simulate.run import Simulated
 
 
-def draw_simulation(run: Simulated, label: str, file: Path) -> None:
-    """Write the picture as PNG."""
+def draw_simulation(run: Simulated, label: str, file: Path, made: Provenance | None = None) -> None:
+    """Write the picture as PNG; ``made``: how it came about."""
     vehicle, truth = run.vehicle, run.truth
     time, coordinate = truth.motion.time, vehicle.coordinate
     scale, unit = SHOWN.get(coordinate.unit, (1.0, coordinate.unit))
     pressures = {c.name: s for c, s in run.signals.items() if c.kind is Kind.PRESSURE}
     torques = [s for c, s in run.signals.items() if c.kind is Kind.TORQUE]
-    effects = ", ".join(e.id for e in vehicle.effects) or "none"
+    effects = ", ".join(units.titles(vehicle)) or "none"
     caption = f"SYNTHETIC recording: {label}. Effects added to the baseline: {effects}."
-    with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9, words=partial(units.words, vehicle)) as axes:
+    with figure(4 if pressures else 3, 1, caption, file, row_inches=1.9, words=partial(units.words, vehicle), made=made) as axes:
         rows = iter(axes[:, 0])
         ax = next(rows)
         for side, theta in zip(vehicle.sides, truth.motion.theta, strict=True):

@@ -15,6 +15,7 @@ from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
 from lugre_steering.errors import BagError
 from lugre_steering.files import new_folder
+from lugre_steering.provenance import MADE, Provenance
 from lugre_steering.recording import TRUTH, Array, IntArray, Kind
 from lugre_steering.simulate.run import Simulated
 from lugre_steering.simulate.sensors import nanoseconds
@@ -28,9 +29,11 @@ STRING = "std_msgs/msg/String"
 STORAGES = ("mcap", "sqlite3")
 
 
-def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", compress: bool = True) -> None:
+def write_bag(
+    folder: Path, run: Simulated, label: str, storage: str = "mcap", compress: bool = True, made: Provenance | None = None
+) -> None:
     """Write all inputs and the truth (at the stamps of the first track's angles) into a new rosbag2 folder,
-    zstd-compressed."""
+    zstd-compressed; how it came about (``made``) stands in its metadata."""
     topics = [*_inputs(run), *_truth(run)]
     stamps = np.concatenate([stamp for _, _, stamp, _ in topics])
     topic = np.repeat(np.arange(len(topics)), [stamp.size for _, _, stamp, _ in topics])
@@ -44,6 +47,8 @@ def write_bag(folder: Path, run: Simulated, label: str, storage: str = "mcap", c
                 mode = CompressionMode.STORAGE if storage == "mcap" else CompressionMode.FILE
                 writer.set_compression(mode, CompressionFormat.ZSTD)
             writer.set_custom_data("synthetic", label)
+            if made is not None:
+                writer.set_custom_data(MADE, "\n".join(made.lines()))
             with writer:
                 text = store.types[STRING](data=f"synthetic: {label}")
                 said = writer.add_connection(f"/{TRUTH}/label", STRING, typestore=store)

@@ -97,7 +97,8 @@ def test_what_is_counted_in_ones_has_no_unit() -> None:
 
 
 def test_sentences_of_a_statement() -> None:
-    text = "Error 1.5 N m. friction.static stopped (see x). It is so. end_stop cannot be told from y. So, e.g. 3 %."
+    text = "Error 1.5 N m. friction.static stopped (see x). rubber.heat_W_m2K is so. end_stop cannot be told from y. So, e.g. 3 %."
     assert words.sentences(text) == [
-        "Error 1.5 N m.", "friction.static stopped (see x).", "It is so.", "end_stop cannot be told from y.", "So, e.g. 3 %.",
+        "Error 1.5 N m.", "friction.static stopped (see x).", "rubber.heat_W_m2K is so.",
+        "end_stop cannot be told from y.", "So, e.g. 3 %.",
     ]  # fmt: skip

@@ -40,7 +40,7 @@ def test_the_view_shows_numbers_their_last_minute_and_health() -> None:
     state.add("left_track_steer_joint", "deg", 49.6, 12.345)
     state.diagnosed(49.7, [("inputs", 2, "angle/left stale"), ("latency", 0, "fine")])
     shown = text_of(state, 50.0)
-    for words in ("/a/steering_torque_estimator", "torque", "40\u2009900", "-48\u2009200", "N m", "12.3", "error", "angle/left stale"):
+    for words in ("/a/steering_torque_estimator", "torque", "40\u202f900", "-48\u202f200", "N m", "12.3", "error", "angle/left stale"):
         assert words in shown, shown
     assert "…" not in shown
     assert "silent" not in shown

@@ -162,7 +162,7 @@ def test_an_experiment_that_fails_gives_exit_code_1(tmp_path: Path, monkeypatch:
     assert json.loads(out)["passed"] is True
     failed = Outcome("paper-pavements", "t", ("a",), ((1.0,),), (Check("c", "p", "o", False),), ())
     monkeypatch.setitem(EXPERIMENTS, "paper-pavements", ("", lambda _: failed))
-    monkeypatch.setattr(command, "write_outcomes", lambda _what, outcomes, _out: {"passed": outcomes[0].passed})
+    monkeypatch.setattr(command, "write_outcomes", lambda _what, outcomes, *_: {"passed": outcomes[0].passed})
     assert invoke("paper-pavements", "--out", str(tmp_path))[0] == 1
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.conclude.headline import inside
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
@@ -96,7 +97,7 @@ def _statement(
         f"{done.title(candidate.effect.id)}: {law}. Up to {done.torque(size)} "
         f"({words.percent(size / done.amplitude)} of the torque amplitude, {label}){_since(done, candidate)}"
         + _lines(done, bent, index, item)
-        + (f"; the data cannot tell it from {', '.join(rivals)}" if rivals else "")
+        + (f"; the data cannot tell it from {' or '.join(inside(done.title(rival)) for rival in rivals)}" if rivals else "")
         + (f"; {IN_PLACE}." if item.in_place else ".")
     )
 

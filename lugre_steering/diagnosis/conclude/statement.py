@@ -78,18 +78,26 @@ def _remarks(
     done: Finished, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver, ended: Sequence[str]
 ) -> list[str]:
     """What limits named effects, one sentence each."""
+
+    def inside(name: str) -> str:
+        return headline.inside(done.title(name))
+
     remarks = [f"Without looking ahead, as the live node must, the error on all samples is {done.torque(causal)}."]
     if judged.rotated:
         remarks.append("Each third of the data was held out in turn, since one alone hardly shows it.")
     ties = [
-        f"{effect.id} cannot be told from {', '.join(effect.indistinguishable_from)}"
+        f"{inside(effect.id)} cannot be told from {' or '.join(map(inside, effect.indistinguishable_from))}"
         for effect in effects
         if effect.indistinguishable_from
     ]
     if ties:
         remarks.append(f"With these data {'; '.join(ties)}.")
     size = done.problem.size
-    ends = [f"{effect.id} with {name} = {words.quantity(value, unit)}" for effect in effects for name, value, unit in at_end(effect, size)]
+    ends = [
+        f"{inside(effect.id)} with {name.replace('_', ' ')} = {words.quantity(value, unit)}"
+        for effect in effects
+        for name, value, unit in at_end(effect, size)
+    ]
     if ends:
         remarks.append(f"At the end of the range that is searched: {', '.join(ends)}; the cause may be more than that, or another.")
     if bounds := calibrations_at_bounds(done):
@@ -97,7 +105,8 @@ def _remarks(
     if ended:
         verb = "does" if len(ended) == 1 else "do"
         last = done.problem.runs[-1].name
-        remarks.append(f"{' and '.join(ended)} {verb} not act in {last}, the last recording: augmented.yaml is without.")
+        who = headline.sentence(" and ".join(map(inside, ended))).removesuffix(".")
+        remarks.append(f"{who} {verb} not act in {last}, the last recording: augmented.yaml is without.")
     if left.structured:
         remarks.append(f"Structure is left: {left.text}.")
     elif done.needs_form:

@@ -30,7 +30,7 @@ def head(diagnosis: Diagnosis) -> str:
     more = f'<p class="more">{text(rest)}</p>' if rest else ""
     return (
         f'<header id="verdict"><p class="over">{text(diagnosis.vehicle.name)} &middot; {bags}</p>\n<h1>{title}</h1>\n'
-        f'<div class="verdict"><p>{text(first)}</p>{more}<span class="chip">{text(result["verdict"])}</span></div>\n'
+        f'<div class="verdict"><p>{text(first)}</p>{more}<span class="chip">{text(result["verdict"].replace("_", " "))}</span></div>\n'
         f"{facts(_numbers(diagnosis))}</header>"
     )
 

@@ -33,11 +33,10 @@ def heldout(diagnosis: Diagnosis) -> str:
         between = " … ".join(text(words.torque(vehicle, end)) for end in spread) if spread else ""
         cells.append([text(name), shown(before, "baseline"), *([shown(after, "augmented"), between] if found else [])])
     on_all = [text(words.torque(vehicle, result[key]["rmse_Nm"])) for key in ("baseline", "augmented")]
-    rest = ["all data, fitted ones too", *on_all, ""], ["noise alone", shown(result["noise_floor_Nm"], ""), "", ""]
-    cells += [row[: len(header)] for row in rest]
+    cells.append(["all data, fitted ones too", *on_all, ""][: len(header)])
     return (
         "<p>Root mean square torque error on stretches kept away from both the search and the fit, with a gap to them longer than the "
-        "memory of the friction.</p>\n" + table(header, cells)
+        f"memory of the friction. Noise alone makes {text(words.torque(vehicle, result['noise_floor_Nm']))}.</p>\n" + table(header, cells)
     )
 
 

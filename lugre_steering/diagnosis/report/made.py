@@ -9,13 +9,14 @@ from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.fitting.keys import KEYS
 from lugre_steering.fitting.problem import calibrations_for
 from lugre_steering.report import words
-from lugre_steering.report.markup import code, pairs, table, text
+from lugre_steering.report.markup import pairs, table, text
 from lugre_steering.report.origin import made_by, plain_words
 
 
 def baseline(diagnosis: Diagnosis) -> str:
-    """Recalibrated values beside those of the sheet."""
+    """Recalibrated values beside those of the sheet; where nothing was fitted, those of the sheet."""
     vehicle, sheet, rows = diagnosis.vehicle, diagnosis.sheet, []
+    fitted = diagnosis.json["verdict"] != "insufficient_data"
     calibrated = {calibration.name for calibration in calibrations_for(vehicle)}
     for key in KEYS:
         now = key.read(vehicle)
@@ -23,15 +24,17 @@ def baseline(diagnosis: Diagnosis) -> str:
             continue
         unit, before = units.label(vehicle, key.unit), key.read(sheet) if sheet is not None else None
         change = f"{100.0 * (now / before - 1.0):+.1f} %" if before else ""
-        rows.append([code(key.key), words.number(before), words.number(now), text(change), "" if unit == "1" else text(unit)])
+        name = f'{text(key.title)} <code class="id">{text(key.key)}</code>'
+        values = [words.number(before), words.number(now), text(change)] if fitted else [words.number(now)]
+        rows.append([name, *values, "" if unit == "1" else text(unit)])
     sentence = (
-        "Nothing was fitted: these are the values of the vehicle file, as they were."
-        if diagnosis.json["verdict"] == "insufficient_data"
-        else "The published model with the fitted values is what missing physics was judged against, so that a wrong friction "
+        "The published model with the fitted values is what missing physics was judged against, so that a wrong friction "
         "level is never reported as physics. They stand in <code>augmented.yaml</code>."
+        if fitted
+        else "Nothing was fitted: these are the values of the vehicle file, as they were."
     )
-    header = ["key of the vehicle file", "sheet", "fitted", "change", "unit"]
-    return f"<p>{sentence}</p>\n" + (table(header, rows, (1, 2, 3), narrow=True) if rows else "")
+    header = ["value of the vehicle file", *(["sheet", "fitted", "change"] if fitted else ["sheet"]), "unit"]
+    return f"<p>{sentence}</p>\n" + (table(header, rows, range(1, len(header) - 1), narrow=True) if rows else "")
 
 
 def origin(diagnosis: Diagnosis) -> str:

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from lugre_steering.recording import Array
+from lugre_steering.report import words
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, motion_of
 from lugre_steering.simulate.paper.bench import (
@@ -35,7 +36,7 @@ RANKING = (("dry_concrete", "dry_asphalt"), ("wet_asphalt",), ("wet_concrete",),
 
 
 def _list(values: Array, digits: int = 0) -> str:
-    return ", ".join(f"{x:.{digits}f}" for x in values)
+    return ", ".join(f"{x:.{digits}f}" if digits else words.number(round(float(x)), 6) for x in values)
 
 
 def _by(unit: str, values: tuple[float, ...], x: Array, series: Iterable[Array]) -> tuple[Curve, ...]:

@@ -14,12 +14,13 @@ from rich.table import Table
 from rich.text import Text
 
 from lugre_steering.files import head, not_ours, write_text
+from lugre_steering.provenance import Provenance
 from lugre_steering.simulate.paper.outcome import Outcome
 
 
-def draw_outcome(outcome: Outcome, file: Path) -> None:
+def draw_outcome(outcome: Outcome, file: Path, made: Provenance | None = None) -> None:
     """All panels one below the other; what was calibrated, what was checked and where it disagrees stands in the
-    picture."""
+    picture, and in its metadata how it came about (``made``)."""
     from lugre_steering.report.style import (  # needs matplotlib
         IMPROVED,
         MEASURED,
@@ -36,7 +37,7 @@ def draw_outcome(outcome: Outcome, file: Path) -> None:
         "points": {"color": "black", "linestyle": "none", "marker": "o", "markersize": 5},
         "series": {},
     }
-    with figure(len(outcome.panels), 1, outcome.caption, file) as axes:
+    with figure(len(outcome.panels), 1, outcome.caption, file, made=made) as axes:
         for ax, panel in zip(axes[:, 0], outcome.panels, strict=True):
             colours = iter(family([curve.label for curve in panel.curves if not styles[curve.style]]))
             for curve in panel.curves:
