@@ -179,7 +179,7 @@ def _closest(
 def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
     """The round without freedoms, if one name does there nearly all that the freedoms do without it."""
     free, exact = seen[0], seen[-1]
-    if free is exact or not exact.trials:
+    if free is exact or not exact.trials or not exact.problem.bends.shape[1]:
         return None
     best = exact.trials[0]
     if exact.before - best.cost < needed(exact.problem, best.fit, weight):
