@@ -230,7 +230,7 @@ def _leap_limit(core, side, dt):
     g, p = core.guard[side], row(core.parameters, side, BASELINE)
     noise = LEAP_SIGMA * max(core.config[0].angle_noise, math.sqrt(g.noise))
     length = p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else math.inf
-    return max(LEAP_SHARE * length, noise) + max(2.0 * FASTER * g.fastest, LEAP_RATE_RAD_S) * dt
+    return max(LEAP_SHARE * length, noise) + max(2.0 * FASTER * g.fastest, LEAP_RATE_RAD_S * p.angle_unit) * dt
 
 
 @inner

@@ -157,13 +157,13 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
         rates = core.trust[side]
         rate = believed(rates, ch, c, dt, value, rate)
         core.guard[side].leap_ns = 0
-        if abs(value - ch.last_value - motion.omega * dt) > LEAP_RATE_RAD_S * dt:  # the call alone costs 0.1 us
+        p = row(core.parameters, side, BASELINE)
+        if abs(value - ch.last_value - motion.omega * dt) > LEAP_RATE_RAD_S * p.angle_unit * dt:  # the call alone costs 0.1 us
             watch_leap(core, side, ch, dt, value)
         watch(core, side, ch, dt, value)
         before = motion.theta if motion.started != 0.0 else value
         follow(motion, dt, value, rate, noise_of(core, side))
         rates.travel += abs(motion.theta - before)
-        p = row(core.parameters, side, BASELINE)
         call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)
     ch.last_ns = stamp_ns
