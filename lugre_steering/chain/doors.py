@@ -53,7 +53,7 @@ def doors(composition: Composition) -> Doors:
             cfunc(_NUMBER(p, _NUMBER), **_OPTIONS)(_arm_factor_door),
             cfunc(_NUMBER(q, _NUMBER), **_OPTIONS)(_line_error_door),
         )
-        _opened[composition.name] = Doors(*(function.address or 0 for function in compiled)), compiled
+        _opened[composition.name] = Doors(*(function.address for function in compiled)), compiled  # type: ignore[arg-type]
     return _opened[composition.name][0]
 
 

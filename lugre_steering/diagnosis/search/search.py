@@ -93,8 +93,7 @@ def search(
         further = len(found) > given
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
-        stands = may_differ(now, current, [item.gain for item in found[given:]])
-        step = _step(seen, current, stands, weight, split, progress)
+        step = _step(seen, current, found[given:], weight, split, progress)
         if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
             break
         there, both = step.problem, [*found, step.name]
@@ -134,17 +133,17 @@ class _Step(NamedTuple):
 
 
 def _step(
-    seen: Sequence[Proposal], current: Fit, stands: float, weight: Array, split: Split, progress: Callable[[str], None]
+    seen: Sequence[Proposal], current: Fit, names: Sequence[Found], weight: Array, split: Split, progress: Callable[[str], None]
 ) -> _Step | None:
-    """The best of what is proposed beside ``current``, unless it takes far too little; ``stands``: ``may_differ`` of names there."""
+    """The best of what is proposed beside ``current``, unless it takes far too little; ``names``: those that stand there."""
     there, best = clearest(weight, seen)
-    further = stands > 0.0
-    instead = None if further else _in_place_of_form(seen, weight)
+    stands = may_differ(seen[0].problem, current, [item.gain for item in names])
+    instead = None if names else _in_place_of_form(seen, weight)
     named = bool(best.effects[len(current.effects) :])
     step = None
     if named and _taken(there, weight, current, best) >= HOPELESS * needed(there, best, weight, stands):
         progress(f"a closer look at {best.effects[-1][0].label}")
-        there, best, one = _closest([there] if further else worlds(there), weight, split, seen, current)
+        there, best, one = _closest([there] if names else worlds(there), weight, split, seen, current)
         step = _Step(there, best, one, one.gain < needed(there, best, weight, stands))
     if instead is not None and (step is None or step.short):
         step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
