@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,9 +13,10 @@ from lugre_steering import units
 from lugre_steering.diagnosis.loudness import loudness
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.split import Split
+from lugre_steering.fitting.problem import Effects, Problem
+from lugre_steering.fitting.split import Split, split
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
@@ -37,6 +38,9 @@ class Finished:
     """The same beside the freedoms of the friction law and of what is named."""
     form: tuple[str, ...] = ()
     """What each of these freedoms is, in words, empty for those of a name; of a problem that has them."""
+    around: bool = False
+    """Whether names have the values that they have beside the freedoms, and the baseline is recalibrated around them: where the form of
+    the friction law is more than noise, other values would make up for it."""
 
     @property
     def compared(self) -> Finished:
@@ -62,6 +66,27 @@ class Finished:
     def held(self) -> Array:
         """Of the samples held out."""
         return np.where(self.roles.held, 1.0 / self.noise.sigma, 0.0)
+
+    def in_file(self, weight: Array, effects: Effects, x: Array) -> Fit:
+        """What a vehicle file can hold of effects, which have their values beside the freedoms, fitted from some nuisances."""
+        if not self.around:
+            return fit(self.problem, weight, effects, x[: self.problem.nuisances], linearisations=20)
+        held = [(replace(candidate, free=()), values) for candidate, values in effects]
+        fitted = fit(self.problem, weight, held, x[: self.problem.nuisances], linearisations=20)
+        return replace(fitted, effects=tuple((candidate, dict(values)) for candidate, values in effects))
+
+    @cached_property
+    def freely(self) -> Fit:
+        """What was found with the values that explain most, be it the form of the friction law."""
+        return replace(self, around=False).in_file(self.fitted, self.found.final.effects, self.found.final.x)
+
+    def refitted(self, phase: int) -> Fit:
+        """What was found, fitted to all but one third of the samples (see ``split``)."""
+        there, final = self.compared, self.found.final
+        if self.around:
+            fitted = np.where(split(there.problem, phase).fit, there.weight, 0.0)
+            final = fit(there.problem, fitted, there.found.final.effects, there.found.final.x, linearisations=8)
+        return self.in_file(np.where(split(self.problem, phase).fit, self.weight, 0.0), final.effects, self.found.final.x)
 
     def unit(self, unit: str) -> str:
         """A unit in the words of the vehicle's coordinate."""

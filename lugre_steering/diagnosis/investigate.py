@@ -55,9 +55,16 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
     used = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
     there, found = search(freer, fewer, used, _unbent(freer, np.where(used.fit, 1.0 / fewer.sigma, 0.0), baseline), progress)
     beside = Finished(there, fewer, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))
-    weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
-    final = fit(problem, weight, found.final.effects, found.final.x[: problem.nuisances], linearisations=20)
-    return Finished(problem, noise, roles, replace(found, baseline=baseline, final=final), beside_form=beside)
+    done = Finished(problem, noise, roles, replace(found, baseline=baseline), beside_form=beside)
+    done = _with_final(done, found.final)
+    if not there.bends.shape[1] or not found.found or any(item.in_place for item in found.found) or not done.needs_form:
+        return done
+    return _with_final(replace(done, around=True), found.final)
+
+
+def _with_final(done: Finished, beside: Fit) -> Finished:
+    """The search with its names as a vehicle file holds them; ``beside``: they and the freedoms."""
+    return replace(done, found=replace(done.found, final=done.in_file(done.fitted, beside.effects, beside.x)))
 
 
 def _coarser(problem: Problem, baseline: Fit, most: int) -> tuple[Problem, IntArray]:

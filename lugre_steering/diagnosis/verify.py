@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,10 +41,14 @@ class Judged:
     """Whether every third was held out in turn, because the first alone hardly sees the effect."""
 
 
-def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles: Split, seed: int) -> Judged:
+def verify(
+    problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles: Split, seed: int,
+    refitted: Callable[[int], Fit] | None = None,
+) -> Judged:
     """Errors on the held-out third; if that does not settle the gain, on each third in turn, the rest refitted without it.
 
-    ``weight`` (n,) is 1 / sigma where samples are valid. Selection has seen the other thirds, their numbers have not.
+    ``weight`` (n,) is 1 / sigma where samples are valid. Selection has seen the other thirds, their numbers have not. ``refitted``: how
+    the augmented model is fitted without a third, if its values are not just those that fit best.
     """
     before, after = (np.where(roles.held, problem.measured - r.prediction, 0.0) ** 2 for r in (baseline, augmented))
     # Where the fitted data cannot tell when an effect began, the held-out data must not be judged by a guess.
@@ -57,9 +62,10 @@ def verify(problem: Problem, weight: Array, baseline: Fit, augmented: Fit, roles
     for phase in range(CYCLE):
         other = split(problem, phase)
         fitted = np.where(other.fit, weight, 0.0)
-        for errors, model in ((before, baseline), (after, augmented)):
-            refitted = fit(problem, fitted, model.effects, model.x, linearisations=8)
-            errors[other.held] = (problem.measured - refitted.prediction)[other.held] ** 2
+        plain = fit(problem, fitted, baseline.effects, baseline.x, linearisations=8)
+        richer = refitted(phase) if refitted else fit(problem, fitted, augmented.effects, augmented.x, linearisations=8)
+        for errors, model in ((before, plain), (after, richer)):
+            errors[other.held] = (problem.measured - model.prediction)[other.held] ** 2
         seen |= other.held & sure
     return replace(_judge(before, after, seen, roles.cluster, seed), rotated=True)
 

@@ -41,8 +41,8 @@ EFFECT = Effect(
     trace="step at each reversal, grows with pressure",
     coordinate="direction",
     parameters=(
-        Parameter("coulomb", "N m", "of the vehicle, direction dependent", 300.0, -1000.0, 3e4),
-        Parameter("load_share", "1", "share of the torque", 0.01, -0.05, 0.4),
+        Parameter("coulomb", "N m", "of the vehicle, direction dependent", 300.0, 0.0, 3e4),
+        Parameter("load_share", "1", "share of the torque", 0.01, 0.0, 0.4),
         Parameter("viscous", "N m s/rad", "of one track", 1000.0, 0.0, 2e5, optional=True),
         Parameter("holding", "1", "share kept at standstill by the seals", 0.5, 0.0, 1.0, (0.0, 1.0)),
         Parameter("breakaway", "1", "raise at low rate (Stribeck)", 0.3, 0.0, 3.0, optional=True),

@@ -134,7 +134,7 @@ def _whole(done: Finished, final: Fit) -> tuple[Fit, Fit]:
             effects[index] = (replace(candidate, since=onset.timed(there.problem, there.weight, bent, index)), values)
             again = fit(there.problem, there.weight, effects, bent)
             bent = again if again.cost < bent.cost else bent
-    return fit(done.problem, done.weight, bent.effects, bent.x[: done.problem.nuisances], linearisations=20), bent
+    return done.in_file(done.weight, bent.effects, bent.x), bent
 
 
 def _limits(done: Finished, named: Sequence[str]) -> dict[str, Limit]:

@@ -31,8 +31,10 @@ def begun_late(done: Finished) -> Finished:
     if all(candidate.since == own.since for (candidate, _), (own, _) in zip(begun.effects, done.found.final.effects, strict=True)):
         return done
     there = done.compared
-    beside = replace(there, found=replace(there.found, final=_at(there, begun)))
-    return replace(done, found=replace(done.found, final=_at(done, begun)), beside_form=beside if done.beside_form else None)
+    compared = _at(there, begun)
+    final = done.in_file(done.fitted, compared.effects, compared.x) if done.around else _at(done, begun)
+    beside = replace(there, found=replace(there.found, final=compared))
+    return replace(done, found=replace(done.found, final=final), beside_form=beside if done.beside_form else None)
 
 
 def _since(result: Fit, index: int, since: tuple[float, ...]) -> Fit:

@@ -74,7 +74,7 @@ def _tested(done: Finished, seed: int) -> _Tested:
     and an improvement that may be none is none: beside the freedoms with which names are compared, as without them the form of the
     friction law may be most of the error. In a vehicle file, which cannot hold freedoms, a name must do no harm."""
     problem, found, there = done.problem, done.found, done.compared
-    judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed)
+    judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed, done.refitted)
     beside = judged
     beside_form = done.needs_form and not any(item.in_place for item in found.found)
     if found.found and beside_form and judged.gain > -CONTRADICTED:

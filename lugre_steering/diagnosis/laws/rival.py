@@ -34,7 +34,7 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
     not far worse than the names with laws ``beside`` them."""
     if beside is not None and beside.beyond(done.held) < TRUER * alone.beyond(done.held):
         return False
-    return alone.beyond(done.held) < excess(done.problem, done.found.final, done.held) and _more_evident(done, alone)
+    return alone.beyond(done.held) < excess(done.problem, done.freely, done.held) and _more_evident(done, alone)
 
 
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:

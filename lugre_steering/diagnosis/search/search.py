@@ -8,7 +8,7 @@ neither makes up for their form nor is made up for by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -35,7 +35,7 @@ from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Round, Trial
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -99,8 +99,9 @@ def search(
         there, both = step.problem, [*found, step.name]
         if step.instead is not None:
             problem, baseline = step.instead.problem, step.instead.current
-        found, current = (both, step.fit) if step.short else _pruned(there, weight, both, step.fit)
-        now, current = _freed(problem.doubted(there.doubt, there.typical), there, weight, current, given)
+        plain = problem.doubted(there.doubt, there.typical)
+        found, current = (both, step.fit) if step.short else _pruned(plain, there, weight, both, step.fit)
+        now, current = _freed(plain, there, weight, current, given)
         if waiting and len(found) < len(both):
             break
         waiting = step.short  # what another one keeps in doubt may stand beside that one
@@ -144,7 +145,9 @@ def _step(
     if named and _taken(there, weight, current, best) >= HOPELESS * needed(there, best, weight, stands):
         progress(f"a closer look at {best.effects[-1][0].label}")
         there, best, one = _closest([there] if names else worlds(there), weight, split, seen, current)
-        step = _Step(there, best, one, one.gain < needed(there, best, weight, stands))
+        whole = _everywhere(there, weight, best, names)
+        one = replace(one, gain=one.gain + best.cost - whole.cost)
+        step = _Step(there, whole, one, one.gain < needed(there, whole, weight, stands))
     if instead is not None and (step is None or step.short):
         step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
     return step
@@ -173,6 +176,21 @@ def _closest(
     chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
     there, best = settled(own.problem, weight, chosen.fit)
     return there, best, Found(chosen.score, _names(rivals), tuple(own.trials), _taken(there, weight, current, best))
+
+
+def _everywhere(problem: Problem, weight: Array, current: Fit, names: Sequence[Found]) -> Fit:
+    """The fit where those of ``names``, which stand before its last one, act everywhere that alone seemed to act in one recording or
+    from an instant on, to make up for it."""
+    for i, item in enumerate(names, len(current.effects) - 1 - len(names)):
+        candidate, values = current.effects[i]
+        if candidate.bags is None and not candidate.since:
+            continue
+        whole = replace(candidate, bags=None, since=()), values
+        effects = [whole if i == j else own for j, own in enumerate(current.effects)]
+        tried = fit(problem, weight, effects, current.x, linearisations=20, tolerance=TRIAL_TOLERANCE)
+        if tried.cost < current.cost + PARTIAL * item.gain:
+            current = tried
+    return current
 
 
 def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
@@ -238,28 +256,38 @@ def _told(item: Found, rivals: Sequence[Trial]) -> Found:
     return replace(item, rivals=tuple(trial.candidate.effect.id for trial in rivals), trials=(*rivals, *item.trials))
 
 
-def _pruned(problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:
-    """Without earlier names that the latest one has made superfluous: they had only filled in for its shape."""
+def _pruned(plain: Problem, problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:
+    """Without earlier names that the latest one has made superfluous: they had only filled in for its shape.
+
+    ``plain``: without any bends of names; those of a name that goes would stand in for it.
+    """
     kept = list(found)
     for index in range(len(kept) - 2, -1, -1):
         if kept[index].given:
             continue
         rest = [effect for i, effect in enumerate(current.effects) if i != index]
-        without = fit(problem, weight, rest, current, linearisations=20, tolerance=TRIAL_TOLERANCE)
+        others = [i for i in range(len(kept) - 1) if i != index and not kept[i].given]
+        bare, x = _shaped(plain, problem, current, others)
+        without = fit(bare, weight, rest, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
         if without.cost - current.cost < needed(problem, current, weight):
             dropped = kept.pop(index)
             # Together they explained what the latest now explains alone.
             kept[-1] = replace(kept[-1], gain=kept[-1].gain + dropped.gain)
-            current = without
+            problem, current = bare, without
     return kept, current
 
 
 def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given: int) -> tuple[Problem, Fit]:
     """The problem where the law of each name may bend too, and what it adds be late; ``plain``: without any bends of names."""
-    shapes = [flexible.bends(problem, current, i) for i in range(given, len(current.effects))]
+    freed, x = _shaped(plain, problem, current, range(given, len(current.effects)))
+    return settled(freed, weight, fit(freed, weight, current.effects, x))
+
+
+def _shaped(plain: Problem, problem: Problem, current: Fit, names: Iterable[int]) -> tuple[Problem, Array]:
+    """A problem where the laws of some effects of a fit may bend too, and where its fit there begins."""
+    shapes = [flexible.bends(problem, current, i) for i in names]
     columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
     if plain.bends.shape[1]:
         columns.append(still_apart(problem, current.prediction))
-    freed = plain.bent(columns)
-    x = np.append(current.x[: plain.nuisances], np.zeros(freed.nuisances - plain.nuisances))
-    return settled(freed, weight, fit(freed, weight, current.effects, x))
+    shaped = plain.bent(columns)
+    return shaped, np.append(current.x[: plain.nuisances], np.zeros(shaped.nuisances - plain.nuisances))
