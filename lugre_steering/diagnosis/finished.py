@@ -78,7 +78,8 @@ class Finished:
     @cached_property
     def freely(self) -> Fit:
         """What was found with the values that explain most, be it the form of the friction law."""
-        return replace(self, around=False).in_file(self.fitted, self.found.final.effects, self.found.final.x)
+        final = self.found.final
+        return replace(self, around=False).in_file(self.fitted, final.effects, final.x) if self.around else final
 
     def refitted(self, phase: int) -> Fit:
         """What was found, fitted to all but one third of the samples (see ``split``)."""

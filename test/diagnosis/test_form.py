@@ -14,6 +14,7 @@ from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.split import CYCLE
 from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 
@@ -79,3 +80,15 @@ def test_a_stop_beside_it_is_named_alone_and_fitted_as_a_vehicle_file_can_hold_i
     assert found[0].effect.id == "end_stop"
     assert found[1]["engage_angle"] == pytest.approx(0.22, abs=0.02)
     assert done.found.final.x.size == NOTHING.nuisances
+    # Its values are those beside the freedoms; others explain more only because they make up for the form of the friction.
+    assert done.around
+    assert found[1] == done.beside_form.found.final.effects[0][1]
+    ((_, freely),) = done.freely.effects
+    assert done.freely.cost < done.found.final.cost
+    for key, true in (("stiffness", 2e5), ("engage_angle", 0.22)):
+        assert abs(found[1][key] - true) < 0.5 * abs(freely[key] - true)
+    for phase in range(CYCLE):  # without a third of the data others, around which the rest is fitted
+        ((_, again),) = done.refitted(phase).effects
+        assert again != found[1]
+        assert again["engage_angle"] == pytest.approx(0.22, abs=0.03)
+

@@ -250,9 +250,37 @@ def test_a_name_that_only_filled_in_for_the_shape_of_another_goes(problem: Probl
     both = fit(hidden, weight(hidden), [linear, quadratic])
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     steps = [search.Found(replace(score, candidate=candidate), (), (), gain) for (candidate, _), gain in ((linear, 5.0), (quadratic, 2.0))]
-    kept, current = search._pruned(hidden, weight(hidden), steps, both)
+    kept, current = search._pruned(hidden, hidden, weight(hidden), steps, both)
     assert [candidate.effect.id for candidate, _ in current.effects] == ["line_loss_quadratic"]
     assert [(item.score.candidate.effect.id, item.gain) for item in kept] == [("line_loss_quadratic", 7.0)]
+
+
+def test_a_name_does_not_go_because_its_own_bends_could_stand_in_for_it(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "BENT", 1.0)
+    linear, slow = effect("line_loss_linear", b=2e4), effect("pressure_lag", tau=0.05)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [linear, slow]))
+    exact = fit(hidden, weight(hidden), [linear, slow])
+    beside, x = search._shaped(hidden, hidden, exact, [0])
+    both = fit(beside, weight(hidden), exact.effects, x)
+    without = fit(beside, weight(hidden), both.effects[1:], both.x)
+    needed = compare.needed(beside, both, weight(hidden))
+    assert without.cost - both.cost < 3.0 * needed  # nearly all that it does, its bends do
+    score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    steps = [search.Found(replace(score, candidate=candidate), (), (), 5.0) for candidate, _ in (linear, slow)]
+    kept, current = search._pruned(hidden, beside, weight(hidden), steps, both)
+    assert len(kept) == len(current.effects) == 2
+
+
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_what_seemed_to_act_in_one_recording_acts_in_all_once_the_reason_is_named(problem: Problem, everywhere: bool) -> None:
+    linear, offset = effect("line_loss_linear", b=2e4), effect("slope_bias", torque=600.0)
+    partial = replace(linear[0], bags=(0,)), linear[1]
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [linear if everywhere else partial, offset]))
+    seemed = fit(hidden, weight(hidden), [partial, offset])
+    name = search.Found(Score(partial[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1000.0)
+    (candidate, values), _ = search._everywhere(hidden, weight(hidden), seemed, [name]).effects
+    assert candidate.bags == (None if everywhere else (0,))
+    assert values["b"] == pytest.approx(2e4, rel=0.1)
 
 
 def test_what_stands_is_named_though_as_much_again_is_unlisted(slower: Problem) -> None:

@@ -97,9 +97,9 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
     alone = find(done, found.baseline, seed, progress) if rivals else None
     if not named:
         return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
-    beside = find(done, found.final, seed, progress) if left.structured else None
+    beside = find(done, done.freely, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):
-        beside = beside or find(done, found.final, seed, progress)
+        beside = beside or find(done, done.freely, seed, progress)
         if beside is None or not keeps_names(done, beside, alone):
             nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
             return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)

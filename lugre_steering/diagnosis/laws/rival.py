@@ -23,7 +23,7 @@ TRUER = 0.5
 def room_for_laws(done: Finished) -> bool:
     """Whether names leave so much that laws in their place could take clearly more than they do, or recalibration goes beside them as
     far as it may: then it makes up for what they are not."""
-    there, named, final = done.compared, done.compared.found, done.found.final
+    there, named, final = done.compared, done.compared.found, done.freely
     rest = excess(there.problem, named.final, there.fitted)
     stuck = at_bounds(done.problem, final.x, [calibration.name for calibration in done.problem.calibrations])
     return bool(stuck) or rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
