@@ -144,6 +144,7 @@ class Core(NamedTuple):
     trust: Records
     guard: Records
     shadow: Array
+    bounds: Array
     released: Array
     output: Records
     waiting: Records
