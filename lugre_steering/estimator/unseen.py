@@ -9,8 +9,6 @@ brings two starts closer to each other, whatever they were; until all agree, the
 
 from __future__ import annotations
 
-import math
-
 from lugre_steering.chain.baseline import REST_RATE_RAD_S
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
@@ -24,7 +22,7 @@ AGREED_SHARE = 0.05
 """Torques agree within this share of the static friction, and with the measured torque."""
 FORGOTTEN = 5.0
 """Presliding lengths after which less than 1 % of any start is left."""
-SUPPORTED_S = 0.2
+SUPPORTED_NS = 200_000_000
 
 
 @inner
@@ -69,9 +67,8 @@ def end_silence(core, side, ch, stamp_ns, value):
 
 @inner
 def _supported(c, since_ns):
-    """Whether the measured torque has agreed with the estimate since then."""
-    seen_s = (c.residual_ns - since_ns) * 1e-9
-    return seen_s > SUPPORTED_S and math.sqrt(c.residual_now) < AGREED_SHARE * c.friction
+    """Whether the measured torque has agreed with the estimate for long enough since then."""
+    return c.agreed_ns != 0 and c.residual_ns - max(c.agreed_ns, since_ns) > SUPPORTED_NS
 
 
 @inner
