@@ -21,6 +21,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
+from lugre_steering.vehicle.model import baseline_parameters
 from lugre_steering.vehicle.sections import EffectEntry
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
@@ -30,6 +31,8 @@ SIGMA = math.radians(0.01)
 BEGIN_S, END_S = 6.0, 10.0
 FRICTION_NM = 24e3
 """Of one track, sliding: about what a wrong direction costs twice."""
+STATIC_NM, STIFFNESS = (float(baseline_parameters(VEHICLE)[name]) for name in ("static_torque", "sigma_0"))
+LENGTH_RAD = STATIC_NM / STIFFNESS
 Fault = Callable[[int, float, float], float]
 
 
@@ -88,17 +91,90 @@ def test_what_was_wrong_is_forgotten_within_a_second(name: str) -> None:
     assert heat.max() < 1.0  # straight on, the way there and back of four seconds is not seen: 0.2 rad of heat
 
 
+def known_again(end_s: float, t: Array) -> Array:
+    """When the joints have turned since ``end_s`` by as much as brings any two bristles together: 2 exp(-travel / length) < 0.05."""
+    time = np.arange(end_s, 20.0, 0.01)
+    turned = np.cumsum(np.abs(np.diff(0.95 * 0.3 * np.sin(0.7 * time))))
+    return np.asarray(t > time[1:][turned > 4.0 * LENGTH_RAD][0])
+
+
+UNSEEN = {
+    "silence": lambda _side, _t, _angle: math.nan,
+    "silence of one": lambda side, _t, angle: angle if side else math.nan,
+    "degrees": lambda _side, _t, angle: math.degrees(angle),
+    "degrees of one": lambda side, _t, angle: angle if side else math.degrees(angle),
+    "signs": lambda _side, _t, angle: -angle,
+    "offset": lambda side, _t, angle: angle + 0.5 * (1 - side),
+    "spikes": lambda _side, t, angle: angle + (round(100 * t) % 10 < 2),
+    "frozen": None,
+}
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+@pytest.mark.parametrize(("begin", "lasting"), [(6.48, 0.4), (6.17, 1.0), (6.48, 1.0), (4.62, 4.0), (7.1, 4.0)])
+def test_no_torque_stands_without_doubt_that_motion_unseen_has_made_wrong(name: str, begin: float, lasting: float) -> None:
+    """In most of them the joint turns back unseen (at 6.73 s), which costs up to twice the friction of both tracks. A twentieth of the
+    static friction of each may be left without doubt."""
+    change = UNSEEN[name] or held((0,))
+    _, rows = drive(during(begin, begin + lasting, change), 16.0)
+    _, i, j = np.intersect1d(rows["stamp_ns"], sound_drive()["stamp_ns"], return_indices=True)
+    off, told, t = np.abs(rows["total"][i] - sound_drive()["total"][j]), rows["doubts"][i] != 0, seconds_of(rows)[i]
+    assert off[~told & (t > begin + lasting)].max() < 2 * 0.05 * STATIC_NM
+    assert not told[known_again(begin + lasting, t)].any()
+
+
+@lru_cache(maxsize=1)
+def sound_drive() -> Records:
+    return drive(lambda _side, _t, angle: angle, 16.0)[1]
+
+
+def unseen_then_parked(stop_s: float, go_s: float) -> tuple[Array, Array, Array]:
+    """Time, angle of the left track and doubt where the reversal at 2 s is not seen (1 to 3 s), and the tracks stand between two times."""
+    estimator, found = Estimator(VEHICLE), []
+    noise = np.random.default_rng(4).normal(0.0, SIGMA, (2, 100 * round(go_s + 4)))
+    for i in range(noise.shape[1]):
+        t = 0.01 * i
+        way = min(t, stop_s) + max(0.0, t - go_s)
+        angle = 0.2 * (way if way < 2.0 else 4.0 - way)
+        for side in (0, 1):
+            reading = math.nan if 1.0 <= t < 3.0 else angle + float(noise[side, i])
+            found += [(t, angle, bool(row["doubts"])) for row in estimator.push(side, T0 + i * PERIOD_NS, reading)[0]]
+    time, angle_, doubt = np.array(found).T
+    return time, angle_, doubt != 0
+
+
+def test_a_bristle_that_is_not_known_stays_so_while_the_joint_stands_and_is_known_by_the_way_that_it_turns() -> None:
+    """Closed form: the start of the bristle falls as exp(-travel / length), length = Mc / sigma_0; the estimate, gone straight, was
+    at one end of it, so what could be apart is 2 Mc at first and 0.05 Ms at last. Rubber is warmer by 5 K and softer by less than 5 %."""
+    time, angle, doubt = unseen_then_parked(3.1, 30.0)
+    assert doubt[(time >= 3.0) & (time < 30.0)].all()
+    coulomb = float(baseline_parameters(VEHICLE)["coulomb_torque"])
+    way = coulomb / STIFFNESS * math.log(2.0 * coulomb / (0.05 * STATIC_NM))
+    last = float(angle[doubt][-1])
+    assert 0.2 - last == pytest.approx(way, rel=0.15)
+
+
+def test_a_joint_that_stood_where_it_stands_after_a_silence_has_not_moved() -> None:
+    rng, estimator, told = np.random.default_rng(4), Estimator(VEHICLE), []
+    for i in range(1500):
+        t = 0.01 * i
+        for side in (0, 1):
+            reading = 0.2 * min(t, 1.0) + float(rng.normal(0.0, SIGMA))
+            told += [bool(row["doubts"]) for row in estimator.push(side, T0 + i * PERIOD_NS, math.nan if 5.0 <= t < 10.0 else reading)[0]]
+    assert not any(told)
+
+
 @pytest.mark.parametrize("name", FAULTS)
 def test_the_feed_forward_goes_to_zero_and_keeps_to_its_rate(name: str) -> None:
     options = Options()
-    _, rows = drive(FAULTS[name])
+    _, rows = drive(FAULTS[name], 16.0)
     t, flagged = seconds_of(rows), rows["doubts"] != 0
     begin = t[flagged][0]
     assert np.all(rows["feed_forward"][flagged & (t > begin + options.withdrawal_ramp_s + 0.2) & (t < begin + 0.6)] == 0.0)
     core = Estimator(VEHICLE)._core.config[0]
     steps = np.abs(np.diff(rows["feed_forward"], axis=0))
     assert np.all(steps <= core["rate_limit"] * np.minimum(0.05, np.diff(t))[:, None] * (1.0 + 1e-9))
-    assert not flagged[t > END_S + 0.5].any()
+    assert not flagged[known_again(END_S, t)].any()
     np.testing.assert_array_equal(rows["feed_forward"][-100:], rows["torque"][-100:])
 
 
@@ -166,7 +242,8 @@ def test_an_angle_that_thaws_within_one_reach_has_gone_there_and_not_leapt() -> 
     _, i, j = np.intersect1d(rows["stamp_ns"], clean()["stamp_ns"], return_indices=True)
     after = seconds_of(rows)[i] > 9.015
     assert np.abs(rows["total"][i] - clean()["total"][j])[after].max() < 0.05 * FRICTION_NM
-    assert not (rows["doubts"][i] != 0)[seconds_of(rows)[i] > 9.3].any()
+    told = rows["doubts"][i] != 0
+    assert not told[known_again(9.0, seconds_of(rows)[i])].any()
 
 
 @pytest.mark.parametrize(("rate_Hz", "spike"), [(20, 0.6), (20, -0.9), (100, 0.11), (100, -0.19), (1000, 0.015)])
@@ -309,7 +386,7 @@ def test_an_encoder_that_freezes_but_for_the_noise_of_the_sheet_is_told_within_a
 
 
 def test_angles_that_freeze_but_for_noise_while_the_pressures_swing_are_told() -> None:
-    """Both at once: the torque begins to swing at the end of a stroke, and by 2 kN m within a fifth of a second."""
+    """Both at once: the torque begins to swing at the end of a stroke, at 7.85 s, and by a tenth of friction in a quarter of a second."""
     strokes, estimator, rng, told = Strokes(VEHICLE), Estimator(VEHICLE), np.random.default_rng(2), []
     for i in range(1000):
         t = 0.01 * i
@@ -317,7 +394,34 @@ def test_angles_that_freeze_but_for_noise_while_the_pressures_swing_are_told() -
         for channel, value in enumerate(values.tolist()):
             reading = value + (SIGMA if channel < 2 else 1.5e4) * float(rng.standard_normal())
             told += [t for row in estimator.push(channel, T0 + i * PERIOD_NS, reading)[0] if "angle frozen" in doubts(row)]
-    assert 6.0 <= told[0] < 7.0
+    assert 7.85 <= told[0] < 8.1
+
+
+@pytest.mark.parametrize("share", [0.08, -0.08])
+def test_a_torque_that_comes_or_goes_a_little_while_the_joint_stands_freezes_nothing(share: float) -> None:
+    """A cylinder that sticks before the joint moves, a seal or rubber that relaxes: within a tenth of a second, or slowly."""
+    rng, estimator = np.random.default_rng(3), Estimator(sensed())
+    for i in range(600):
+        t = 0.01 * i
+        torque = 20e3 * min(1.0, 2.0 * t) + share * STATIC_NM * min(1.0, max(0.0, (t - 3.0) / 0.1))
+        estimator.push(1, T0 + i * PERIOD_NS - 1, torque)
+        rows = estimator.push(0, T0 + i * PERIOD_NS, 0.2 * min(t, 0.5) + float(rng.normal(0.0, SIGMA)))[0]
+        assert not [row for row in rows if "angle frozen" in doubts(row)]
+
+
+@pytest.mark.parametrize("rate_Hz", [20, 100, 500])
+@pytest.mark.parametrize("step_deg", [0.25, 0.5])
+def test_a_coarse_encoder_is_not_frozen_but_told_when_it_is(rate_Hz: int, step_deg: float) -> None:
+    """Steps of 25 and 50 times the noise of the sheet; strokes and holds, the right side 0.8 of the left. At last the right one stands."""
+    step, steps = math.radians(step_deg), [(0.0, 0.0), (1.0, 0.0), (3.0, 0.3), (6.0, 0.3), (10.0, -0.3), (13.0, -0.3), (17.0, 0.3)]
+    rng, estimator, told = np.random.default_rng(1), Estimator(VEHICLE), []
+    for i in range(17 * rate_Hz):
+        t = i / rate_Hz
+        for side, share in enumerate((1.0, 0.8)):
+            way = np.interp(t if side == 0 or t < 15.0 else 15.0, *np.array(steps).T)
+            reading = step * round((share * way + float(rng.normal(0.0, SIGMA))) / step)
+            told += [t for row in estimator.push(side, T0 + round(t * 1e9), reading)[0] if "angle frozen" in doubts(row)]
+    assert 15.0 < told[0] < 15.75  # 1.5 deg of the other side, and five samples
 
 
 def moved_by(steps: list[tuple[float, float, float]], seconds: float, late: int = 0) -> list[tuple[float, str]]:
@@ -349,14 +453,15 @@ def test_a_side_that_comes_later_than_the_other_is_not_frozen(late: int) -> None
 
 
 def test_a_side_that_stood_and_goes_on_from_there_is_not_taken_for_frozen_again() -> None:
-    """A vehicle that turns one side at a time: told at the first time of each side, then learnt."""
+    """A vehicle that turns one side at a time: told at the first time of each side, and that it may have moved meanwhile; then learnt."""
     steps = [(0.0, 0.0, 0.0)]
     for k in range(4):
         steps += [(6.0 * k + 1, 0.0, 0.0), (6.0 * k + 2, 0.2, 0.0), (6.0 * k + 3, 0.2, 0.0), (6.0 * k + 4, 0.2, 0.2),
                   (6.0 * k + 5, 0.2, 0.2), (6.0 * k + 6, 0.0, 0.0)]  # fmt: skip
     told = moved_by(steps, 24.0)
     assert told[0][0] < 1.3
-    assert all(reason == "angle frozen" and t < 6.0 for t, reason in told)
+    assert {reason for t, reason in told if t < 6.0} == {"angle frozen", "unseen motion"}
+    assert not [t for t, reason in told if t > (6.0 if reason == "angle frozen" else 9.0)]
 
 
 def test_a_jump_is_believed_soon_where_the_measured_torque_speaks_for_it() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from lugre_steering.errors import DataError
-from lugre_steering.estimator import Estimator, Options
+from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.state_file import Ownership, read_state, write_state
 from lugre_steering.vehicle import Vehicle, load
 
@@ -139,6 +139,27 @@ def test_options_change_while_it_runs() -> None:
     estimator.set_options(Options(feed_forward_limit_Nm=1e3, feed_forward_rate_limit_Nm_s=1e9))
     rows = steer(estimator, 300, 400)
     assert max(abs(float(row["feed_forward"][0])) for row in rows) == 1e3
+
+
+def test_what_was_not_known_of_the_bristle_is_not_known_after_a_restart() -> None:
+    """A silence in mid-stroke, then parked: the same place after the restart says nothing of what went unseen before it."""
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 400)
+
+    def park(parked: Estimator, begin: int, end: int) -> list[np.void]:
+        return [
+            row.copy() for i in range(begin, end) for side in (0, 1) for row in parked.push(side, T0 + i * 10_000_000, 0.2)[0]
+        ]
+
+    assert doubts(park(estimator, 700, 900)[-1]) == ["unseen motion"]
+    resumed = Estimator(VEHICLE)
+    resumed.resume(json.loads(json.dumps(estimator.memory)))
+    assert all(doubts(row) == ["unseen motion"] for row in park(resumed, 1000, 1100))
+    moved = [
+        row.copy() for i in range(300) for side in (0, 1) for row in resumed.push(side, T0 + (1100 + i) * 10_000_000, 0.2 - 0.002 * i)[0]
+    ]
+    assert doubts(moved[0]) == ["unseen motion"]
+    assert doubts(moved[-1]) == []
 
 
 def test_the_memory_is_plain_data() -> None:

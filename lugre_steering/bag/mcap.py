@@ -34,10 +34,11 @@ from lugre_steering.bag.mcap_records import (
     fills,
     records,
 )
+from lugre_steering.bag.mcap_walk import LEAST_BYTES, walk
 from lugre_steering.bag.messages import Connection, Messages, windows
 from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
-from lugre_steering.recording import Finding
+from lugre_steering.recording import Finding, IntArray
 
 MAGIC = b"\x89MCAP0\r\n"
 MESSAGE_HEAD = np.dtype(
@@ -54,7 +55,7 @@ _KEPT = 1 << 16  # bytes
 _SUMMARY_LIMIT = 256 << 20  # bytes; one of a recording of 100 GB has some 50 MB
 _TOPICS_LIMIT = 64 << 20  # bytes of all definitions and descriptions of topics
 _MOST_REPORTED = 30  # findings of one file
-_NO_HEADS = np.empty(0, MESSAGE_HEAD)
+_NO_HEADS, _NO_STARTS = np.empty(0, MESSAGE_HEAD), np.empty(0, np.int64)
 
 
 class _Run(NamedTuple):
@@ -174,9 +175,9 @@ class McapFile:
             starts, broken = self._find(data, torn=run.torn, in_chunk=run.is_chunk)
             self._allowance.spend_messages(len(starts))
         except TooLargeError as error:
-            reason, starts, broken, whole = str(error), array("q"), False, False
+            reason, starts, broken, whole = str(error), _NO_STARTS, False, False
         if not believed and not broken:
-            starts = array("q")
+            starts = _NO_STARTS
         messages, foreign = self._messages(data, starts)
         seen = len(starts)
         where = f"the chunk at byte {run.offset}" if run.is_chunk else f"the records from byte {run.offset} on"
@@ -242,52 +243,51 @@ class McapFile:
             raise _DamageError("its checksum does not match", remains, located=False)
         return data
 
-    def _find(self, data: Data, *, torn: bool, in_chunk: bool) -> tuple[array[int], bool]:
+    def _find(self, data: Data, *, torn: bool, in_chunk: bool) -> tuple[IntArray, bool]:
         """Where the messages begin, and whether there is damage between them. Learns topics on the way.
 
         In unpacked ``data`` (a bytearray) nothing behind the damage is worth a search.
         """
-        starts = array("q")
-        at, end = 0, len(data)
+        raw, at, end, head = np.frombuffer(data, np.uint8), 0, len(data), RECORD.size
+        raw.flags.writeable = False  # of one type for the compiler, whatever holds the data
+        most, count = self._allowance.chunk_messages + 1, 0
+        starts = np.empty(min(most, end // LEAST_BYTES), np.int64)
 
         def read(at: int, size: int) -> Data:
             return data[at : at + size]
 
-        unpack, head, least = RECORD.unpack_from, RECORD.size, MESSAGE_HEAD.itemsize - RECORD.size
-        for _ in range(self._allowance.chunk_messages + 1):
+        for _ in range(most):
+            count, at = walk(raw, at, starts, count)
+            if count == most:
+                self._allowance.spend_messages(most)
             if at + head > end:
                 break
-            op, size = unpack(data, at)
+            op, size = RECORD.unpack_from(data, at)
             after = at + head + size
-            if after > end:
+            if after > end or op not in (SCHEMA, CHANNEL) or not fills(read, at, after, end):
                 break
-            if op == MESSAGE and size >= least:
-                starts.append(at)
-            elif op in (SCHEMA, CHANNEL) and fills(read, at, after, end):
-                self._register(op, data[at + head : after])
-            else:
-                break
+            self._register(op, data[at + head : after])
             at = after
         else:
-            self._allowance.spend_messages(len(starts) + 1)
+            self._allowance.spend_messages(count + 1)
+        starts = starts[:count]
         if at == end:
             return starts, False
         if isinstance(data, bytearray):
             return starts if torn else starts[:-1], not torn
-        starts, broken = array("q"), False
+        found, broken = array("q"), False
         for record in records(read, 0, end, self._known, in_chunk=in_chunk):
             broken |= record.op == GAP or (record.after > end and not torn)
             if record.op == MESSAGE and record.after <= end:
-                starts.append(record.at)
+                found.append(record.at)
             elif record.op in (SCHEMA, CHANNEL):
                 self._register(record.op, data[record.at + head : record.after])
-        return starts, broken
+        return np.array(found, np.int64), broken
 
-    def _messages(self, data: Data, starts: array[int]) -> tuple[Messages, int]:
+    def _messages(self, data: Data, start: IntArray) -> tuple[Messages, int]:
         """Wanted messages in log order, and how many have no known topic or no possible log time."""
         raw = np.frombuffer(data, np.uint8)
-        start = np.array(starts, np.int64)
-        heads = windows(raw, start, MESSAGE_HEAD.itemsize).view(MESSAGE_HEAD)[:, 0] if starts else _NO_HEADS
+        heads = windows(raw, start, MESSAGE_HEAD.itemsize).view(MESSAGE_HEAD)[:, 0] if start.size else _NO_HEADS
         connection = self._wanted[heads["channel"]]
         possible = heads["log"] >= 0  # a larger one than 2**63 is negative here
         order = np.argsort(heads["log"], kind="stable")

@@ -122,6 +122,9 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
     jumped = ("angle jumped", "spike")
     frozen, stale, unlike = ("angle frozen",), ("stale",), ("residual", "frozen", "pressure")
     return {
+        # First, while the rubber is as cold as at the beginning to which the latter goes back.
+        "clock an hour ahead": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns + hour)), ("time_jump",)),
+        "clock an hour back": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns - hour)), ("time_jump",)),
         "both angles frozen": (_of(vehicle, angle, _held()), frozen),
         "left angle frozen": (_of(vehicle, angle, _held(), 0), frozen),
         "right angle frozen": (_of(vehicle, angle, _held(), 1), frozen),
@@ -149,8 +152,6 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
         "rates that contradict": (_of(vehicle, angle, lambda _, sample: sample._replace(rate=50.0)), ("absurd_rate",)),
         "another joint's name": (_of(vehicle, angle, lambda _, sample: sample._replace(joint="boom")), ("without a wanted joint", *stale)),
         "zero stamps": (_of(vehicle, (*angle, *pressure), stamp(lambda _: 0)), ("zero_stamp",)),
-        "clock an hour ahead": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns + hour)), ("time_jump",)),
-        "clock an hour back": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns - hour)), ("time_jump",)),
         "pressures are no number": (_of(vehicle, pressure, value(lambda _: math.nan)), ("not_finite",)),
         "pressures out of range": (_of(vehicle, pressure, value(lambda _: 1e9)), ("absurd",)),
         "pressures in bar": (_of(vehicle, pressure, value(lambda p: 1e-5 * p)), unlike),
@@ -235,7 +236,9 @@ class Campaign:
         reach = [self.slope * max(0.05, tb - ta) for (ta, _), (tb, _) in itertools.pairwise(commands)]
         values = [value for _, value in (*commands, *neighbour.torque, *neighbour.feed_forward)]
         wanted = dict(neighbour.left)
-        held = [ns for ns, value in neighbour.feed_forward if ns > end_ns and abs(value - wanted.get(ns, value)) > NEAR * self.friction]
+        now_ns = time.time_ns()  # stamps may have been ahead of it
+        fed = [(ns, value) for ns, value in neighbour.feed_forward if end_ns < ns < now_ns]
+        held = [ns for ns, value in fed if abs(value - wanted.get(ns, value)) > NEAR * self.friction]
         return Score(
             fault=name,
             finite=all(map(math.isfinite, values)),

@@ -23,7 +23,8 @@ from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.actuation import line_pressures, total_gains
 
 PERIOD_S = 0.01
-STROKE_S = 7.0
+STROKE_S, STROKES = 7.0, 40
+STEP_S = 0.002
 AMPLITUDE_RAD, RIGHT_SHARE = 0.3, 0.95
 START_TIMEOUT_S = 240.0
 JOINED_S = 0.5
@@ -51,19 +52,20 @@ def as_it_is(_: int, sample: Sample) -> Sequence[Sample]:
 
 
 class Strokes:
-    """A vehicle that steers to and fro for ever: values of all channels at any time, without noise; pressures by the plant."""
+    """A vehicle that steers to and fro for ever: values of all channels at any time, without noise; pressures by the plant, whose rubber
+    warms up for ``STROKES`` strokes and then stays as it is."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        time_s = np.arange(0.0, 3.0 * STROKE_S, 0.002)
+        time_s = np.arange(0.0, (STROKES + 1) * STROKE_S, STEP_S)
         share = np.array([[1.0], [RIGHT_SHARE]])[: len(vehicle.sides)]
         turn = 2.0 * math.pi / STROKE_S
         theta = AMPLITUDE_RAD * share * np.sin(turn * time_s)
         motion = Motion(time_s, theta)
         torque = run(vehicle, motion).torque
         pressures = line_pressures(torque, total_gains(vehicle, theta))
-        steady = slice(int(np.searchsorted(time_s, STROKE_S)), int(np.searchsorted(time_s, 2.0 * STROKE_S)))
-        self._time = time_s[steady] - STROKE_S
+        self._stroke = round(STROKE_S / STEP_S)
+        steady = slice(self._stroke, None)
         rows: list[Array] = []
         for channel in vehicle.channels:
             if channel.kind is Kind.ANGLE:
@@ -72,13 +74,13 @@ class Strokes:
                 assert vehicle.hydraulics is not None
                 rows.append(pressures[vehicle.hydraulics.lines.index(channel.name), steady])
             else:
-                rows.append(np.full(self._time.size, 15.0))
+                rows.append(np.full(time_s[steady].size, 15.0))
         self._rows = np.array(rows)
 
     def at(self, time_s: float) -> Array:
         """Values (channels,) at a time [s]."""
-        place = min(int((time_s % STROKE_S) / 0.002), self._time.size - 1)
-        return self._rows[:, place]
+        place, last = int(time_s / STEP_S), self._rows.shape[1] - self._stroke
+        return self._rows[:, place if place < last else last + (place - last) % self._stroke]
 
 
 class NodeProcess:

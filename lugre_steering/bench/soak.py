@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.bench.live import eight_lines, observe, serve
-from lugre_steering.bench.neighbour import SECOND, STROKE_S, Strokes
+from lugre_steering.bench.neighbour import SECOND, STEP_S, Strokes
 from lugre_steering.estimator import Estimator
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.vehicle import save
@@ -84,7 +84,7 @@ def block(strokes: Strokes, first: int, count: int, rng: np.random.Generator) ->
     """``count`` instants at 500 Hz from the ``first`` one: channels, stamps, values, rates of all samples in order."""
     channels = [i for i, channel in enumerate(strokes.vehicle.channels) if channel.kind is not Kind.AIR_TEMPERATURE]
     instants = np.arange(first, first + count)
-    values = np.array([strokes.at(float(i) * 0.002 % STROKE_S) for i in instants])[:, channels]
+    values = np.array([strokes.at(float(i) * STEP_S) for i in instants])[:, channels]
     sensors = strokes.vehicle.sensors
     kinds = [strokes.vehicle.channels[i].kind for i in channels]
     noise = np.array([math.radians(sensors.angle_noise_deg) if kind is Kind.ANGLE else sensors.pressure_noise_Pa for kind in kinds])

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from lugre_steering import units
 from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, prepare
-from lugre_steering.data.sensing import white_noise
+from lugre_steering.data.sensing import sensed, white_noise
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.report.words import percent
@@ -72,7 +72,7 @@ def inspect_angles(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
     except DataError:
         return ()
     topics = {(c.kind, c.name): c.topic for c in vehicle.channels}
-    return (*_rough(run, vehicle, topics), *_copied(run, vehicle, topics))
+    return (*_rough(recording, run, vehicle, topics), *_copied(run, vehicle, topics))
 
 
 def _finding(name: str, topic: str, statement: str) -> Finding:
@@ -109,18 +109,24 @@ def _moved(recording: Recording, vehicle: Vehicle, kind: Kind) -> bool:
     return all(own) or any(others)
 
 
-def _rough(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
-    """Angles too noisy to follow a bristle; a rig's stiffness is a guess, by which nothing is judged."""
+def _rough(recording: Recording, run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
+    """Angles too noisy to follow a bristle; a rig's stiffness is a guess, by which nothing is judged.
+
+    What counts is the noise on the common clock, for which samples of a fast sensor are averaged; a sensor is known by that of one sample.
+    """
     if vehicle.contact is not None:
         return
     record = build_model(vehicle).parameters[0][0]
     presliding = float(record["coulomb_torque"] / record["sigma_0"])
-    if run.angle.sigma() > ROUGH * presliding:
+    left = run.angle.sigma()
+    if left > ROUGH * presliding:
+        single = max(sensed(signal).sigma() for signal in recording.angle.values())
+        averaged = f", {units.distance(vehicle, left, degrees='.2g')} in the mean over a step of the clock," if left < 0.9 * single else ""
         topic = ", ".join(dict.fromkeys(topics[Kind.ANGLE, side] for side in vehicle.sides))
         yield _finding(
             "noisy_sensor", topic,
-            f"noise of {units.distance(vehicle, run.angle.sigma(), degrees='.2g')} per sample is {percent(run.angle.sigma() / presliding)} "
-            "of what the contact turns before it slides; no friction can be told from it; check the sensor and its cable",
+            f"noise of {units.distance(vehicle, single, degrees='.2g')} per sample{averaged} is {percent(left / presliding)} of what the "
+            "contact turns before it slides; no friction can be told from it; check the sensor and its cable",
         )  # fmt: skip
 
 

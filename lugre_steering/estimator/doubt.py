@@ -23,6 +23,7 @@ from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.estimator.layout import ANGLE_JUMP
 from lugre_steering.estimator.preview import departs
+from lugre_steering.estimator.unseen import AGREED_SHARE, FASTER, UNSEEN_SIGMA, farthest, lose_sight, part
 from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
 from lugre_steering.recording import Kind
 
@@ -31,8 +32,6 @@ SUPPORTED_S, SUPPORT_SHARE = 0.3, 0.25
 """A jump is believed as soon as this, where the measured torque stays within such a share of the estimate and both are large."""
 SETTLED_S = 0.2
 """For so long after a return the angle stays in doubt."""
-FASTER = 1.5
-"""How much faster than ever before a joint may be while nobody sees it."""
 FASTEST_MEMORY_S = 0.1
 LEAP_SHARE = 0.1
 """A step of less than this share of the bristle's length costs less than that share of the friction."""
@@ -43,12 +42,15 @@ STANDING_SIGMA = 5.0
 """A reading this many times its noise from where it stood has moved: chance alone does that once in 200 000 samples."""
 STILL_NS = 100_000_000
 STILL_SAMPLES = 5
-UNSEEN_SIGMA = 20.0
-"""Motion of so many times the noise of an angle must change its reading."""
+UNSEEN_STEPS = 3.0
+"""Motion of so many of an encoder's steps must change its reading, though the sides do not go equally far."""
 CREEP_MEMORY_S = 1.0
 """Motion of the other side that comes slower than this does not speak against an angle that stands but for its noise."""
 NOISY_SIGMA = 10.0
 NOISE_MEMORY_S = 0.2
+SWING_SHARE = 0.1
+"""Torque up to this share of the static friction may come or go while angles stand, seen by their noise to be alive: cylinders stick,
+seals and rubber relax."""
 PRESSURE_MEMORY_S = 1.0
 """Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
 RESIDUAL_MEMORY_S = 2.0
@@ -59,23 +61,27 @@ BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
 REPEATING, REPEATS_MEMORY = 0.1, 50.0
 """Of a line whose samples have repeated less often than this, over so many of them, a standstill is no measurement."""
 
-DOUBTS = ("angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
-          "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen")  # fmt: skip
-JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE = (1 << bit for bit in range(len(DOUBTS)))
+DOUBTS = (
+    "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
+    "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
+)  # fmt: skip
+JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN = (1 << bit for bit in range(len(DOUBTS)))
 
-INPUTS = JUMPED | FROZEN | NOISY | LINE
+INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN
 """What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
     [
         ("shadow_ns", np.int64),  # stamp of the trusted state; 0: the present one is trusted
         ("shadow_angle", np.float64),  # measured then [rad]
+        ("shadow_unseen", np.bool_),  # whether its bristle was not known
         ("calm", np.float64),  # time without another jump since [s]
         ("returned", np.bool_),  # to where the shadow can have gone
         ("absurd", np.bool_),  # the readings since the last accepted one
         ("leap_ns", np.int64),  # stamp of the reading before one that departs from the motion so far; 0: none does
         ("leap_angle", np.float64),  # measured then [rad]
         ("leap_since_ns", np.int64),  # since when the joint may have been on its way
+        ("step", np.float64),  # smallest change that the reading has shown [rad]; 0: none yet
         ("fastest", np.float64),  # rate that the joint has shown while trusted [rad/s]
         ("still_ns", np.int64),  # since when the reading has not changed by more than its noise
         ("still", np.int64),  # samples since
@@ -83,7 +89,8 @@ GUARD = np.dtype(
         ("place", np.float64),  # where it stands: mean of the first of them [rad]
         ("still_other", np.float64),  # angle of the other side then, followed slowly [rad]; NaN: none yet
         ("apart", np.int64),  # samples in a row for which the other side was away from there
-        ("frozen", np.bool_),
+        ("unseen_ns", np.int64),  # stamp of the end of unseen motion after which the bristle is not known yet; 0: it is
+        ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not
         ("frozen_at", np.float64),  # reading then [rad]
         ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault
         ("before", np.float64),  # change of the reading before the last [rad]
@@ -110,25 +117,28 @@ def _stand(g, stamp_ns, value):
 
 @inner
 def _thaw(core, side, ch, stamp_ns, value):
-    """A frozen angle moves: if it goes on from where it was, it was sound and only stood."""
+    """A frozen angle moves: if it goes on from where it was, it may have been sound and only stood."""
     g = core.guard[side]
-    if abs(value - g.frozen_at) > UNSEEN_SIGMA * core.config[0].angle_noise:
-        g.frozen = False
-        g.stands = g.stands or reachable(core, side, ch.last_ns, stamp_ns, value - ch.last_value)
+    if abs(value - g.frozen_at) <= UNSEEN_SIGMA * core.config[0].angle_noise:
+        return
+    g.stands = g.stands or reachable(core, side, ch.last_ns, stamp_ns, value - ch.last_value)
+    lose_sight(core, side, stamp_ns, value, (stamp_ns - g.frozen_ns) * 1e-9)
+    g.frozen_ns = 0
 
 
 @inner
-def watch(core, side, ch, dt, value):
+def watch(core, side, ch, stamp_ns, dt, value):
     """Learn from the next reading [rad] of a side, ``dt`` [s] after the last: whether it stands still, and its noise.
 
     Neighbouring second differences of a smooth motion have one sign; of white noise their product is -4 variances.
     """
     g, sigma = core.guard[side], core.config[0].angle_noise
-    stamp_ns = ch.last_ns if dt <= 0.0 else ch.last_ns + np.int64(dt * 1e9)
     change = value - ch.last_value
-    if g.frozen:
+    if g.frozen_ns != 0:
         _thaw(core, side, ch, stamp_ns, value)
     same = g.same + 1 if change == 0.0 else 0
+    if change != 0.0 and dt > 0.0:
+        g.step = min(abs(change), g.step) if g.step > 0.0 else abs(change)
     if dt <= 0.0 or abs(value - g.place) > STANDING_SIGMA * sigma:
         _stand(g, stamp_ns, value)
     else:
@@ -136,10 +146,12 @@ def watch(core, side, ch, dt, value):
         if g.still < STILL_SAMPLES:
             g.place += (value - g.place) / (g.still + 1)
         g.same = same
+    if dt > NOISE_MEMORY_S:
+        g.before = math.nan  # a silence has no neighbours
     bend = change - g.before
     limit = (3.0 * NOISY_SIGMA * sigma) ** 2  # one spike is no noise
-    weight = min(1.0, dt / NOISE_MEMORY_S)
-    g.noise = max(0.0, g.noise + (max(-limit, min(limit, -0.25 * bend * g.bend)) - g.noise) * weight)
+    if not math.isnan(bend * g.bend):
+        g.noise = max(0.0, g.noise + (max(-limit, min(limit, -0.25 * bend * g.bend)) - g.noise) * dt / NOISE_MEMORY_S)
     g.before, g.bend = change, bend
 
 
@@ -155,12 +167,21 @@ def still(core, side, stamp_ns):
 
 
 @inner
+def _unseen(core):
+    """Motion [rad] that must change a reading, by its noise or by how coarse the encoders are."""
+    limit = UNSEEN_SIGMA * core.config[0].angle_noise
+    for side in range(core.motion.size):
+        limit = max(limit, UNSEEN_STEPS * core.guard[side].step)
+    return limit
+
+
+@inner
 def _watch_other(core, side, dt, stamp_ns):
     """Freeze the angle of a side that stands still at its newest sample, ``dt`` [s] after the last, while the other side moves.
 
     The other side counts as far as its stamps lie within the standstill: one of them may come later than the other.
     """
-    g, c, other = core.guard[side], core.config[0], 1 - side
+    g, other = core.guard[side], 1 - side
     seen_ns = core.channels[other].last_ns
     if core.motion[other].started == 0.0 or seen_ns < g.still_ns or seen_ns > stamp_ns:
         return
@@ -169,7 +190,7 @@ def _watch_other(core, side, dt, stamp_ns):
         g.still_other = theta
     elif g.same < STILL_SAMPLES:
         g.still_other += (theta - g.still_other) * min(1.0, dt / CREEP_MEMORY_S)
-    g.apart = g.apart + 1 if abs(theta - g.still_other) > UNSEEN_SIGMA * c.angle_noise else 0
+    g.apart = g.apart + 1 if abs(theta - g.still_other) > _unseen(core) else 0
     if g.apart >= STILL_SAMPLES and still(core, side, stamp_ns):  # fewer may be a spike
         _freeze(core, side)
 
@@ -178,8 +199,8 @@ def _watch_other(core, side, dt, stamp_ns):
 def _freeze(core, side):
     """From now on the angle of the side is frozen, until its reading moves."""
     g = core.guard[side]
-    if not g.frozen:
-        g.frozen, g.frozen_at = True, core.channels[side].last_value
+    if g.frozen_ns == 0:
+        g.frozen_ns, g.frozen_at = g.still_ns, core.channels[side].last_value
 
 
 @inner
@@ -191,8 +212,10 @@ def angle_doubts(core, side, dt, stamp_ns):
         found |= JUMPED
     if core.motion.size > 1 and c.angle_noise > 0.0:
         _watch_other(core, side, dt, stamp_ns)
-    if g.frozen:
+    if g.frozen_ns != 0:
         found |= FROZEN
+    if g.unseen_ns != 0:
+        found |= UNSEEN
     if noise_of(core, side) > c.angle_noise:
         found |= NOISY
     return found
@@ -200,19 +223,21 @@ def angle_doubts(core, side, dt, stamp_ns):
 
 @inner
 def weigh_pressures(core, stamp_ns, measured):
-    """Angles that stand still while the measured torque [N m] swings by more than they can hold unseen are frozen."""
+    """Angles that stand still while the measured torque [N m] swings by more than it can without motion that shows are frozen."""
     c = core.config[0]
     dt = (stamp_ns - c.swing_ns) * 1e-9
     c.swing_ns = stamp_ns
-    stiffness, standing = 0.0, c.angle_noise > 0.0
+    stiffness, standing, equal = 0.0, c.angle_noise > 0.0, True
     for side in range(core.motion.size):
         stiffness += row(core.parameters, side, BASELINE).sigma_0
         standing = standing and still(core, side, stamp_ns)
+        equal = equal and core.guard[side].same >= STILL_SAMPLES
     if not standing or dt <= 0.0:
         c.swing_from = measured
         return
     c.swing_from += (measured - c.swing_from) * min(1.0, dt / PRESSURE_MEMORY_S)
-    if abs(measured - c.swing_from) > stiffness * UNSEEN_SIGMA * c.angle_noise:
+    limit = stiffness * _unseen(core)
+    if abs(measured - c.swing_from) > (limit if equal else max(limit, SWING_SHARE * c.friction)):
         for side in range(core.motion.size):
             _freeze(core, side)
 
@@ -241,7 +266,7 @@ def watch_leap(core, side, ch, dt, value):
         return
     if abs(value - ch.last_value - core.motion[side].omega * dt) > _leap_limit(core, side, dt):
         g.leap_ns, g.leap_angle = ch.last_ns, ch.last_value
-        g.leap_since_ns = g.still_ns if g.frozen else ch.last_ns
+        g.leap_since_ns = g.frozen_ns if g.frozen_ns != 0 else ch.last_ns
         if g.shadow_ns == 0:
             copy_row(core.shadow, side, core.state, side)
 
@@ -267,7 +292,7 @@ def trust(core, side, dt):
         patience = SUPPORTED_S if _supported(core.config[0]) else TRUSTED_S
         if g.calm >= (SETTLED_S if g.returned else patience):
             g.shadow_ns = 0
-    elif not g.frozen and g.leap_ns == 0:
+    elif g.frozen_ns == 0 and g.leap_ns == 0:
         g.fastest += max(0.0, abs(core.motion[side].omega) - g.fastest) * min(1.0, dt / FASTEST_MEMORY_S)
 
 
@@ -281,8 +306,7 @@ def _stand_at(motion, value):
 @inner
 def reachable(core, side, since_ns, stamp_ns, change):
     """Whether a joint can have turned by ``change`` [rad] between two stamps, at the rates that it has shown."""
-    g, sigma = core.guard[side], core.config[0].angle_noise
-    return abs(change) <= FASTER * g.fastest * (stamp_ns - since_ns) * 1e-9 + UNSEEN_SIGMA * sigma
+    return abs(change) <= farthest(core, side, (stamp_ns - since_ns) * 1e-9)
 
 
 @inner
@@ -294,11 +318,13 @@ def re_anchor(core, side, ch, stamp_ns, value):
     g, c, out, motion = core.guard[side], core.config[0], core.output[side], core.motion[side]
     p, state, trial = row(core.parameters, side, BASELINE), row(core.state, side, STATE), row(core.scratch_state, 0, STATE)
     ch.reasons[ANGLE_JUMP] += 1
+    if g.shadow_ns == 0:
+        g.shadow_unseen = g.unseen_ns != 0
     if g.shadow_ns == 0 and g.leap_ns == 0:
         copy_row(core.shadow, side, core.state, side)
         g.shadow_ns, g.shadow_angle = ch.last_ns, ch.last_value
-        begin_ns = g.still_ns
-        g.returned = g.frozen
+        begin_ns = g.frozen_ns
+        g.returned = g.frozen_ns != 0
     else:
         saturated = state.saturated
         copy_row(core.state, side, core.shadow, side)
@@ -311,7 +337,11 @@ def re_anchor(core, side, ch, stamp_ns, value):
     g.leap_ns = 0
     passed = (stamp_ns - g.shadow_ns) * 1e-9
     if g.returned:
-        rate = (value - g.shadow_angle) / ((stamp_ns - begin_ns) * 1e-9)
+        unseen_s = (stamp_ns - begin_ns) * 1e-9
+        rate = (value - g.shadow_angle) / unseen_s
+        if not g.shadow_unseen:
+            g.unseen_ns = 0
+        lose_sight(core, side, stamp_ns, value, unseen_s)
         call_step(c.step_door, p, state, core.rubber, out, passed, value, rate, 0.0, c.effects)
     else:
         copy_row(core.scratch_state, 0, core.state, side)
@@ -319,8 +349,9 @@ def re_anchor(core, side, ch, stamp_ns, value):
         turned = trial.theta - state.theta
         state.theta += turned
         state.contact_angle += turned
+        part(core, side, stamp_ns, value, math.inf)
         call_step(c.step_door, p, state, core.rubber, out, passed, value, 0.0, 0.0, c.effects)
-    g.absurd = g.frozen = False
+    g.absurd, g.frozen_ns = False, 0
     _stand(g, stamp_ns, value)
     for other in range(core.motion.size):  # a jump is no motion
         core.guard[other].still_other, core.guard[other].apart = math.nan, 0
@@ -360,6 +391,10 @@ def weigh_residual(c, stamp_ns, measured, residual):
     dt = (stamp_ns - c.residual_ns) * 1e-9
     known = dt > 0.0 and c.residual_ns != 0
     c.residual_ns = stamp_ns
+    if abs(residual) > AGREED_SHARE * c.friction:
+        c.agreed_ns = 0
+    elif c.agreed_ns == 0:
+        c.agreed_ns = stamp_ns
     soon = min(1.0, dt / SUDDEN_MEMORY_S) if known else 0.0
     c.residual_now += (residual * residual - c.residual_now) * soon
     c.measured_now += (measured * measured - c.measured_now) * soon

@@ -380,6 +380,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
         trust=np.zeros(sides, TRUST),
         guard=np.zeros(sides, GUARD),
         shadow=rows_of(np.zeros(sides, composition.state)),
+        bounds=rows_of(np.zeros(2 * sides, composition.state)),
         released=np.zeros(sides),
         output=np.zeros(sides, OUTPUT),
         waiting=np.zeros((sides, WAITING_RING), WAITING),

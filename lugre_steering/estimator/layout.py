@@ -69,6 +69,7 @@ CONFIG = np.dtype(
         ("residual_square", np.float64),  # of late [(N m)^2], and the same of the measured and the estimated torque
         ("measured_square", np.float64),
         ("estimate_square", np.float64),
+        ("agreed_ns", np.int64),  # since when residuals have been small; 0: the last one is not
         ("residual_now", np.float64),  # the same three of the very last time
         ("measured_now", np.float64),
         ("estimate_now", np.float64),
@@ -144,6 +145,7 @@ class Core(NamedTuple):
     trust: Records
     guard: Records
     shadow: Array
+    bounds: Array
     released: Array
     output: Records
     waiting: Records

@@ -15,15 +15,16 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator.layout import Core, records_of
 
 Memory = Mapping[str, Any]
-"""Per side ``stamp_ns`` and ``angle`` [rad] of its last sample, the records ``state`` and ``motion``; JSON can hold it."""
+"""Per side ``stamp_ns`` and ``angle`` [rad] of its last sample, the fastest rate [rad/s] that it has shown, whether its bristle is
+not known after unseen motion, the records ``state`` and ``motion``; JSON can hold it."""
 
-_STATES = ("state", "shadow")
+_STATES = ("state", "shadow", "bounds")
 _HANDED_OVER = (
     "motion", "trust", "guard", "output", "waiting", "pending", "line_ns", "line_value", "plan_ns", "plan_theta", "released",
 )  # fmt: skip
 _ONGOING = (
     "start_ns", "lagged", "lag_input", "lagged_ns", "pending_first", "pending_count", "plan_size", "swing_ns", "swing_from",
-    "residual_ns", "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now",
+    "residual_ns", "agreed_ns", "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now",
     "beyond", "released_ns", "weight", "message",
 )  # fmt: skip
 
@@ -31,7 +32,7 @@ _ONGOING = (
 def remembered(core: Core, composition: Composition, sides: Sequence[str]) -> Memory:
     """The memory of each side that has begun; of one in doubt, the state that is trusted."""
     table: dict[str, Any] = {}
-    states, shadows = (records_of(getattr(core, name), composition.state) for name in _STATES)
+    states, shadows = (records_of(rows, composition.state) for rows in (core.state, core.shadow))
     for i, side in enumerate(sides):
         channel, guard = core.channels[i], core.guard[i]
         if states[i]["started"] == 0.0:
@@ -39,8 +40,9 @@ def remembered(core: Core, composition: Composition, sides: Sequence[str]) -> Me
         doubted = guard["shadow_ns"] != 0
         stamp_ns, angle = (guard["shadow_ns"], guard["shadow_angle"]) if doubted else (channel["last_ns"], channel["last_value"])
         state = shadows[i] if doubted else states[i]
+        unseen = guard["shadow_unseen"] if doubted else guard["unseen_ns"] != 0
         table[side] = {
-            "stamp_ns": int(stamp_ns), "angle": float(angle), "fastest": float(guard["fastest"]),
+            "stamp_ns": int(stamp_ns), "angle": float(angle), "fastest": float(guard["fastest"]), "unseen": bool(unseen),
             "state": _plain(state), "motion": _plain(core.motion[i]),
         }  # fmt: skip
     return {"start_ns": int(core.config[0]["start_ns"]), "sides": table}
@@ -55,15 +57,21 @@ def recall(core: Core, composition: Composition, sides: Sequence[str], memory: M
     try:
         rows = [(i, memory["sides"][side]) for i, side in enumerate(sides) if side in memory["sides"]]
         records = [(_record(states, row["state"]), _record(core.motion, row["motion"])) for _, row in rows]
-        last = [(int(row["stamp_ns"]), float(row["angle"]), float(row["fastest"])) for _, row in rows]
+        last = [(int(row["stamp_ns"]), float(row["angle"]), float(row["fastest"]), bool(row["unseen"])) for _, row in rows]
         start_ns = int(memory["start_ns"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(f"it is not the memory of this model ({error})") from error
     core.config["start_ns"] = start_ns
-    for (i, _), (state, motion), (stamp_ns, angle, fastest) in zip(rows, records, last, strict=True):
+    parameters, bounds = records_of(core.parameters, composition.parameters), records_of(core.bounds, composition.state)
+    for (i, _), (state, motion), (stamp_ns, angle, fastest, unseen) in zip(rows, records, last, strict=True):
         states[i], core.motion[i] = state, motion
         core.guard[i]["fastest"] = fastest
         core.guard[i]["still_ns"] = stamp_ns
+        if unseen:
+            core.guard[i]["unseen_ns"] = stamp_ns
+            bounds[2 * i : 2 * i + 2] = state
+            length = parameters[i]["static_torque"] / parameters[i]["sigma_0"]
+            bounds["z"][2 * i : 2 * i + 2] = length, -length
         core.channels[i]["last_ns"], core.channels[i]["last_value"] = stamp_ns, angle
 
 

@@ -28,6 +28,7 @@ from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
 from lugre_steering.estimator.release import release
+from lugre_steering.estimator.unseen import drive_bounds, end_silence
 
 LONGEST_PERIOD_NS = 100_000_000  # of a sensor whose stamps may pair by half their period
 
@@ -151,21 +152,26 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     state, motion, output = row(core.state, side, STATE), core.motion[side], core.output[side]
     saturated = state.saturated
     dt = _elapsed(c, ch, state, stamp_ns)
+    g = core.guard[side]
     if jumped:
         re_anchor(core, side, ch, stamp_ns, value)
     else:
         rates = core.trust[side]
         rate = believed(rates, ch, c, dt, value, rate)
-        core.guard[side].leap_ns = 0
+        g.leap_ns = 0
         p = row(core.parameters, side, BASELINE)
         if abs(value - ch.last_value - motion.omega * dt) > LEAP_RATE_RAD_S * p.angle_unit * dt:  # the call alone costs 0.1 us
             watch_leap(core, side, ch, dt, value)
-        watch(core, side, ch, dt, value)
+        watch(core, side, ch, stamp_ns, dt, value)
+        if dt * 1e9 > c.max_gap_ns:
+            end_silence(core, side, ch, stamp_ns, value)
         before = motion.theta if motion.started != 0.0 else value
         follow(motion, dt, value, rate, noise_of(core, side))
         rates.travel += abs(motion.theta - before)
         call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)
+    if g.unseen_ns != 0:
+        drive_bounds(core, side, dt)
     ch.last_ns = stamp_ns
     ch.last_value = value
     waiting = core.waiting[side, _seat(ch, core.waiting.shape[1])]

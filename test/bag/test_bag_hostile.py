@@ -162,16 +162,16 @@ def packed_records(record: bytes, count: int) -> bytes:
     return chunk("zstd", zstandard.ZstdCompressor().compress(plain), len(plain))
 
 
-@pytest.mark.parametrize("padding", [0, 8 << 20])
-def test_chunks_of_messages_without_end(tmp_path: Path, padding: int) -> None:
-    """A large record of another program in the file is no reason to unpack more."""
+@pytest.mark.parametrize(("padding", "records_of_it", "chunks"), [(0, 1, 5), (8 << 20, 1, 5), (900_000, 134, 30)])
+def test_chunks_of_messages_without_end(tmp_path: Path, padding: int, records_of_it: int, chunks: int) -> None:
+    """A large record of another program in the file is no reason to unpack more; many small ones, 120 MB here, are no reason to be slow."""
     messages = make.steering(1.0)
     file = mcap(tmp_path / "run.mcap", messages, whole=False)
     data = file.read_bytes()
     end = data.rindex(b"\x0f" + struct.pack("<Q", 4))
     empty = struct.pack("<BQHIQQ", 5, 22, 1, 0, T0, T0)
     foreign = struct.pack("<BQ", 0x80, padding) + bytes(padding)
-    file.write_bytes(data[:end] + foreign + packed_records(empty, 1_000_000) * 5 + data[end:])
+    file.write_bytes(data[:end] + foreign * records_of_it + packed_records(empty, 1_000_000) * chunks + data[end:])
     begin = time.monotonic()
     count, said = values(file)
     assert count == len(messages)

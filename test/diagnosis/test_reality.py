@@ -42,7 +42,7 @@ from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.online import sheet_words
 from lugre_steering.recording import Array, Recording, Signal
-from lugre_steering.simulate.command import load_vehicle
+from lugre_steering.simulate.command import load_vehicle, simulation
 from lugre_steering.vehicle import EffectEntry, Vehicle
 
 VEHICLE = load_vehicle(None)
@@ -347,6 +347,19 @@ def test_dead_sensors_stop_the_diagnosis(fault: str) -> None:
     result = diagnose_recordings([break_it(r) for r in sound()], VEHICLE).json
     assert (result["verdict"], result["effects"]) == ("insufficient_data", [])
     assert any(f["finding"] == finding and topic in f["topic"] for f in result["data_quality"])
+
+
+@pytest.mark.parametrize("rate_Hz", [20.0, 50.0, 100.0, 500.0])
+def test_noise_is_told_as_that_of_one_sample(rate_Hz: float) -> None:
+    """However many of them are averaged for the clock of the pressures: the spread of the noise that is added, counted by itself."""
+    size = float(np.radians(1.2))
+    recording = simulation("double-cycle", VEHICLE, {"angle_rate_Hz": rate_Hz, "pressure_rate_Hz": 50.0}).recording
+    rough = changed(recording, angle=lambda v: v + noise(size)(v))
+    spread = float(np.std(rough.angle["left"].value - recording.angle["left"].value))
+    said = next(f.statement for f in inspect(rough, VEHICLE).findings if f.finding == "noisy_sensor")
+    told = re.search(r"noise of ([0-9.]+) deg per sample", said)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(np.degrees(spread), rel=0.1)
 
 
 def test_sound_channels_are_alive() -> None:

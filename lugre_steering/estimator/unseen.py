@@ -1,0 +1,84 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Motion that nobody saw: during a silence, a freeze or a jump. How the bristle came out of it is not known.
+
+Of all the ways that the joint can have gone, dz = d theta - |d theta| z / length makes two lead to the ends of what the bristle can
+hold: first as far as possible to one side, then back to where the joint is now. Both are driven on beside the estimate. Every radian
+brings two starts closer to each other, whatever they were; until all agree, the torque is in doubt.
+"""
+
+from __future__ import annotations
+
+from lugre_steering.chain.baseline import REST_RATE_RAD_S
+from lugre_steering.chain.compiled import inner
+from lugre_steering.chain.doors import call_step, copy_row, row
+from lugre_steering.chain.layout import BASELINE, STATE
+
+FASTER = 1.5
+"""How much faster than ever before a joint may be while nobody sees it."""
+UNSEEN_SIGMA = 20.0
+"""Motion of so many times the noise of an angle must change its reading."""
+AGREED_SHARE = 0.05
+"""Torques agree within this share of the static friction, and with the measured torque."""
+FORGOTTEN = 5.0
+"""Presliding lengths after which less than 1 % of any start is left."""
+SUPPORTED_NS = 200_000_000
+
+
+@inner
+def farthest(core, side, seconds):
+    """How far [rad] the joint of a side can have gone in that time [s], at the rates that it has shown."""
+    return FASTER * core.guard[side].fastest * seconds + UNSEEN_SIGMA * core.config[0].angle_noise
+
+
+@inner
+def lose_sight(core, side, stamp_ns, value, seconds):
+    """Nobody has seen for so long [s] how the joint went from where its state is to ``value`` [rad]: part the two ways."""
+    change = abs(value - row(core.state, side, STATE).theta)
+    part(core, side, stamp_ns, value, max(farthest(core, side, seconds), FASTER * change))
+
+
+@inner
+def part(core, side, stamp_ns, value, far):
+    """The two ways to ``value`` [rad] of a joint that can have gone so far [rad], there and back, from where its state is."""
+    c, g, p, state = core.config[0], core.guard[side], row(core.parameters, side, BASELINE), row(core.state, side, STATE)
+    length = p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else 0.0
+    aside = max(0.0, min(FORGOTTEN * length, 0.5 * (far - abs(value - state.theta))))
+    for way in range(2):
+        i = 2 * side + way
+        bound, out = row(core.bounds, i, STATE), core.scratch_output[0]
+        if g.unseen_ns == 0:
+            copy_row(core.bounds, i, core.state, side)
+        turn = max(state.theta, value) + aside if way == 0 else min(state.theta, value) - aside
+        call_step(c.step_door, p, bound, core.rubber, out, 0.0, turn, 0.0, 0.0, c.effects)
+        call_step(c.step_door, p, bound, core.rubber, out, 0.0, value, 0.0, 0.0, c.effects)
+        bound.temperature = state.temperature  # what may have been slid is a bound of the bristle, not of the heat
+    g.unseen_ns = stamp_ns
+
+
+@inner
+def end_silence(core, side, ch, stamp_ns, value):
+    """The reading [rad] comes after a silence. A joint that stood and is where it stood has not moved meanwhile."""
+    p, omega, noise = row(core.parameters, side, BASELINE), core.motion[side].omega, core.config[0].angle_noise
+    stood = abs(omega) < REST_RATE_RAD_S * p.angle_unit and abs(value - ch.last_value) <= UNSEEN_SIGMA * noise
+    if not stood:
+        lose_sight(core, side, stamp_ns, value, (stamp_ns - ch.last_ns) * 1e-9)
+
+
+@inner
+def _supported(c, since_ns):
+    """Whether the measured torque has agreed with the estimate for long enough since then."""
+    return c.agreed_ns != 0 and c.residual_ns - max(c.agreed_ns, since_ns) > SUPPORTED_NS
+
+
+@inner
+def drive_bounds(core, side, dt):
+    """Both ways go on with the motion of the side, ``dt`` [s] after its last sample, until their torques agree with its own."""
+    c, g, p, motion = core.config[0], core.guard[side], row(core.parameters, side, BASELINE), core.motion[side]
+    out, apart = core.scratch_output[0], 0.0
+    for i in range(2 * side, 2 * side + 2):
+        bound = row(core.bounds, i, STATE)
+        call_step(c.step_door, p, bound, core.rubber, out, dt, motion.theta, motion.omega, motion.alpha, c.effects)
+        apart = max(apart, abs(out.torque - core.output[side].torque))
+    if apart <= AGREED_SHARE * p.static_torque or _supported(c, g.unseen_ns):
+        g.unseen_ns = 0
