@@ -136,10 +136,10 @@ def write_outcomes(what: str, outcomes: list[Outcome], out: Path, made: Provenan
     results, note = [], no_pictures()
     names = [*(outcome.name for outcome in outcomes), *([ALL] if what == ALL else [])]
     with output_folder(out):
-        refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png"))
+        refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png", ".csv"))
         for outcome in outcomes:
             results.append({"schema": SCHEMA, **outcome.to_json(), "provenance": plain(made)})
-            write_table(outcome, out / f"{outcome.name}.csv")
+            write_table(outcome, out / f"{outcome.name}.csv", made)
             if note is None:
                 draw_outcome(outcome, out / f"{outcome.name}.png", made)
             write_record(results[-1], out / f"{outcome.name}.json")
