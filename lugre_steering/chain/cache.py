@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any, ClassVar
+from typing import IO, Any
 
 import numba
 from numba.core import caching, ccallback, dispatcher
@@ -117,7 +117,7 @@ class _ByContent(caching.UserProvidedCacheLocator):
 class _Forms(caching.CompileResultCacheImpl):
     """Kept there or not at all: elsewhere Numba would run stale code after an edit of what a function calls."""
 
-    _locator_classes: ClassVar[list[type[object]]] = [_ByContent]
+    _locator_classes = [_ByContent]  # noqa: RUF012 (as Numba has it)
 
 
 class _KeptCode(caching.FunctionCache):
