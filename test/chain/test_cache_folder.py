@@ -10,9 +10,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 import lugre_steering
+from lugre_steering.chain.compiled import law
+from lugre_steering.chain.lag import lag_weights
 
 NOWHERE = "/proc/nowhere"
 """No user, not even root, can make this folder."""
@@ -60,3 +63,12 @@ def test_copies_of_the_package_share_what_they_compile_and_an_edited_one_does_no
         assert file == str(copy / "chain" / "lag.py")
         hits.append(int(used))
     assert hits == [0, 1, 0]
+
+
+def test_laws_of_the_package_are_kept_and_those_of_users_are_not() -> None:
+    """Numba sees no change of what a law calls: it is followed in the package (its folder is of all sources) and nowhere else."""
+    def users(x: float) -> float:
+        return x
+
+    assert lag_weights.stats.cache_path.startswith(numba.config.CACHE_DIR)
+    assert law(users).stats.cache_path is None
