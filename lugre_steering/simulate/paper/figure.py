@@ -15,6 +15,7 @@ from rich.text import Text
 
 from lugre_steering.files import COMMENT_MARK, comments, write_text
 from lugre_steering.provenance import Provenance
+from lugre_steering.report import words
 from lugre_steering.simulate.paper.outcome import Outcome
 
 
@@ -88,4 +89,4 @@ def checks_table(outcomes: Sequence[Outcome]) -> Table:
 
 
 def _number(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+    return words.number(value, 5 if abs(value) >= 1000.0 else 3)
