@@ -238,7 +238,7 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         table = Table(
             "manoeuvre", "what is driven", title="Shown by (simulated)", title_justify="left", title_style="bold"
         )
-        table.add_column("trace [N m rms]", justify="right")
+        table.add_column("trace (N m rms)", justify="right")
         table.add_column("after recalibration", justify="right")
         for row in result["shown_by"]:
             sizes = [words.number(row[key], 3) for key in ("rms_Nm", "visible_rms_Nm")]
