@@ -5,78 +5,26 @@ returns."""
 
 from __future__ import annotations
 
-import functools
-import inspect
 import os
 import sys
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import Progress, TaskID
 
 from lugre_steering import defaults, serialise
 from lugre_steering.counted import counted
-from lugre_steering.errors import DataError, ImplausibleWarning, LugreSteeringError
-from lugre_steering.terminal import forgive_letters
-from lugre_steering.version import __version__
+from lugre_steering.errors import DataError
+from lugre_steering.program import app as app  # with all commands once this file is imported
+from lugre_steering.program import command, options_of_commands
+from lugre_steering.progress import progress_bar, spinner, step_bar
+from lugre_steering.terminal import console, forgive_letters, output
 
-# Set before NumPy is imported: its matrices here are so narrow that BLAS threads only fight with our own.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
-app = typer.Typer(
-    help="Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out.",
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    rich_markup_mode=None,  # it would take the brackets of units for its own
-    pretty_exceptions_enable=False,
-)
-
-
-def _tell_version(wanted: bool) -> None:
-    if wanted:
-        print(f"lugre-steering {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    context: typer.Context,
-    _: Annotated[bool, typer.Option("--version", help="print the version and leave", callback=_tell_version, is_eager=True)] = False,
-) -> None:
-    """Steering torque of rubber-tracked vehicles: estimate it, and find the physics that the model leaves out."""
-    if context.invoked_subcommand == "config":  # which must work with any content
-        return
-    try:
-        context.default_map = {**defaults.of_commands(defaults.load(), _options_of_commands())}
-    except LugreSteeringError as error:
-        print(f"lugre-steering: {error}", file=sys.stderr)
-        raise typer.Exit(2) from None
-
-
-def _options_of_commands() -> dict[str, dict[str, defaults.Option]]:
-    """The options of every command by the name as it is typed, without its dashes."""
-    found: dict[str, dict[str, defaults.Option]] = {}
-    for registered in app.registered_commands:
-        function = registered.callback
-        assert function is not None
-        name = registered.name or function.__name__
-        for parameter in inspect.signature(function, eval_str=True).parameters.values():
-            hint, *info = get_args(parameter.annotation) or (None,)
-            if info and isinstance(info[0], typer.models.OptionInfo):
-                # Typer holds the first name where other uses have a default.
-                names = [text for text in (info[0].default, *(info[0].param_decls or ())) if str(text).startswith("--")]
-                typed = str(names[0])[2:] if names else parameter.name.replace("_", "-")
-                found.setdefault(name, {})[typed] = defaults.Option(parameter.name, hint)
-    return found
-
+if TYPE_CHECKING:
+    from lugre_steering.provenance import Provenance
+    from lugre_steering.vehicle import Vehicle
 
 _BAGS = "rosbag2 folders or files (mcap or sqlite3, compressed or not), folders of them, or patterns"
 Bags = Annotated[list[Path], typer.Argument(help=_BAGS)]
@@ -89,79 +37,6 @@ FailOn = Annotated[
     list[str] | None, typer.Option("--fail-on", help="exit code 1 if this is so; 'list' tells what can be asked; repeatable")
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
-
-OwnEffects = Annotated[
-    list[Path] | None, typer.Option("--effects", help="file with physics of your own (.yaml or .py); repeatable")
-]
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def console() -> Console:
-    """Where progress and messages go: stderr, so that stdout carries results only."""
-    return Console(stderr=True, markup=False)
-
-
-def output() -> Console:
-    """Where tables go: stdout. Names of files and vehicles are shown as they are, brackets and all."""
-    return Console(markup=False)
-
-
-@contextmanager
-def progress_bar() -> Iterator[Callable[[str, int, int | None], None]]:
-    """A bar per task on a terminal, nothing in a pipe: call it with a name, how much is done, and of how much."""
-    with Progress(console=console(), disable=not sys.stderr.isatty()) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def show(name: str, done: int, total: int | None) -> None:
-            if name not in tasks:
-                tasks[name] = bar.add_task(escape(name))
-            bar.update(tasks[name], completed=done, total=total)
-
-        yield show
-
-
-@contextmanager
-def spinner() -> Iterator[Callable[[str], None]]:
-    """One line that says what is being done, on a terminal only: call it with each new text."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    with console().status("") as status:
-        yield lambda text: status.update(escape(text))
-
-
-@contextmanager
-def step_bar(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
-    """A bar over the named steps, on a terminal only: a text that begins with a step moves it there, any other is a detail."""
-    with Progress(console=console(), disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task("", total=len(steps))
-        reached = 0
-
-        def show(text: str) -> None:
-            nonlocal reached
-            reached = max([reached, *(i for i, step in enumerate(steps) if text.startswith(step))])
-            bar.update(task, description=escape(text), completed=reached)
-
-        yield show
-        bar.update(task, completed=len(steps))
-
-
-@contextmanager
-def doubts_told_once() -> Iterator[None]:
-    """Doubts about a vehicle file as one line each on stderr, however often it is read; other warnings as ever."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("once", ImplausibleWarning)
-        show = warnings.showwarning
-
-        def tell(message: Warning | str, category: type[Warning], *place: Any, **options: Any) -> None:
-            if issubclass(category, ImplausibleWarning):
-                print(f"lugre-steering: warning: {message}", file=sys.stderr)
-            else:
-                show(message, category, *place, **options)
-
-        warnings.showwarning = tell
-        yield
 
 
 def print_json(result: Any) -> None:
@@ -187,38 +62,6 @@ def leave_if(failures: Sequence[str]) -> None:
         print(f"lugre-steering: --fail-on: {failure}", file=sys.stderr)
     if failures:
         raise typer.Exit(1)
-
-
-def command(name: str | None = None) -> Callable[[F], F]:
-    """Register a command whose expected errors end as one line on stderr and exit code 2."""
-
-    def register(function: F) -> F:
-        @functools.wraps(function)
-        def run(*arguments: Any, own_effects: list[Path] | None = None, **options: Any) -> Any:
-            try:
-                if own_effects:
-                    from lugre_steering.effects.registry import add_files
-
-                    add_files(own_effects)
-                with doubts_told_once():
-                    return function(*arguments, **options)
-            except LugreSteeringError as error:
-                print(f"lugre-steering: {error}", file=sys.stderr)
-                raise typer.Exit(2) from None
-            except BrokenPipeError:  # whoever read our output has left
-                raise
-            except OSError as error:
-                print(f"lugre-steering: {error.filename or name or function.__name__}: {error.strerror or error}", file=sys.stderr)
-                raise typer.Exit(2) from None
-
-        own = inspect.signature(function, eval_str=True)
-        last = inspect.Parameter("own_effects", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=OwnEffects)
-        run.__signature__ = own.replace(parameters=[*own.parameters.values(), last])  # type: ignore[attr-defined]
-        run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
-        app.command(name)(run)
-        return function
-
-    return register
 
 
 @command()
@@ -269,17 +112,11 @@ def replay(
 
 @command()
 def simulate(
-    what: Annotated[
-        str, typer.Argument(help="manoeuvre, published experiment, YAML or CSV file, or bag; see --list")
-    ] = "",
-    vehicle: Annotated[
-        Path | None, typer.Option(help="vehicle file (YAML); the shipped test vehicle if left out")
-    ] = None,
+    what: Annotated[str, typer.Argument(help="manoeuvre, published experiment, YAML or CSV file, or bag; see --list")] = "",
+    vehicle: Annotated[Path | None, typer.Option(help="vehicle file (YAML); the shipped test vehicle if left out")] = None,
     out: Annotated[Path | None, typer.Option(help="folder for the results")] = None,
     show_list: Annotated[bool, typer.Option("--list", help="show manoeuvres and experiments")] = False,
-    effect: Annotated[
-        list[str] | None, typer.Option(help="add physics, id:parameter=value,... (SI); repeatable")
-    ] = None,
+    effect: Annotated[list[str] | None, typer.Option(help="add physics, id:parameter=value,... (SI); repeatable")] = None,
     storage: Annotated[str | None, typer.Option(help="mcap or sqlite3 [mcap]")] = None,
     rate: Annotated[float | None, typer.Option(help="angle samples per second [100]")] = None,
     pressure_rate: Annotated[float | None, typer.Option(help="pressure samples per second [as --rate]")] = None,
@@ -297,8 +134,7 @@ def simulate(
     from lugre_steering.simulate import command as simulation
 
     if show_list:
-        rows = [dict(zip(("kind", "name", "description"), row, strict=True)) for row in simulation.catalogue()]
-        print_json(rows) if as_json else simulation.show_catalogue(output())
+        print_json([one._asdict() for one in simulation.catalogue()]) if as_json else simulation.show_catalogue(output())
         return
     if not what or out is None:
         raise DataError(
@@ -319,12 +155,18 @@ def simulate(
     if simulation.is_experiment(what):
         if any(value is not None for value in (storage, *sensing.values())):
             raise DataError(f"simulate {what}: has its own sampling and noise and writes no bag; expected no such option")
-        outcomes = simulation.run_experiments(what, chosen)
-        result = simulation.write_outcomes(what, outcomes, out, origin)
-        print_json(result) if as_json else simulation.show_outcomes(output(), outcomes, out)
-        raise typer.Exit(0 if result["passed"] else 1)
+        _experiments(what, chosen, out, origin, as_json)
     result = simulation.run_manoeuvre(what, chosen, out, sensing, storage or "mcap", origin)
     print_json(result) if as_json else simulation.show_run(output(), result, chosen)
+
+
+def _experiments(what: str, vehicle: Vehicle, out: Path, origin: Provenance, as_json: bool) -> NoReturn:
+    from lugre_steering.simulate import command as simulation
+
+    outcomes = simulation.run_experiments(what, vehicle)
+    result = simulation.write_outcomes(what, outcomes, out, origin)
+    print_json(result) if as_json else simulation.show_outcomes(output(), outcomes, out)
+    raise typer.Exit(0 if result["passed"] else 1)
 
 
 @command("vehicle")
@@ -667,7 +509,7 @@ def config(
         saved.pop(option, None)
         defaults.save(saved)
     elif option:
-        saved[option] = defaults.checked(option, value, _options_of_commands())
+        saved[option] = defaults.checked(option, value, options_of_commands())
         defaults.save(saved)
     if as_json:
         print_json({"file": defaults.file(), "defaults": saved})

@@ -25,13 +25,14 @@ from lugre_steering.errors import DataError
 from lugre_steering.serialise import as_json
 
 MAKER = "lugre_steering"
-VEHICLE_MARK = f"# Written by {MAKER}"
-"""How the first line of a vehicle file begins that a command wrote."""
+COMMENT_MARK = f"# Written by {MAKER}"
+"""How the first line of a vehicle file or a table begins that a command wrote."""
 MARKS = {
     ".png": f"tEXtSoftware\0{MAKER}".encode(),
     ".html": f'<meta name="generator" content="{MAKER}">'.encode(),
     ".json": f'"schema": "{MAKER}/'.encode(),
-    ".yaml": VEHICLE_MARK.encode(),
+    ".yaml": COMMENT_MARK.encode(),
+    ".csv": COMMENT_MARK.encode(),
 }
 """By kind of file, what stands near the beginning of every one that was written here."""
 _HEAD = 4096
@@ -266,6 +267,11 @@ def is_ours(file: Path) -> bool:
     """Whether the file carries the mark of those written here, by its kind."""
     mark = MARKS.get(file.suffix)
     return mark is not None and mark in head(file)
+
+
+def comments(notes: Iterable[str]) -> str:
+    """Lines of a comment, one for each note, whatever names of files may hold."""
+    return "".join(f"# {''.join(c if c.isprintable() else '?' for c in note)}\n" for note in notes)
 
 
 def head(file: Path) -> bytes:

@@ -1,12 +1,14 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Words on a terminal: letters that it does not know are written as near as it can, never as a traceback; remarks as points."""
+"""Where words go, stdout or stderr; letters that it does not know are written as near as it can, never as a
+traceback, remarks as points."""
 
 from __future__ import annotations
 
 import codecs
 import sys
 
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -38,3 +40,13 @@ def point(said: str) -> Table:
     grid = Table.grid(padding=(0, 1))
     grid.add_row("-", Text(said, overflow="fold"))
     return grid
+
+
+def console() -> Console:
+    """Where progress and messages go: stderr, so that stdout carries results only."""
+    return Console(stderr=True, markup=False)
+
+
+def output() -> Console:
+    """Where tables go: stdout. Names of files and vehicles are shown as they are, brackets and all."""
+    return Console(markup=False)

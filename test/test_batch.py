@@ -56,11 +56,22 @@ def summary(out: Path) -> dict:
     return json.loads((out / "summary.json").read_text())
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_a_folder_is_replayed_whole_and_says_what_it_left_out(runs: Path, tmp_path: Path, jobs: str) -> None:
-    out = tmp_path / "out"
-    done = command("replay", runs, "--vehicle", VEHICLE, "--out", out, "--jobs", jobs)
-    assert done.exit_code == 0, done.stderr
+@pytest.fixture(scope="module")
+def replayed(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[int, tuple[Path, str]]:
+    """By the number of jobs, results of all and what was said; every run at the same second."""
+    folder, results = tmp_path_factory.mktemp("replayed"), {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1780000000")
+        for jobs in (1, 2):
+            done = command("replay", runs, "--vehicle", VEHICLE, "--out", folder / str(jobs), "--jobs", str(jobs))
+            assert done.exit_code == 0, done.stderr
+            results[jobs] = (folder / str(jobs), done.stdout)
+    return results
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_folder_is_replayed_whole_and_says_what_it_left_out(replayed: dict[int, tuple[Path, str]], jobs: int) -> None:
+    out, said = replayed[jobs]
     written = summary(out)
     assert [bag["name"] for bag in written["bags"]] == ["first", "second"]
     assert {Path(left["bag"]).name: left["reason"].split(";")[0] for left in written["skipped"]} == {
@@ -68,18 +79,13 @@ def test_a_folder_is_replayed_whole_and_says_what_it_left_out(runs: Path, tmp_pa
         "torn.mcap": "not a recording (neither MCAP nor sqlite3 by its first bytes)",
     }
     for name in ("first", "second", "robot", "torn.mcap"):
-        assert name in done.stdout
+        assert name in said
     assert sorted(path.name for path in out.iterdir() if path.is_dir()) == ["first", "second"]
 
 
-def test_several_at_a_time_give_the_same(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1780000000")
-    results = []
-    for jobs in ("1", "2"):
-        out = tmp_path / jobs
-        assert command("replay", runs, "--vehicle", VEHICLE, "--out", out, "--jobs", jobs).exit_code == 0
-        results.append((summary(out), [file.read_bytes() for file in sorted(out.glob("*/*.mcap"))]))
-    assert results[0] == results[1]
+def test_several_at_a_time_give_the_same(replayed: dict[int, tuple[Path, str]]) -> None:
+    one, two = ((summary(out), [file.read_bytes() for file in sorted(out.glob("*/*.mcap"))]) for out, _ in replayed.values())
+    assert one == two
 
 
 def test_results_in_a_folder_are_no_recordings(runs: Path, tmp_path: Path) -> None:

@@ -16,12 +16,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner, Result
 
 import lugre_steering
 from lugre_steering import cli
 from lugre_steering.bench.replay import write_cycle
+from lugre_steering.diagnosis.effect_card import show_effect
+from lugre_steering.effects.registry import CATALOGUE
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning", "error::RuntimeWarning")  # a process would show them on stderr
 
@@ -284,3 +287,11 @@ def test_completion_is_offered(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "lugre_steering"]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.stdout.split() == ["diagnose"]
+
+
+def test_names_of_parameters_are_never_cut() -> None:
+    """They must be typed as they stand: --effect end_stop:cubic_stiffness=1e7."""
+    for effect in CATALOGUE.values():
+        with (console := Console(width=80)).capture() as said:
+            show_effect(console, effect, {"shown_by": [], "picture": ""})
+        assert [p.name for p in effect.parameters if p.name not in said.get()] == [], effect.id

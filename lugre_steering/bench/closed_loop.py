@@ -238,7 +238,7 @@ def draw(runs: list[Run], file: Path) -> None:
         titles = "wanted angle [deg]", "torque fed forward, left [kN m]", "tracking error, left [deg]"
         for ax, words in zip(axes[:, 0], titles, strict=True):
             ax.set_ylabel(words)
-            ax.set_xlabel("time [s]")
+            ax.set_xlabel("time (s)")
         axes[0, 0].legend(loc="upper right", fontsize=8)
 
 

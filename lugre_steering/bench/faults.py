@@ -101,64 +101,68 @@ def _swapped() -> Callable[[int, Sample], list[Sample]]:
     return change
 
 
+def _value(change: Callable[[float], float]) -> Callable[[int, Sample], Sample]:
+    return lambda _, sample: sample._replace(value=change(sample.value))
+
+
+def _stamp(change: Callable[[int], int]) -> Callable[[int, Sample], Sample]:
+    return lambda _, sample: sample._replace(stamp_ns=change(sample.stamp_ns))
+
+
+def _spike(samples: int) -> Callable[[int, Sample], Sample]:
+    return lambda tick, sample: sample._replace(value=sample.value + (1.0 if tick % 20 < samples else 0.0))
+
+
+def _silent(_: int, __: Sample) -> tuple[()]:
+    return ()
+
+
 def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[Fault, tuple[str, ...]]]:
     """What is sent in place of the sensors' samples, and words of which one must be told."""
     angle, pressure, air = (Kind.ANGLE,), (Kind.PRESSURE,), (Kind.AIR_TEMPERATURE,)
     line = next(i for i, channel in enumerate(vehicle.channels) if channel.kind is Kind.PRESSURE)
     hour = 3600 * SECOND
 
-    def value(change: Callable[[float], float]) -> Callable[[int, Sample], Sample]:
-        return lambda _, sample: sample._replace(value=change(sample.value))
-
-    def stamp(change: Callable[[int], int]) -> Callable[[int, Sample], Sample]:
-        return lambda _, sample: sample._replace(stamp_ns=change(sample.stamp_ns))
-
-    def spike(samples: int) -> Callable[[int, Sample], Sample]:
-        return lambda tick, sample: sample._replace(value=sample.value + (1.0 if tick % 20 < samples else 0.0))
-
-    def silent(_: int, __: Sample) -> tuple[()]:
-        return ()
-
     jumped = ("angle jumped", "spike")
     frozen, stale, unlike = ("angle frozen",), ("stale",), ("residual", "frozen", "pressure")
     return {
         # First, while the rubber is as cold as at the beginning to which the latter goes back.
-        "clock an hour ahead": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns + hour)), ("time_jump",)),
-        "clock an hour back": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns - hour)), ("time_jump",)),
+        "clock an hour ahead": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns + hour)), ("time_jump",)),
+        "clock an hour back": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns - hour)), ("time_jump",)),
         "both angles frozen": (_of(vehicle, angle, _held()), frozen),
         "left angle frozen": (_of(vehicle, angle, _held(), 0), frozen),
         "right angle frozen": (_of(vehicle, angle, _held(), 1), frozen),
-        "both angles dropped": (_of(vehicle, angle, silent), stale),
-        "left angle dropped": (_of(vehicle, angle, silent, 0), stale),
-        "one pressure dropped": (_of(vehicle, pressure, silent, line), stale),
-        "all pressures dropped": (_of(vehicle, pressure, silent), stale),
-        "everything dropped": (_of(vehicle, (*angle, *pressure, *air), silent), stale),
+        "both angles dropped": (_of(vehicle, angle, _silent), stale),
+        "left angle dropped": (_of(vehicle, angle, _silent, 0), stale),
+        "one pressure dropped": (_of(vehicle, pressure, _silent, line), stale),
+        "all pressures dropped": (_of(vehicle, pressure, _silent), stale),
+        "everything dropped": (_of(vehicle, (*angle, *pressure, *air), _silent), stale),
         "everything 0.5 s late": (_of(vehicle, (*angle, *pressure), _late(50)), ("stamps are not close", *stale)),
-        "stamps 0.5 s behind": (_of(vehicle, (*angle, *pressure), stamp(lambda ns: ns - SECOND // 2)), ("not close", "backward")),
+        "stamps 0.5 s behind": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns - SECOND // 2)), ("not close", "backward")),
         "everything twice": (_of(vehicle, (*angle, *pressure), lambda _, sample: [sample, sample]), ("duplicate",)),
         "everything in wrong order": (_of(vehicle, (*angle, *pressure), _swapped()), ("backward",)),
         "ten messages at once": (_of(vehicle, (*angle, *pressure), _gathered(10)), NOTHING),
-        "angles are no number": (_of(vehicle, angle, value(lambda _: math.nan)), ("not_finite",)),
-        "left angle infinite": (_of(vehicle, angle, value(lambda _: math.inf), 0), ("not_finite",)),
-        "angles out of range": (_of(vehicle, angle, value(lambda _: 4.0)), ("absurd",)),
-        "angles in degrees": (_of(vehicle, angle, value(math.degrees)), (*jumped, "absurd")),
-        "both signs flipped": (_of(vehicle, angle, value(lambda angle: 0.3 - angle)), jumped),
-        "left angle 0.5 rad off": (_of(vehicle, angle, value(lambda angle: angle + 0.5), 0), jumped),
-        "spikes of two samples": (_of(vehicle, angle, spike(2)), jumped),
-        "spikes of five samples": (_of(vehicle, angle, spike(5)), jumped),
+        "angles are no number": (_of(vehicle, angle, _value(lambda _: math.nan)), ("not_finite",)),
+        "left angle infinite": (_of(vehicle, angle, _value(lambda _: math.inf), 0), ("not_finite",)),
+        "angles out of range": (_of(vehicle, angle, _value(lambda _: 4.0)), ("absurd",)),
+        "angles in degrees": (_of(vehicle, angle, _value(math.degrees)), (*jumped, "absurd")),
+        "both signs flipped": (_of(vehicle, angle, _value(lambda angle: 0.3 - angle)), jumped),
+        "left angle 0.5 rad off": (_of(vehicle, angle, _value(lambda angle: angle + 0.5), 0), jumped),
+        "spikes of two samples": (_of(vehicle, angle, _spike(2)), jumped),
+        "spikes of five samples": (_of(vehicle, angle, _spike(5)), jumped),
         "noise of one degree": (
-            _of(vehicle, angle, value(lambda angle: angle + math.radians(1.0) * float(rng.standard_normal()))), ("noisy", *jumped)
+            _of(vehicle, angle, _value(lambda angle: angle + math.radians(1.0) * float(rng.standard_normal()))), ("noisy", *jumped)
         ),
         "rates that contradict": (_of(vehicle, angle, lambda _, sample: sample._replace(rate=50.0)), ("absurd_rate",)),
         "another joint's name": (_of(vehicle, angle, lambda _, sample: sample._replace(joint="boom")), ("without a wanted joint", *stale)),
-        "zero stamps": (_of(vehicle, (*angle, *pressure), stamp(lambda _: 0)), ("zero_stamp",)),
-        "pressures are no number": (_of(vehicle, pressure, value(lambda _: math.nan)), ("not_finite",)),
-        "pressures out of range": (_of(vehicle, pressure, value(lambda _: 1e9)), ("absurd",)),
-        "pressures in bar": (_of(vehicle, pressure, value(lambda p: 1e-5 * p)), unlike),
-        "pressures negative": (_of(vehicle, pressure, value(lambda p: -p)), unlike),
+        "zero stamps": (_of(vehicle, (*angle, *pressure), _stamp(lambda _: 0)), ("zero_stamp",)),
+        "pressures are no number": (_of(vehicle, pressure, _value(lambda _: math.nan)), ("not_finite",)),
+        "pressures out of range": (_of(vehicle, pressure, _value(lambda _: 1e9)), ("absurd",)),
+        "pressures in bar": (_of(vehicle, pressure, _value(lambda p: 1e-5 * p)), unlike),
+        "pressures negative": (_of(vehicle, pressure, _value(lambda p: -p)), unlike),
         "pressures frozen": (_of(vehicle, pressure, _held()), unlike),
-        "air of 95 degC": (_of(vehicle, air, value(lambda _: 95.0)), ("absurd",)),
-        "air is no number": (_of(vehicle, air, value(lambda _: math.nan)), ("not_finite",)),
+        "air of 95 degC": (_of(vehicle, air, _value(lambda _: 95.0)), ("absurd",)),
+        "air is no number": (_of(vehicle, air, _value(lambda _: math.nan)), ("not_finite",)),
     }  # fmt: skip
 
 

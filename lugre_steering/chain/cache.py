@@ -4,7 +4,8 @@
 
 Numba believes whatever lies in its cache: an empty or cut file stops every later start, a flipped byte in the machine code may
 do anything. So each file ends with the hash of what stands before it, which Numba, a reader of pickles, does not see.
-Of processes that start together, one compiles and the others wait for what it keeps.
+Of processes that start together, one compiles and the others wait for what it keeps. Copies of the package (a source tree,
+what is installed from it) share what they keep: it lies under the content of its source, not under the path.
 """
 
 from __future__ import annotations
@@ -101,8 +102,28 @@ class _Turn:
         os.close(self._file)
 
 
+class _ByContent(caching.UserProvidedCacheLocator):
+    """The place of a function's code, named by the content of its file."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)
+        self._content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        self._cache_path = os.path.join(_folder(), f"{function.__module__}_{self._content[:16]}")
+
+    def get_source_stamp(self) -> str:
+        return self._content
+
+
+class _Forms(caching.CompileResultCacheImpl):
+    """Kept there or not at all: elsewhere Numba would run stale code after an edit of what a function calls."""
+
+    _locator_classes = [_ByContent]  # noqa: RUF012 (as Numba has it)
+
+
 class _KeptCode(caching.FunctionCache):
     """Numba's cache of one function; no trouble with its files ever reaches the caller, who then compiles."""
+
+    _impl_class = _Forms
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
@@ -154,10 +175,7 @@ def keep_safely() -> None:
         if not function.__module__.startswith("lugre_steering"):
             return plain(function)
         with suppress(RuntimeError, OSError):  # no folder can be written
-            kept = _KeptCode(function)
-            # Elsewhere Numba would run stale code after an edit of what a function calls.
-            if _folder() and kept.cache_path.startswith(_folder()):
-                return kept
+            return _KeptCode(function)
         _tell(f"compiled code cannot be kept in {_folder() or 'any folder'}: every start compiles")
         return caching.NullCache()
 

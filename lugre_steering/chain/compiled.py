@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 from llvmlite import ir
@@ -20,14 +21,15 @@ from numba.extending import intrinsic
 
 from lugre_steering.chain.cache import keep_safely
 
+_PACKAGE = Path(__file__).parents[1]
+
 
 def _keep_compiled_code() -> None:
     """Give Numba a cache folder that changes with any source of the compiled chain.
 
     Numba looks at the file of the cached function only and would run stale code after an edit of a stage it calls.
     """
-    package = Path(__file__).resolve().parent.parent
-    sources = [file for room in ("chain", "effects", "estimator") for file in sorted((package / room).glob("*.py"))]
+    sources = [file for room in ("chain", "effects", "estimator") for file in sorted((_PACKAGE / room).glob("*.py"))]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     for folder in _cache_folders():
         try:
@@ -77,10 +79,19 @@ def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (si
 _NO_DOORS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 inner = njit(**_NO_DOORS)
 """Decorator of what only compiled code calls: without the entrances for Python and C, a third of the time to compile the estimator."""
-law = njit(fastmath={"contract"}, error_model="numpy")
-"""Decorator of every law of the chain: fused multiply-adds; divisions without the check that blocks vectorisation."""
-LAW_OPTIONS: Any = {"fastmath": {"contract"}, "error_model": "numpy", **_NO_DOORS}
-"""The same for what is compiled by way of ``overload``."""
+Law = TypeVar("Law", bound=Callable[..., Any])
+_LAW: Any = {"fastmath": {"contract"}, "error_model": "numpy", "no_cfunc_wrapper": True}
+LAW_OPTIONS: Any = {**_LAW, **_NO_DOORS}
+"""Those of ``law``, for what is compiled by way of ``overload``."""
+
+
+def law(function: Law) -> Law:
+    """Decorator of every law of the chain: fused multiply-adds; divisions without the check that blocks vectorisation.
+
+    The package's own are kept, so that another composition costs its step alone; what those of users call may change unseen.
+    """
+    ours = _PACKAGE in Path(inspect.getfile(function)).parents
+    return njit(**_LAW, cache=ours)(function)  # type: ignore[no-any-return]
 
 
 @law

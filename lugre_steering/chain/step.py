@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-from lugre_steering.chain.compiled import LAW_OPTIONS
+from lugre_steering.chain.compiled import LAW_OPTIONS, inner
 from lugre_steering.chain.compose import Composition, compose, composition_of, name_of
 from lugre_steering.chain.layout import BASELINE_FIELDS, OUTPUT
 from lugre_steering.recording import Array
@@ -60,7 +60,7 @@ def _run(p, s, rubber, time, theta, omega, alpha, out, previous, effects):
         previous = time[i]
 
 
-@njit(nogil=True, cache=True)
+@inner
 def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, previous, effects):
     for i in range(time.size):
         step(p[0], s[0], rubber, scratch[0], time[i] - previous, theta[i], omega[i], alpha[i], effects)

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong wiring, found by comparing the recording with the nominal model: signs, units, exchanged channels, clocks, zeros.
+"""Wrong wiring, found by comparing the recording with the nominal model: signs, units, exchanged channels.
 
 Each suspicion is a hypothesis: the recording as it would be with one fault undone, or two where one does not suffice. It is
 reported when the nominal model then agrees very much better and well, which no physics of the catalogue brings about;
@@ -11,25 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
-from scipy.signal import correlate
-from scipy.stats import theilslopes
 
-from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, prepare
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.data.nominal import GAIN, GOOD, nominal_torques, topics_of
+from lugre_steering.data.offsets import SKEW_RANGE_S, clock_skew, zero_drifts
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.units import words
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.model import Model, build_model
-from lugre_steering.vehicle.sensors import delay_s, lag_s
 
 BLOCKING = frozenset({
     "sign_flipped", "unit_suspect", "swapped_lines", "swapped_angles", "clock_skew", "wiring_suspect", "dead_sensor",
@@ -38,12 +33,10 @@ BLOCKING = frozenset({
 
 UNTOLD = 0.3
 """Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
-GAIN = 1.6
-"""The nominal level may be wrong by this factor; units and lost circuits are further off."""
 MISTYPED = 13.0
 """By which factor loads and friction of a wrong vehicle file may be off; units are further."""
-BETTER, GOOD = 0.5, 0.45
-"""A hypothesis must halve the relative error of the nominal model and leave less than this (80 % of the energy explained)."""
+BETTER = 0.5
+"""A hypothesis must halve the relative error of the nominal model, and leave one that is ``GOOD``."""
 ORDINARY = 0.1
 """Relative error of the nominal model that friction of another form makes as well, and that accuses nobody but a unit."""
 WEAK_BETTER = 0.8
@@ -66,19 +59,6 @@ MIRROR = (
     "More than one wiring fault is possible: of exchanged angle sensors, all angle signs flipped and the lines of every circuit "
     "exchanged, any one looks like the other two together."
 )
-SKEW_S = 0.12
-"""Smaller shifts are the catalogue effects time_delay and pressure_lag, which are fitted; friction may look like 0.1 s."""
-SKEW_RANGE_S = 5.0
-SKEW_ENERGY = 0.5
-SKEW_HELD = 0.8
-"""Share of the nominal torque's slope energy that must stay in the stretch that is shifted."""
-SKEW_RATE_HZ = 50.0
-SOFTER = (0.5, 0.7, 1.0, 1.4)
-PLAY = (0.0, 0.1, 0.3, 0.6)
-LAG_S = (0.1, 0.2, 0.3, 0.5)
-"""Stiffness factors, backlash (in presliding lengths) and lags that may explain a late torque in place of a clock."""
-DRIFT_SHARE = 0.02
-"""Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
 TINY = 1e-2
 """A line whose highest pressure is this share of the others', or a torque this share of the nominal one, has another unit."""
 PRESSURE_UNITS = {"kPa": 1e3, "psi": 6894.757, "bar": 1e5, "MPa": 1e6}
@@ -126,12 +106,12 @@ def inspect_wiring(pieces: Sequence[Recording], vehicle: Vehicle) -> tuple[Findi
         run = None if found else _telling(piece, vehicle)
         if run is not None and not (found := _wrong(piece, vehicle, run)):
             runs.append(run)
-            skewed += (replace(finding, intervals_s=whole) for finding in _skew(vehicle, run))
+            skewed += (replace(finding, intervals_s=whole) for finding in clock_skew(vehicle, run))
         wrong += (Finding(fault.finding, ", ".join(fault.topics), fault.statement, whole) for fault in found)
     if wrong:
         return tuple(wrong)
     every = tuple(interval for piece in pieces for interval in span(piece))
-    return (*skewed, *(replace(finding, intervals_s=every) for finding in _drifts(vehicle, runs)))
+    return (*skewed, *(replace(finding, intervals_s=every) for finding in zero_drifts(vehicle, runs)))
 
 
 def _telling(piece: Recording, vehicle: Vehicle) -> Run | None:
@@ -142,7 +122,7 @@ def _telling(piece: Recording, vehicle: Vehicle) -> Run | None:
         return None
     if float(np.ptp(run.theta, axis=1).max()) < 40.0 * vehicle.sensors.angle_sigma or run.valid.sum() < 20:
         return None
-    total = _torques(build_model(vehicle), run).sum(axis=0)[run.valid]
+    total = nominal_torques(build_model(vehicle), run).sum(axis=0)[run.valid]
     return None if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))) else run
 
 
@@ -154,10 +134,6 @@ def span(recording: Recording) -> tuple[tuple[float, float], ...]:
     return ((min(start for start, _ in ends), max(end for _, end in ends)),) if ends else ()
 
 
-def _topics(vehicle: Vehicle, kind: Kind) -> dict[str, str]:
-    return {channel.name: channel.topic for channel in vehicle.channels if channel.kind is kind}
-
-
 def _foreign_unit(vehicle: Vehicle) -> tuple[str, float]:
     """The unit that an angle (or a linear coordinate) would most likely be given in by mistake, and its factor to SI."""
     return ("degrees", float(np.pi / 180.0)) if vehicle.coordinate.unit == "rad" else ("mm", 1e-3)
@@ -167,7 +143,7 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
     """Angles by their magnitude alone."""
     unit, factor = _foreign_unit(vehicle)
     wrong = []
-    for side, topic in _topics(vehicle, Kind.ANGLE).items():
+    for side, topic in topics_of(vehicle, Kind.ANGLE).items():
         signal = recording.angle.get(side)
         count = 0 if signal is None else signal.time_s.size
         absurd = recording.rejected.get(topic, {}).get("absurd", 0)
@@ -182,12 +158,6 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
     return (_Fault("unit_suspect", tuple(wrong), statement),)
 
 
-def _torques(model: Model, run: Run) -> Array:
-    """Nominal torque of each side (sides, n) [N m]."""
-    rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
-    return np.array([torque_side(p, model.rubber, run.time, *row) for p, *row in rows])
-
-
 def _error(run: Run, measured: Array, expected: Array, most: float = GAIN) -> float:
     """Relative error of the expected torque, both about their means, with a gain of at most ``most``, or its reciprocal at least."""
     a, b = measured[run.valid] - measured[run.valid].mean(), expected[run.valid] - expected[run.valid].mean()
@@ -200,7 +170,7 @@ def _error(run: Run, measured: Array, expected: Array, most: float = GAIN) -> fl
 def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     """The faults of the simplest hypothesis among the best, if it is convincing."""
     model = build_model(vehicle)
-    total = _torques(model, run).sum(axis=0)
+    total = nominal_torques(model, run).sum(axis=0)
     as_is, mistyped = _error(run, run.measured, total), _error(run, run.measured, total, MISTYPED)
     correlation = float(np.corrcoef(run.measured[run.valid], total[run.valid])[0, 1])
     mirrored = _mirrored(vehicle, run)
@@ -265,7 +235,7 @@ def as_well(others: Sequence[tuple[float, str]]) -> str:
 
 def _noted(vehicle: Vehicle, faults: Faults, note: str) -> Faults:
     """Faults with a note, and with what a vehicle that is alike on both sides cannot tell."""
-    whole = {_exchanged_angles(vehicle)[0].topics, tuple(_topics(vehicle, Kind.PRESSURE).values())}
+    whole = {_exchanged_angles(vehicle)[0].topics, tuple(topics_of(vehicle, Kind.PRESSURE).values())}
     if len(faults) == 1 and faults[0].finding != "unit_suspect" and faults[0].topics in whole and _both_tracks(vehicle):
         note += " " + MIRROR
     together = {fault: [other.statement for other in faults if other is not fault] for fault in faults}
@@ -280,7 +250,7 @@ def _noted(vehicle: Vehicle, faults: Faults, note: str) -> Faults:
 def _no_torque(vehicle: Vehicle) -> Faults:
     """Next to no torque, in whatever unit. Blocking: no physics of the catalogue takes it all away."""
     kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
-    topics = tuple(_topics(vehicle, kind).values())
+    topics = tuple(topics_of(vehicle, kind).values())
     statement = (
         f"{', '.join(topics)}: the measured torque is less than {100 * TINY:g} % of that of the nominal model, and no common unit explains "
         "it; check that the sensors are connected, that the hydraulics were on, and the units"
@@ -306,7 +276,7 @@ def _hypotheses(vehicle: Vehicle, run: Run, model: Model, count: int) -> Iterato
         if len(of_angles) > count or _mirrored(vehicle, moved):
             continue
         # The chain is not quite odd (gravity), so undone motion runs through it again.
-        expected = _torques(model, moved).sum(axis=0)
+        expected = nominal_torques(model, moved).sum(axis=0)
         gains = run.gains if vehicle.hydraulics is None else line_gains(vehicle, moved.theta)
         for of_signals, pressure, better in _signals_undone(vehicle, run, count - len(of_angles)):
             if len(of_angles) + len(of_signals) == count:
@@ -315,14 +285,14 @@ def _hypotheses(vehicle: Vehicle, run: Run, model: Model, count: int) -> Iterato
 
 
 def _exchanged_angles(vehicle: Vehicle) -> Faults:
-    topics = tuple(_topics(vehicle, Kind.ANGLE).values())
+    topics = tuple(topics_of(vehicle, Kind.ANGLE).values())
     statement = f"{' and '.join(topics)} are exchanged: the outer track would turn further than the inner one"
     return (_Fault("swapped_angles", topics, statement),)
 
 
 def _angles_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Run]]:
     """Motion with nothing undone, with one or all signs flipped, and with the sides exchanged (and flipped) too."""
-    topics = _topics(vehicle, Kind.ANGLE)
+    topics = topics_of(vehicle, Kind.ANGLE)
     sensors = tuple(dict.fromkeys(topics.values()))
     flips = [(), *((topic,) for topic in sensors), *([sensors] if len(sensors) > 1 else [])]
     towards = "" if vehicle.track is None else " (positive turns the track to the left)"
@@ -353,10 +323,10 @@ def _signals_undone(vehicle: Vehicle, run: Run, count: int) -> Iterator[tuple[Fa
 def _plugs(vehicle: Vehicle) -> Iterator[tuple[Faults, tuple[int, ...], float]]:
     """Orders and signs in which the signals may be connected."""
     if vehicle.hydraulics is None:
-        (topic,) = _topics(vehicle, Kind.TORQUE).values()
+        (topic,) = topics_of(vehicle, Kind.TORQUE).values()
         yield (_Fault("sign_flipped", (topic,), f"{topic}: the sign is flipped"),), (0,), -1.0
         return
-    topics = list(_topics(vehicle, Kind.PRESSURE).values())
+    topics = list(topics_of(vehicle, Kind.PRESSURE).values())
     for i, j in combinations(range(len(topics)), 2):
         order = list(range(len(topics)))
         order[i], order[j] = j, i
@@ -374,11 +344,11 @@ def _plugs(vehicle: Vehicle) -> Iterator[tuple[Faults, tuple[int, ...], float]]:
 def _units_undone(vehicle: Vehicle, run: Run) -> Iterator[tuple[Faults, Array, float]]:
     yield (), run.pressure, BETTER
     if vehicle.hydraulics is None:
-        (topic,) = _topics(vehicle, Kind.TORQUE).values()
+        (topic,) = topics_of(vehicle, Kind.TORQUE).values()
         statement = f"{topic}: probably in k{vehicle.coordinate.force_unit} (multiply by 1000)"
         yield (_Fault("unit_suspect", (topic,), statement),), 1e3 * run.pressure, BETTER
         return
-    topics = list(_topics(vehicle, Kind.PRESSURE).values())
+    topics = list(topics_of(vehicle, Kind.PRESSURE).values())
     shown = run.pressure + gauge_offset(vehicle)
     highest = np.abs(shown).max(axis=1)
     for unit, factor in PRESSURE_UNITS.items():
@@ -406,7 +376,7 @@ def _angle_units(recording: Recording, vehicle: Vehicle, as_is: Run, model: Mode
     None that would break a steering geometry which the angles obey as they are.
     """
     unit, factor = _foreign_unit(vehicle)
-    topics = _topics(vehicle, Kind.ANGLE)
+    topics = topics_of(vehicle, Kind.ANGLE)
     sensors = tuple(dict.fromkeys(topics.values()))
     for named in (sensors, *((sensor,) for sensor in sensors if len(sensors) > 1)):
         scaled = {
@@ -417,7 +387,7 @@ def _angle_units(recording: Recording, vehicle: Vehicle, as_is: Run, model: Mode
         if _off_geometry(vehicle, as_is) < GEOMETRY_RAD < _off_geometry(vehicle, run):
             continue
         statement = f"{' and '.join(named)}: probably in {unit} (multiply by {factor:.6g})"
-        error = _error(run, run.measured, _torques(model, run).sum(axis=0))
+        error = _error(run, run.measured, nominal_torques(model, run).sum(axis=0))
         yield _Hypothesis((_Fault("unit_suspect", named, statement),), error)
 
 
@@ -448,132 +418,3 @@ def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:
     left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
     t, ratio = np.tan(left), sense * vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
     return float(np.sqrt(np.mean((right - np.arctan2(t, 1.0 + ratio * t)) ** 2)))
-
-
-@dataclass(frozen=True)
-class _Shifts:
-    """Slope of the measured torque, every ``stride`` samples or ``dt`` seconds, that may be shifted by up to ``reach`` places;
-    its ``energy`` in the stretch that each shift leaves."""
-
-    measured: Array
-    energy: Array
-    reach: int
-    stride: int
-    dt: float
-
-    def match(self, torque: Array) -> tuple[float, float, float]:
-        """Unexplained share at the best shift, that shift [s], and the share unshifted, for one variant of the torque."""
-        expected = _slope(torque, self.stride, self.dt)[self.reach : self.measured.size - self.reach]
-        power = max(float(np.sum(expected**2)), 1e-30)
-        overlap = correlate(self.measured, expected, mode="valid")
-        gain = np.clip(overlap / power, 1.0 / GAIN, GAIN)
-        left = 1.0 + (gain**2 * power - 2.0 * gain * overlap) / np.maximum(self.energy, 1e-30)
-        return float(left.min()), (_lowest(left) - self.reach) * self.dt, float(left[self.reach])
-
-
-def _skew(vehicle: Vehicle, run: Run) -> Iterator[Finding]:
-    """Torque stamped late or early against the angles, by more than softer springs, play or a slow sensor could imitate.
-
-    The slope dM/dt of measured and nominal torque is matched over shifts, for every stiffness and play in SOFTER and PLAY, and
-    unshifted for the lags in LAG_S too. A clock shifts starts and stops alike at any rate; the others do not, so one of the
-    variants fits better there.
-    """
-    model = build_model(vehicle)
-    nominal = _seen(vehicle, run, model)
-    shifts = _shifts(run, nominal)
-    if shifts is None or abs(shifts.match(nominal)[1]) <= SKEW_S:
-        return
-    matches, unshifted = [], np.inf
-    for torque in (_seen(vehicle, run, variant) for variant in _variants(model)):
-        matches.append(shifts.match(torque))
-        slow = (shifts.match(lagged(torque, _step(run), lag))[2] for lag in LAG_S)
-        unshifted = min(unshifted, matches[-1][2], *slow)
-    best, shift, _ = min(matches)
-    if abs(shift) > SKEW_S and best < min(SKEW_ENERGY * unshifted, GOOD**2):
-        kind = Kind.PRESSURE if vehicle.hydraulics is not None else Kind.TORQUE
-        topics = ", ".join(_topics(vehicle, kind).values())
-        late = "late" if shift > 0.0 else "early"
-        # The best may lie at the end of the search, or beyond.
-        least = "at least " if abs(shift) > (shifts.reach - 1.5) * shifts.dt else ""
-        yield Finding(
-            "clock_skew", topics,
-            f"{topics}: stamped {least}{abs(shift):.2f} s too {late} against the angles (unexplained share of the torque's slope "
-            f"{unshifted:.2f} as recorded, {best:.2f} shifted); synchronise the clocks of the devices",
-        )  # fmt: skip
-
-
-def _step(run: Run) -> float:
-    return float(run.time[1] - run.time[0])
-
-
-def _seen(vehicle: Vehicle, run: Run, model: Model) -> Array:
-    """Torque of a model as sensors show it whose delay and lag the vehicle file knows."""
-    torque = _torques(model, run).sum(axis=0)
-    return lagged(np.interp(run.time - delay_s(vehicle), run.time, torque), _step(run), lag_s(vehicle))
-
-
-def _slope(torque: Array, stride: int, dt: float) -> Array:
-    return np.asarray(np.gradient(uniform_filter1d(torque, max(3, round(0.1 / dt) * stride))[::stride]))
-
-
-def _shifts(run: Run, nominal: Array) -> _Shifts | None:
-    """The shifts that can be tried; none where the nominal torque moves too little for it."""
-    stride = max(1, round(1.0 / SKEW_RATE_HZ / _step(run)))
-    dt = stride * _step(run)
-    held = np.concatenate([[0.0], np.cumsum(_slope(nominal, stride, dt) ** 2)])
-    ends = np.arange(int(min(SKEW_RANGE_S, (run.time[-1] - run.time[0]) / 6.0) / dt) + 1)
-    # Without the strongest slopes in what is shifted, weak ones that hidden physics changes would decide.
-    reach = int(np.flatnonzero(held[held.size - 1 - ends] - held[ends] >= SKEW_HELD * held[-1])[-1])
-    if reach * dt < 2.0 * SKEW_S:
-        return None
-    measured = _slope(run.measured, stride, dt)
-    energy = np.convolve(measured**2, np.ones(measured.size - 2 * reach), mode="valid")
-    return _Shifts(measured, energy, reach, stride, dt)
-
-
-def _variants(model: Model) -> Iterator[Model]:
-    """The model with every stiffness in SOFTER and every play in PLAY."""
-    presliding = float(model.parameters[0]["coulomb_torque"][0] / model.parameters[0]["sigma_0"][0])
-    gaps = [f"{effect.id}_{effect.play}" for effect in CATALOGUE.values() if effect.play]
-    for softer, play in product(SOFTER, PLAY):
-        variant = replace(model, parameters=tuple(p.copy() for p in model.parameters))
-        for record in variant.parameters:
-            record["sigma_0"] *= softer
-            for gap in gaps:
-                record[gap] += play * presliding
-        yield variant
-
-
-def _lowest(values: Array) -> float:
-    """Place of the lowest of ``values`` (n,), between samples by a parabola through it and its neighbours."""
-    at = int(values.argmin())
-    if not 0 < at < values.size - 1:
-        return float(at)
-    before, here, after = (float(value) for value in values[at - 1 : at + 2])
-    return at + 0.5 * (before - after) / max(before - 2.0 * here + after, 1e-30)
-
-
-def _drifts(vehicle: Vehicle, runs: Sequence[Run]) -> Iterator[Finding]:
-    """Lines whose level drifts over the runs, one after the other, while the other side of their cylinders does the work."""
-    if vehicle.hydraulics is None or not runs:
-        return
-    model = build_model(vehicle)
-    expected = np.concatenate([_torques(model, run).sum(axis=0) for run in runs])
-    time, valid = (np.concatenate([getattr(run, name) for run in runs]) for name in ("time", "valid"))
-    pressures, gains = (np.concatenate([getattr(run, name) for run in runs], axis=1) for name in ("pressure", "torque_per_line"))
-    limit = max(DRIFT_SHARE * vehicle.sensors.pressure_range_Pa, 10.0 * vehicle.sensors.pressure_noise_Pa)
-    idle = np.abs(expected) > 0.2 * np.abs(expected).max()
-    duration = float(time[-1] - time[0])
-    for (line, topic), gain, pressure in zip(_topics(vehicle, Kind.PRESSURE).items(), gains, pressures, strict=True):
-        at = np.flatnonzero(idle & valid & (gain * expected < 0.0))
-        if at.size < 100 or time[at[-1]] - time[at[0]] < 0.5 * duration:
-            continue
-        parts = np.array_split(at, 20)
-        level = np.array([np.median(pressure[part]) for part in parts])
-        slope, _, low, high = theilslopes(level, [time[part].mean() for part in parts])
-        if abs(slope) * duration > limit and low * high > 0.0 and high - low < abs(slope):
-            yield Finding(
-                "zero_drift", topic,
-                f"{topic}: the unloaded level of line '{line}' drifts by {slope * duration / 1e5:+.1f} bar over the run; check the "
-                "sensor's zero (the catalogue effect pressure_drift describes the same and may be named for it)",
-            )  # fmt: skip

@@ -52,13 +52,7 @@ def run(
     pictures would not belong to this result.
     """
     vehicle = load(vehicle_file)
-    if not 0.0 <= material <= 1.0:
-        raise DataError(f"--material: got {material:g}, expected a share from 0 to 1")
-    if not bags and not windows:
-        raise DataError("no recording is given, expected a BAG or --window FILE")
-    for bag in bags:
-        if not bag.exists():
-            raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
+    _check_given(bags, windows, material)
     with output_folder(out):
         pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
         old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
@@ -82,12 +76,27 @@ def run(
             raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
         if report:
             progress("writing the report")
-            from lugre_steering.diagnosis.report.page import write_report
-
-            note = write_report(result, out).note
-            if note:
-                print(f"lugre-steering: {note}", file=sys.stderr)
+            _write_report(result, out)
     return result
+
+
+def _check_given(bags: Sequence[Path], windows: Sequence[Path], material: float) -> None:
+    if not 0.0 <= material <= 1.0:
+        raise DataError(f"--material: got {material:g}, expected a share from 0 to 1")
+    if not bags and not windows:
+        raise DataError("no recording is given, expected a BAG or --window FILE")
+    for bag in bags:
+        if not bag.exists():
+            raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
+
+
+def _write_report(result: Diagnosis, out: Path) -> None:
+    """Page and pictures, and a line on stderr where something of them had to be left out."""
+    from lugre_steering.diagnosis.report.page import write_report
+
+    note = write_report(result, out).note
+    if note:
+        print(f"lugre-steering: {note}", file=sys.stderr)
 
 
 def _take_away_report(out: Path, old: Mapping[str, Any]) -> None:

@@ -208,7 +208,7 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
     facts.add_column(no_wrap=True, style="dim")
     facts.add_column(overflow="fold")
     for name, text in (
-        ("stage", f"{effect.stage}, tier {effect.tier}"),
+        ("stage", f"{effect.stage.replace('_', ' ')}, tier {effect.tier}"),
         ("law", effect.equation),
         ("how it shows", effect.trace),
         ("told by", effect.coordinate),
@@ -220,7 +220,11 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
             facts.add_row(name, text)
     console.print(facts, highlight=False, markup=False)
     if effect.parameters:
-        table = Table("parameter", "unit", "meaning", title="Parameters", title_justify="left", title_style="bold")
+        table = Table(title="Parameters", title_justify="left", title_style="bold")
+        # Names must be typed as they stand, so none is cut.
+        table.add_column("parameter", overflow="fold", min_width=max(len(p.name) for p in effect.parameters))
+        table.add_column("unit")
+        table.add_column("meaning")
         for column in ("typical", "lowest", "highest"):
             table.add_column(column, justify="right")
         for p in effect.parameters:
@@ -234,7 +238,7 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
         table = Table(
             "manoeuvre", "what is driven", title="Shown by (simulated)", title_justify="left", title_style="bold"
         )
-        table.add_column("trace [N m rms]", justify="right")
+        table.add_column("trace (N m rms)", justify="right")
         table.add_column("after recalibration", justify="right")
         for row in result["shown_by"]:
             sizes = [words.number(row[key], 3) for key in ("rms_Nm", "visible_rms_Nm")]

@@ -46,7 +46,7 @@ def show_fleet(console: Console, fleet: Fleet, out: Path) -> None:
 def _vehicles(fleet: Fleet) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
     table.add_column("vehicle", overflow="fold")
-    for column in ("recordings", "quarantine", "hours", "RMSE [N m]"):
+    for column in ("recordings", "quarantine", "hours", "RMSE (N m)"):
         table.add_column(column, justify="right", no_wrap=True)
     for one in fleet.vehicles:
         error = "-" if one.median_rmse_Nm is None else f"{one.median_rmse_Nm:.1f}"

@@ -22,7 +22,7 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     look: Any = {"box": None, "padding": (0, 2, 0, 0), "header_style": "bold"}  # names whole at 80 columns
     table = Table(title="replay: estimate against measured torque", title_justify="left", **look)
     table.add_column("recording", overflow="fold")
-    for column in ("seconds", "torques", f"RMSE [{unit}]", "R2", f"bias [{unit}]"):
+    for column in ("seconds", "torques", f"RMSE ({unit})", "R2", f"bias ({unit})"):
         table.add_column(column, justify="right", no_wrap=True)
     shown = told_apart([bag["bag"] for bag in summary["bags"]])
     for bag, path in zip(summary["bags"], shown, strict=True):

@@ -8,7 +8,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
@@ -42,15 +42,23 @@ SCHEMA = "lugre_steering/experiment/1"
 SHIPPED = "test_vehicle.yaml"
 
 
-def catalogue() -> list[tuple[str, str, str]]:
-    """(kind, name, description) of everything that can be simulated by name."""
+class Simulable(NamedTuple):
+    """Something that can be simulated by name."""
+
+    kind: str
+    name: str
+    description: str
+
+
+def catalogue() -> list[Simulable]:
+    """Everything that can be simulated by name."""
     rows = [("manoeuvre", m.name, m.description) for m in BUILT_IN.values()]
     rows += [("experiment", name, text) for name, (text, _) in EXPERIMENTS.items()]
     rows.append(("experiment", ALL, "all published experiments together"))
     rows.append(("file", "FILE.yaml", "segments: a list of sweep, hold and chirp (mean steering angle)"))
     rows.append(("file", "FILE.csv", "time_s and left_deg, right_deg, or angle_deg (mean); also in _rad"))
     rows.append(("file", "BAG", "the steering angles of a recorded rosbag2 folder or file"))
-    return rows
+    return [Simulable(*row) for row in rows]
 
 
 def is_experiment(what: str) -> bool:
@@ -136,10 +144,10 @@ def write_outcomes(what: str, outcomes: list[Outcome], out: Path, made: Provenan
     results, note = [], no_pictures()
     names = [*(outcome.name for outcome in outcomes), *([ALL] if what == ALL else [])]
     with output_folder(out):
-        refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png"))
+        refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png", ".csv"))
         for outcome in outcomes:
             results.append({"schema": SCHEMA, **outcome.to_json(), "provenance": plain(made)})
-            write_table(outcome, out / f"{outcome.name}.csv")
+            write_table(outcome, out / f"{outcome.name}.csv", made)
             if note is None:
                 draw_outcome(outcome, out / f"{outcome.name}.png", made)
             write_record(results[-1], out / f"{outcome.name}.json")

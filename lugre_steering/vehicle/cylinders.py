@@ -42,7 +42,7 @@ def line_gains(vehicle: Vehicle, theta: Array) -> Array:
     for row, areas, lines in zip(table.geometry, table.areas, table.lines, strict=True):
         side = int(row[0])
         # The plain NumPy form: compiling this law for arrays would take longer than any record needs.
-        arm = moment_arm.py_func(theta[side], row[1], row[2], row[3], row[4])
+        arm = moment_arm.py_func(theta[side], row[1], row[2], row[3], row[4])  # type: ignore[attr-defined]
         for area, line in ((areas[0], lines[0]), (-areas[1], lines[1])):
             if line >= 0:
                 gains[side, line] += vehicle.sensors.pressure_gain * area * arm

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
+from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
@@ -18,13 +19,29 @@ OF_CYLINDERS = frozenset({"arm", "line"})
 """Hooks that nothing reads where the torque itself is measured."""
 
 
-def add_effect(
-    vehicle: Vehicle, added: EffectEntry, fail: Callable[[str, object, str], LugreSteeringError]
-) -> Vehicle:
-    """The vehicle with one more effect, checked against the catalogue; ``fail`` makes errors of key, value, expectation.
+Fail = Callable[[str, object, str], LugreSteeringError]
+"""Makes the error of a key, its value and what was expected."""
+
+
+def add_effect(vehicle: Vehicle, added: EffectEntry, fail: Fail) -> Vehicle:
+    """The vehicle with one more effect, checked against the catalogue.
 
     An effect stands once; one that acts per line may be given line by line.
     """
+    effect, added = _of_catalogue(added, fail)
+    _check_machine(vehicle, effect, fail)
+    before = next((entry for entry in vehicle.effects if entry.id == added.id), None)
+    if before is not None and (not effect.per_line or before.parameters.keys() & added.parameters.keys()):
+        raise fail("id", added.id, f"each effect{' and line' if effect.per_line else ''} once")
+    _check_values(vehicle, effect, added.parameters, fail)
+    if before is None:
+        return vehicle.replace(effects=(*vehicle.effects, added))
+    joined = replace(added, parameters={**before.parameters, **added.parameters})
+    return vehicle.replace(effects=tuple(joined if entry is before else entry for entry in vehicle.effects))
+
+
+def _of_catalogue(added: EffectEntry, fail: Fail) -> tuple[Effect, EffectEntry]:
+    """The effect of an entry, and the entry with the source and hash of physics that is not the package's."""
     effect = CATALOGUE.get(added.id)
     if effect is None and added.source is not None:
         what = f"install {added.source}" if added.source.startswith("package ") else f"give the file with --effects {added.source}"
@@ -35,21 +52,25 @@ def add_effect(
     if origin is not None and added.sha256 not in (None, origin.sha256):
         expected = f"that of the laws given now in {origin.source} ({origin.sha256}): they are others under the same name"
         raise fail("sha256", added.sha256, expected)
-    if origin is not None:
-        added = replace(added, source=origin.source, sha256=origin.sha256)
+    return effect, added if origin is None else replace(added, source=origin.source, sha256=origin.sha256)
+
+
+def _check_machine(vehicle: Vehicle, effect: Effect, fail: Fail) -> None:
+    """Whether the vehicle has what the effect acts on."""
     if not effect.observable:
-        raise fail("id", added.id, f"an effect that the standard topics can show; this one needs {effect.not_recorded}")
+        raise fail("id", effect.id, f"an effect that the standard topics can show; this one needs {effect.not_recorded}")
     if effect.stage == "thermal" and vehicle.rubber is None:
-        raise fail("id", added.id, "a vehicle with the section 'rubber' for a thermal effect")
+        raise fail("id", effect.id, "a vehicle with the section 'rubber' for a thermal effect")
     if OF_CYLINDERS & effect.hooks.keys() and vehicle.hydraulics is None:
-        raise fail("id", added.id, "a vehicle with the section 'hydraulics', whose cylinders have arms and lines")
-    before = next((entry for entry in vehicle.effects if entry.id == added.id), None)
+        raise fail("id", effect.id, "a vehicle with the section 'hydraulics', whose cylinders have arms and lines")
+
+
+def _check_values(vehicle: Vehicle, effect: Effect, values: Mapping[str, float], fail: Fail) -> None:
+    """Whether parameters, or values by line, are those of the effect, inside their ranges, and all that it needs."""
     ranges = {p.name: (p.low, p.high) for p in effect.parameters}
     if effect.per_line:
         ranges = dict.fromkeys(vehicle.hydraulics.lines if vehicle.hydraulics else (), next(iter(ranges.values())))
-    if before is not None and (not effect.per_line or before.parameters.keys() & added.parameters.keys()):
-        raise fail("id", added.id, f"each effect{' and line' if effect.per_line else ''} once")
-    for name, value in added.parameters.items():
+    for name, value in values.items():
         if name not in ranges:
             what = "line" if effect.per_line else "parameter"
             raise fail(f"parameters.{name}", value, f"no such {what}; {suggestion(name, list(ranges))}")
@@ -58,17 +79,13 @@ def add_effect(
         if not math.isclose(value, min(max(value, low), high), rel_tol=1e-9):
             raise fail(f"parameters.{name}", value, f"a number from {low:g} to {high:g}")
     # What may not be zero has no neutral value, so it cannot be left out.
-    missing = [key for key, (low, high) in ranges.items() if key not in added.parameters and not low <= 0.0 <= high]
-    if missing or not added.parameters:
-        raise fail("parameters", added.parameters, f"values of {', '.join(missing or ranges) or 'a pressure line'}")
+    missing = [key for key, (low, high) in ranges.items() if key not in values and not low <= 0.0 <= high]
+    if missing or not values:
+        raise fail("parameters", values, f"values of {', '.join(missing or ranges) or 'a pressure line'}")
     for low_key, high_key in effect.places:
-        low, high = added.parameters.get(low_key, 0.0), added.parameters.get(high_key, 0.0)
+        low, high = values.get(low_key, 0.0), values.get(high_key, 0.0)
         if (low, high) != (0.0, 0.0) and not low < high:
-            raise fail(f"parameters.{high_key}", added.parameters.get(high_key), f"more than {low_key} ({low:g}), both of a window given")
-    if before is None:
-        return vehicle.replace(effects=(*vehicle.effects, added))
-    joined = replace(added, parameters={**before.parameters, **added.parameters})
-    return vehicle.replace(effects=tuple(joined if entry is before else entry for entry in vehicle.effects))
+            raise fail(f"parameters.{high_key}", values.get(high_key), f"more than {low_key} ({low:g}), both of a window given")
 
 
 def with_effects(vehicle: Vehicle, reader: Reader) -> Vehicle:

@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 
 from lugre_steering.errors import ImplausibleWarning, VehicleFileError
-from lugre_steering.files import MAKER, VEHICLE_MARK, write_text
+from lugre_steering.files import COMMENT_MARK, MAKER, comments, write_text
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
 from lugre_steering.vehicle.effects import each_once, with_effects
@@ -36,7 +36,7 @@ def load(path: str | Path) -> Vehicle:
     file = Path(path)
     reader = Reader(file, VehicleFileError)
     text = reader.text()
-    if text.startswith(VEHICLE_MARK) and text.split()[-1] != END:
+    if text.startswith(COMMENT_MARK) and text.split()[-1] != END:
         raise VehicleFileError(f"{file}: is cut off: a file that {MAKER} has written ends with the line '{END}'")
     vehicle = from_mapping(reader.parse(text), file)
     for doubt in plausibility(vehicle):
@@ -76,8 +76,8 @@ def save(vehicle: Vehicle, path: str | Path, notes: Sequence[str] = ()) -> None:
     Its first and last lines tell who wrote it and that nothing is missing: most of its beginnings would be valid vehicles.
     """
     content = yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120)
-    comments = "".join(f"# {''.join(c if c.isprintable() else '?' for c in note)}\n" for note in notes)
-    write_text(f"{VEHICLE_MARK}; not whole without the three dots of its last line\n{comments}{content}{END}\n", Path(path))
+    first = f"{COMMENT_MARK}; not whole without the three dots of its last line\n"
+    write_text(f"{first}{comments(notes)}{content}{END}\n", Path(path))
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:

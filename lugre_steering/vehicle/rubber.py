@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from lugre_steering.recording import Array
+from lugre_steering.vehicle.monotone import monotone
 from lugre_steering.vehicle.sections import Rubber, Wlf
 
 TABLE_STEP_K = 0.1
@@ -52,7 +52,7 @@ def moduli(rubber: Rubber, temperature_degC: Array, frequency_Hz: float | None =
         x, axis = temperature, np.array(rubber.dma.temperature_degC)
         storage, loss = rubber.dma.storage_modulus_Pa, rubber.dma.loss_modulus_Pa
     x = np.clip(x, axis[0], axis[-1])
-    real, imaginary = (10.0 ** PchipInterpolator(axis, np.log10(column))(x) for column in (storage, loss))
+    real, imaginary = (10.0 ** monotone(axis, np.log10(column), x) for column in (storage, loss))
     modulus: ComplexArray = real + 1j * imaginary
     return modulus
 

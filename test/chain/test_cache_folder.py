@@ -1,15 +1,21 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where compiled code is kept: in the user's cache, and in the temporary folder where there is none."""
+"""Where compiled code is kept: in the user's cache, and in the temporary folder where there is none; once for all copies of a source."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
+
+import lugre_steering
+from lugre_steering.chain.compiled import law
+from lugre_steering.chain.lag import lag_weights
 
 NOWHERE = "/proc/nowhere"
 """No user, not even root, can make this folder."""
@@ -30,3 +36,39 @@ def test_the_first_folder_that_can_be_written_is_used(tmp_path: Path, given: dic
     env = {**kept, "TMPDIR": str(tmp_path), **{key: value.format(tmp=tmp_path) for key, value in given.items()}}
     done = subprocess.run([sys.executable, "-c", SAY], env=env, capture_output=True, text=True, timeout=60, check=True)
     assert Path(done.stdout.strip()).parent == Path(folder.format(tmp=tmp_path))
+
+
+USE = """
+import numba
+from lugre_steering.chain import compiled, lag
+
+used = numba.njit(cache=True)(lag.lag_weights.py_func)
+used(0.01, 0.1)
+print(lag.__file__, sum(used.stats.cache_hits.values()))
+"""
+
+
+def test_copies_of_the_package_share_what_they_compile_and_an_edited_one_does_not(tmp_path: Path) -> None:
+    source = Path(lugre_steering.__file__).parent
+    copies = [tmp_path / name / "lugre_steering" for name in ("first", "second", "edited")]
+    for copy in copies:
+        shutil.copytree(source, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    with (copies[-1] / "chain" / "lag.py").open("a") as file:
+        file.write("# An edit.\n")
+    hits = []
+    for copy in copies:
+        env = {**os.environ, "PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+        done = subprocess.run([sys.executable, "-c", USE], env=env, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
+        file, used = done.stdout.split()
+        assert file == str(copy / "chain" / "lag.py")
+        hits.append(int(used))
+    assert hits == [0, 1, 0]
+
+
+def test_laws_of_the_package_are_kept_and_those_of_users_are_not() -> None:
+    """Numba sees no change of what a law calls: it is followed in the package (its folder is of all sources) and nowhere else."""
+    def users(x: float) -> float:
+        return x
+
+    assert lag_weights.stats.cache_path.startswith(numba.config.CACHE_DIR)
+    assert law(users).stats.cache_path is None

@@ -10,8 +10,10 @@ from chain_support import VEHICLE_FILE, vehicle
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from reference_model import ReferenceTrack
+from scipy.interpolate import PchipInterpolator
 
 from lugre_steering.vehicle import DmaTable, MasterCurve, Rubber, Wlf
+from lugre_steering.vehicle.monotone import monotone
 from lugre_steering.vehicle.rubber import (
     _equivalent_temperature,
     friction_measure,
@@ -122,3 +124,14 @@ def test_landmarks_of_the_shipped_table() -> None:
     E = moduli(vehicle().rubber, T)  # type: ignore[arg-type]
     assert T[E.imag.argmax()] == pytest.approx(-61.1, abs=1.5)
     assert T[(E.imag / E.real).argmax()] == pytest.approx(-44.4, abs=1.5)
+
+
+def test_the_curve_through_a_table_is_that_of_scipy() -> None:
+    """Rising, falling, level and turning tables of two and more places; at their places and between."""
+    random = np.random.default_rng(5)
+    for count in (2, 3, 4, 30):
+        for kind in range(20):
+            axis = np.cumsum(random.uniform(0.1, 3.0, count))
+            values = random.standard_normal(count).round(kind % 3)  # rounded ones have equal neighbours
+            x = np.concatenate([axis, random.uniform(axis[0], axis[-1], 50)])
+            np.testing.assert_allclose(monotone(axis, values, x), PchipInterpolator(axis, values)(x), rtol=0.0, atol=1e-14)

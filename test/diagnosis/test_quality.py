@@ -23,8 +23,9 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.data import dataset, stamps
 from lugre_steering.data.dataset import prepare
+from lugre_steering.data.offsets import SKEW_RANGE_S
 from lugre_steering.data.quality import inspect
-from lugre_steering.data.wiring import SKEW_RANGE_S, as_well
+from lugre_steering.data.wiring import as_well
 from lugre_steering.diagnosis.case import Case as DiagnosisCase
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import fit

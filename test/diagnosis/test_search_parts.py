@@ -250,7 +250,8 @@ def test_a_name_that_only_filled_in_for_the_shape_of_another_goes(problem: Probl
     both = fit(hidden, weight(hidden), [linear, quadratic])
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     steps = [search.Found(replace(score, candidate=candidate), (), (), gain) for (candidate, _), gain in ((linear, 5.0), (quadratic, 2.0))]
-    kept, current = search._pruned(hidden, hidden, weight(hidden), steps, both)
+    there, kept, current = search._pruned(hidden, hidden, weight(hidden), steps, both)
+    assert there.nuisances == current.x.size
     assert [candidate.effect.id for candidate, _ in current.effects] == ["line_loss_quadratic"]
     assert [(item.score.candidate.effect.id, item.gain) for item in kept] == [("line_loss_quadratic", 7.0)]
 
@@ -267,7 +268,7 @@ def test_a_name_does_not_go_because_its_own_bends_could_stand_in_for_it(problem:
     assert without.cost - both.cost < 3.0 * needed  # nearly all that it does, its bends do
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     steps = [search.Found(replace(score, candidate=candidate), (), (), 5.0) for candidate, _ in (linear, slow)]
-    kept, current = search._pruned(hidden, beside, weight(hidden), steps, both)
+    _, kept, current = search._pruned(hidden, beside, weight(hidden), steps, both)
     assert len(kept) == len(current.effects) == 2
 
 

@@ -47,7 +47,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
     workspace = tmp_path_factory.mktemp("workspace")
     ignored = shutil.ignore_patterns(".*", "*.egg-info", "__pycache__", "build", "bags", "test", "install", "log")
     shutil.copytree(PACKAGE_ROOT, workspace / "src" / PACKAGE, ignore=ignored)
-    env = {**environment(), "COLCON_HOME": str(workspace), "NUMBA_CACHE_DIR": str(workspace / "compiled")}
+    env = {**environment(), "COLCON_HOME": str(workspace)}
     del env["PYTHONPATH"]  # only what the workspace adds: the installed package, not this source tree
     env["PATH"] = f"{Path(sys.executable).parent}:{env['PATH']}"
     build = [sys.executable, "-m", "colcon", "build", "--packages-select", PACKAGE]

@@ -137,7 +137,7 @@ def test_the_shipped_parameters_are_the_defaults() -> None:
 def test_the_node_imports_no_plotting_bags_or_command_line() -> None:
     code = (
         "import sys, lugre_steering.node, lugre_steering.live.run\n"
-        "heavy = {'matplotlib', 'plotly', 'rosbags', 'pandas', 'typer', 'rich', 'scipy.stats'}\n"
+        "heavy = {'matplotlib', 'plotly', 'rosbags', 'pandas', 'typer', 'rich', 'scipy.stats', 'scipy.interpolate', 'scipy.optimize'}\n"
         "print(','.join(sorted(heavy & set(sys.modules))))"
     )
     command = [sys.executable, "-c", code]

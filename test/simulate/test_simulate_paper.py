@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 from pathlib import Path
@@ -14,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.errors import DataError
+from lugre_steering.provenance import provenance
 from lugre_steering.resources import config_folder
 from lugre_steering.simulate.command import write_outcomes
 from lugre_steering.simulate.paper import EXPERIMENTS, bench, conditions, double_cycle, stiffness
@@ -95,12 +97,32 @@ def test_a_softer_contact_fails_the_stiffness(prepared: bench.Bench) -> None:
 
 def test_results_are_written(prepared: bench.Bench, tmp_path: Path) -> None:
     outcome = stiffness.stiffness(prepared)
-    write_outcomes("paper-stiffness", [outcome], tmp_path)
+    made = provenance("simulate", {"paper": True}, config_folder() / "test_vehicle.yaml")
+    write_outcomes("paper-stiffness", [outcome], tmp_path, made)
     result = json.loads((tmp_path / "paper-stiffness.json").read_text(encoding="utf-8"))
     assert result["synthetic"] is True
     assert result["passed"] is True
     assert result["calibrated"]["heat capacity factor"] == prepared.calibrated["heat capacity factor"]
     # F / theta of the exact LuGre presliding curve at 60 % of break-away: 0.6 / -ln(0.4) = 0.655 of the stiffness.
     assert "34 % below" in result["caption"]
-    assert (tmp_path / "paper-stiffness.csv").read_text(encoding="utf-8").count("\n") == len(outcome.rows) + 1
     assert (tmp_path / "paper-stiffness.png").read_bytes().startswith(b"\x89PNG")
+    lines = (tmp_path / "paper-stiffness.csv").read_text(encoding="utf-8").splitlines()
+    told = [line for line in lines if line.startswith("# ")]
+    assert "simulated" in told[0]
+    assert [line.removeprefix("# ") for line in told[1:]] == made.lines()
+    header, *rows = csv.reader(lines[len(told) :])
+    assert tuple(header) == outcome.columns
+    assert [[float(cell) for cell in row] for row in rows] == [pytest.approx(row, rel=1e-5) for row in outcome.rows]
+
+
+def test_a_table_of_others_stays_and_ours_is_replaced(prepared: bench.Bench, tmp_path: Path) -> None:
+    outcome, table = stiffness.stiffness(prepared), tmp_path / "paper-stiffness.csv"
+    theirs = ",".join(outcome.columns) + "\n1,2,3\n"
+    table.write_text(theirs)
+    with pytest.raises(DataError, match=r"paper-stiffness\.csv: exists and is not part of an earlier result"):
+        write_outcomes("paper-stiffness", [outcome], tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == [table.name]
+    assert table.read_text() == theirs
+    table.unlink()
+    for _ in range(2):
+        write_outcomes("paper-stiffness", [outcome], tmp_path)

@@ -100,7 +100,7 @@ def search(
         if step.instead is not None:
             problem, baseline = step.instead.problem, step.instead.current
         plain = problem.doubted(there.doubt, there.typical)
-        found, current = (both, step.fit) if step.short else _pruned(plain, there, weight, both, step.fit)
+        there, found, current = (there, both, step.fit) if step.short else _pruned(plain, there, weight, both, step.fit)
         now, current = _freed(plain, there, weight, current, given)
         if waiting and len(found) < len(both):
             break
@@ -256,8 +256,10 @@ def _told(item: Found, rivals: Sequence[Trial]) -> Found:
     return replace(item, rivals=tuple(trial.candidate.effect.id for trial in rivals), trials=(*rivals, *item.trials))
 
 
-def _pruned(plain: Problem, problem: Problem, weight: Array, found: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:
-    """Without earlier names that the latest one has made superfluous: they had only filled in for its shape.
+def _pruned(
+    plain: Problem, problem: Problem, weight: Array, found: Sequence[Found], current: Fit
+) -> tuple[Problem, list[Found], Fit]:
+    """Without earlier names that the latest one has made superfluous: they had only filled in for its shape; with the problem of the fit.
 
     ``plain``: without any bends of names; those of a name that goes would stand in for it.
     """
@@ -274,7 +276,7 @@ def _pruned(plain: Problem, problem: Problem, weight: Array, found: Sequence[Fou
             # Together they explained what the latest now explains alone.
             kept[-1] = replace(kept[-1], gain=kept[-1].gain + dropped.gain)
             problem, current = bare, without
-    return kept, current
+    return problem, kept, current
 
 
 def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given: int) -> tuple[Problem, Fit]:

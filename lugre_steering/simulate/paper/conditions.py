@@ -13,7 +13,7 @@ import numpy as np
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, motion_of
+from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Motion, motion_of
 from lugre_steering.simulate.paper.bench import (
     Bench,
     arrivals,
@@ -199,7 +199,19 @@ def six_cycles(bench: Bench) -> Outcome:
     )
     temperature = run.tracks["temperature"].mean(axis=0)
     ends = [s.stop - 1 for s in sweeps(motion)][1:12:2]
-    panels = (
+    notes = (
+        "compared on arrival at the limits, the same angle in each cycle. The largest torque of each cycle also falls "
+        f"({_list(largest(run)[:12:2])} N m).",
+    )
+    rows = tuple((i + 1, *map(float, arrived[i]), float(temperature[ends[i]])) for i in range(6))
+    columns = ("cycle", "at +limit (N m)", "at -limit (N m)", "rubber (degC)")
+    panels = _of_cycles(motion, run, arrived, temperature)
+    return Outcome("paper-cycles", "Six steering cycles", columns, rows, checks, panels, bench.calibrated, notes)
+
+
+def _of_cycles(motion: Motion, run: plant.Truth, arrived: Array, temperature: Array) -> tuple[Panel, ...]:
+    """Torque and rubber over time, and the torque at both limits cycle by cycle (6, 2)."""
+    return (
         Panel(
             "steering torque",
             "time (s)",
@@ -221,13 +233,6 @@ def six_cycles(bench: Bench) -> Outcome:
             (Curve("rubber", motion.time, temperature),),
         ),
     )
-    notes = (
-        "compared on arrival at the limits, the same angle in each cycle. The largest torque of each cycle also falls "
-        f"({_list(largest(run)[:12:2])} N m).",
-    )
-    rows = tuple((i + 1, *map(float, arrived[i]), float(temperature[ends[i]])) for i in range(6))
-    columns = ("cycle", "at +limit (N m)", "at -limit (N m)", "rubber (degC)")
-    return Outcome("paper-cycles", "Six steering cycles", columns, rows, checks, panels, bench.calibrated, notes)
 
 
 def pavement(bench: Bench) -> Outcome:

@@ -13,8 +13,9 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from lugre_steering.files import head, not_ours, write_text
+from lugre_steering.files import COMMENT_MARK, comments, write_text
 from lugre_steering.provenance import Provenance
+from lugre_steering.report import words
 from lugre_steering.simulate.paper.outcome import Outcome
 
 
@@ -53,13 +54,12 @@ def draw_outcome(outcome: Outcome, file: Path, made: Provenance | None = None) -
                 ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def write_table(outcome: Outcome, file: Path) -> None:
-    """The table as CSV. A file there of anybody else, which has other columns, is not replaced (``DataError``)."""
+def write_table(outcome: Outcome, file: Path, made: Provenance | None = None) -> None:
+    """The table as CSV; comments before it say that it is simulated, and how it came about (``made``)."""
     text = io.StringIO()
-    writer = csv.writer(text)
+    text.write(f"{COMMENT_MARK}; simulated\n{comments(made.lines() if made else ())}")
+    writer = csv.writer(text, lineterminator="\n")
     writer.writerow(outcome.columns)
-    if file.exists() and not head(file).startswith(text.getvalue().encode()):
-        raise not_ours(file)
     writer.writerows([[f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in outcome.rows])
     write_text(text.getvalue(), file)
 
@@ -89,4 +89,4 @@ def checks_table(outcomes: Sequence[Outcome]) -> Table:
 
 
 def _number(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+    return words.number(value, 5 if abs(value) >= 1000.0 else 3)
