@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import os
 import tempfile
 from collections.abc import Callable, Iterator
@@ -21,15 +20,14 @@ from numba.extending import intrinsic
 
 from lugre_steering.chain.cache import keep_safely
 
-_PACKAGE = Path(__file__).parents[1]
-
 
 def _keep_compiled_code() -> None:
     """Give Numba a cache folder that changes with any source of the compiled chain.
 
     Numba looks at the file of the cached function only and would run stale code after an edit of a stage it calls.
     """
-    sources = [file for room in ("chain", "effects", "estimator") for file in sorted((_PACKAGE / room).glob("*.py"))]
+    package = Path(__file__).parents[1]
+    sources = [file for room in ("chain", "effects", "estimator") for file in sorted((package / room).glob("*.py"))]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     for folder in _cache_folders():
         try:
@@ -90,7 +88,7 @@ def law(function: Law) -> Law:
 
     The package's own are kept, so that another composition costs its step alone; what those of users call may change unseen.
     """
-    ours = _PACKAGE in Path(inspect.getfile(function)).parents
+    ours = (function.__module__ or "").startswith("lugre_steering.")  # what is made of an expression has no module
     return njit(**_LAW, cache=ours)(function)  # type: ignore[no-any-return]
 
 
