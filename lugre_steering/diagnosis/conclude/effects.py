@@ -13,6 +13,7 @@ from lugre_steering import units
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.headline import inside
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.loudness import FORM_LEFT
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.compare import tied
@@ -56,15 +57,18 @@ def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> lis
 def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedValue]]:
     """Value, 95 % interval and unit of each free parameter, effect by effect.
 
-    As sure as beside all freedoms; and a value that these shift is as unsure as that.
+    As sure as beside all freedoms; and a value that these shift is as unsure as that, or where it was found beside them, as the share of
+    their torque that they may have wrong, as they too are of another form than nature.
     """
     deviation = _deviation(done, bent)[done.compared.problem.nuisances :]
     position = 0
     found: list[dict[str, FittedValue]] = []
-    for (candidate, values), (_, shifted) in zip(whole.effects, bent.effects, strict=False):
+    share = float(np.sqrt(FORM_LEFT)) if done.around else 1.0
+    without, beside = (done.freely, done.compared.found.final) if done.around else (whole, bent)
+    for (candidate, values), (_, freely), (_, shifted) in zip(whole.effects, without.effects, beside.effects, strict=False):
         parameters: dict[str, FittedValue] = {}
         for key in candidate.free:
-            half = verify.NORMAL * float(np.hypot(deviation[position], values[key] - shifted[key]))
+            half = verify.NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
             )
