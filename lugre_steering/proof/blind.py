@@ -79,6 +79,7 @@ def run(job: Job) -> Row:
             row["measured"] = measured(made, out / "augmented.yaml", diagnosis)
         if diagnosis is not None and LAW in hiding.effects:
             row["unseen"] = foretold(bags, seen / "vehicle.yaml", out / "augmented.yaml", next(unseen.glob("run_unseen")), Path(temporary))
+            row["unseen"]["noise_Nm"] = made.unseen_noise_variance() ** 0.5
         if job.peers:
             from lugre_steering.proof.peers import compare
 
@@ -130,7 +131,7 @@ def diagnose(bags: Sequence[Path], vehicle: Path, out: Path, *more: str) -> tupl
     return kept, None
 
 
-def foretold(bags: Sequence[Path], sheet: Path, augmented: Path, unseen: Path, folder: Path) -> Row | None:
+def foretold(bags: Sequence[Path], sheet: Path, augmented: Path, unseen: Path, folder: Path) -> Row:
     """Root mean square errors [N m] of replays on a manoeuvre that nobody recorded: recalibrated baseline, and diagnosed file."""
     error, _ = called("calibrate", *map(str, bags), "--vehicle", str(sheet), "--out", str(folder / "calibrated"))
     files = {"baseline_Nm": folder / "calibrated" / "calibrated.yaml", "augmented_Nm": augmented}

@@ -18,6 +18,7 @@ from lugre_steering.proof.scores import (
     answered,
     called_unlisted,
     foretold,
+    harmed,
     has_wrong_extra,
     heldout,
     location,
@@ -40,8 +41,6 @@ __all__ = ["OUTCOMES", "TARGETS", "board"]
 
 SCHEMA = "lugre_steering/scoreboard/2"
 TOGETHER = ("pair", "triple")
-WORSE = 1.02
-"""A diagnosed file does harm on an unseen manoeuvre where its error is by more than this factor above the baseline's."""
 
 
 def board(rows: Sequence[Row], made: Mapping[str, object]) -> Row:
@@ -174,13 +173,13 @@ def _laws(rows: Sequence[Row]) -> Row:
     def kept(key: str, empty: bool) -> Row:
         return proportion(called_unlisted(row) for row in clear if (row["truth"]["effects"][0]["parameters"][key] in ("", "none")) == empty)
 
-    gains = [gain for row in clear if (gain := foretold(row)) is not None]
     return {
         "called_unlisted": proportion(called_unlisted(row) for row in clear), "inside_grammar": kept("outside", empty=True),
         "outside_grammar": kept("outside", empty=False), "with_memory": kept("memory", empty=False),
         "by_channel": _grouped(clear, _channel, lambda group: proportion(called_unlisted(row) for row in group)),
         "named": _named(clear), "outcomes": dict(Counter(outcome(row) for row in clear)),
-        "foretold": summary(gains), "harmed": proportion(gain < 1.0 - WORSE**2 for gain in gains),
+        "foretold": summary(foretold(row) for row in clear),
+        "harmed": proportion(worse for row in clear if (worse := harmed(row)) is not None),
     }  # fmt: skip
 
 

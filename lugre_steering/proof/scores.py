@@ -27,6 +27,8 @@ CLEAR_RATIO = 0.3 / np.sqrt(3.0)
 LOCAL_SHARE = 0.6
 """An effect that acts for a smaller share of the time has a place that can be scored."""
 FIRST_SUSPECTS = 3
+WORSE = 1.02
+"""A diagnosed file does harm on an unseen manoeuvre where its error is by more than this factor above the baseline's."""
 
 
 class Meaning(NamedTuple):
@@ -288,11 +290,27 @@ def removed_without(row: Row) -> float | None:
 
 
 def foretold(row: Row) -> float | None:
-    """Share of the recalibrated baseline's mean square error on an unseen manoeuvre that the diagnosed file removes."""
+    """Share of the removable error on an unseen manoeuvre, that of the recalibrated baseline above the noise, which the diagnosed file
+    removes; None where there is next to none."""
+    squares = _unseen(row)
+    if squares is None:
+        return None
+    before, after, noise = squares
+    return (before - after) / (before - noise) if before - noise > 0.1 * noise else None
+
+
+def harmed(row: Row) -> bool | None:
+    """Whether the diagnosed file is clearly worse than the recalibrated baseline on an unseen manoeuvre."""
+    squares = _unseen(row)
+    return None if squares is None else squares[1] > WORSE**2 * squares[0]
+
+
+def _unseen(row: Row) -> tuple[float, float, float] | None:
+    """Mean squares [N2 m2] on an unseen manoeuvre: of the recalibrated baseline, the diagnosed file and the noise."""
     unseen = row.get("unseen")
     if not unseen or not unseen.get("baseline_Nm") or unseen.get("augmented_Nm") is None:
         return None
-    return float(1.0 - (unseen["augmented_Nm"] / unseen["baseline_Nm"]) ** 2)
+    return unseen["baseline_Nm"] ** 2, unseen["augmented_Nm"] ** 2, unseen["noise_Nm"] ** 2
 
 
 def ratio_of(row: Row) -> float | None:

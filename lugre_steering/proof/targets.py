@@ -35,7 +35,7 @@ TARGETS: dict[str, Target] = {
     "barely": Target("right name or tie, barely visited", 0.93),
     "unlisted": Target("fixed unlisted kinds called unlisted, 0.3 and above", 0.90),
     "laws": Target("generated laws called unlisted, 0.3 and above", 0.90),
-    "laws_foretold": Target("error removed on an unseen manoeuvre, generated laws (median)", 0.90),
+    "laws_foretold": Target("removable error removed on an unseen manoeuvre, generated laws (median)", 0.90),
     "laws_harmed": Target("generated laws: worse than the baseline on the unseen manoeuvre", 0.02, most=True),
     "location_iou": Target("location IoU of local effects (median)", 0.7),
     "parameter_error": Target("relative error of coefficients (median)", 0.1, most=True),
