@@ -354,6 +354,32 @@ def test_gravity_of_a_joint_is_known_or_found(tmp_path: Path, known: bool) -> No
     assert "Gravity" in next(e for e in done.json["effects"] if e["id"] == "kingpin_jacking")["statement"]
 
 
+def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pass_for_its_gravity(tmp_path: Path) -> None:
+    """Gravity eight times the friction: recalibrated alone, the friction law is stretched as far as it may, and from there no fit comes
+    back. Nothing is named beside what the pendulum has."""
+    base = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)
+    own = EffectEntry("viscous_friction", {"sigma_2": 30.0}), EffectEntry("yaw_inertia", {"inertia": 40.0})
+    real = base.replace(gravity=Gravity(0.0, 350.0), effects=own)
+    write_bag(tmp_path / "bag", simulate(real, motion_of(BUILT_IN["varied-rates"], real), sensing_of(real)), "test")
+    found = {e.id: e.parameters for e in diagnose([tmp_path / "bag"], base).effects}
+    assert set(found) == {"kingpin_jacking", "viscous_friction", "yaw_inertia"}
+    for name, parameter, value in (
+        ("kingpin_jacking", "amplitude", 350.0), ("viscous_friction", "sigma_2", 30.0), ("yaw_inertia", "inertia", 40.0),
+    ):  # fmt: skip
+        assert found[name][parameter].value == pytest.approx(value, rel=0.1)
+
+
+def test_what_would_have_to_act_more_than_it_ever_does_is_not_named(tmp_path: Path) -> None:
+    """Friction five times as high between 3 and 14 deg; an entry of the catalogue knows up to three times."""
+    base = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    real = base.replace(effects=(EffectEntry("surface_patch", {"change": 4.0, "angle_low": 0.05, "angle_high": 0.25}),))
+    write_bag(tmp_path / "bag", simulate(real, motion_of(BUILT_IN["varied-rates"], real), sensing_of(real)), "test")
+    done = diagnose([tmp_path / "bag"], base)
+    assert done.verdict == "unlisted_physics"
+    assert not done.effects
+    assert done.augmented.heldout_rmse_Nm < 0.5 * done.baseline.heldout_rmse_Nm  # what is there is modelled all the same
+
+
 @pytest.mark.parametrize(("sign", "refused"), [(1.0, False), (-1.0, True)])
 def test_a_pendulum_whose_sheet_lacks_its_gravity_is_no_wiring_fault(tmp_path: Path, sign: float, refused: bool) -> None:
     """Gravity ten times the friction hides it; a torque with the wrong sign still shows, as friction then wins work."""

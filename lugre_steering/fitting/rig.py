@@ -55,4 +55,7 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> lis
 
 
 def _fitted(problem: Problem, weight: Array, effects: Sequence[tuple[Candidate, Values]], near: Fit) -> Fit:
-    return fit(problem, weight, effects, near, tolerance=TRIAL_TOLERANCE)
+    """The better of the fits that begin at ``near`` and at the vehicle file: friction stretched into a soft spring passes for gravity,
+    and from there the way back may be closed."""
+    begun = (fit(problem, weight, effects, x, tolerance=TRIAL_TOLERANCE) for x in (near, problem.start()))
+    return min(begun, key=lambda each: each.cost)

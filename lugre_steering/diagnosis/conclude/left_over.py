@@ -50,10 +50,9 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
         if needs_form:
-            description = (
-                "what is left beyond noise is within what friction of another form than the model's does, "
-                f"mostly {_form(done, final)}"
-            )
+            form = _form(done, final)
+            other = f"friction of another form than the model's does, mostly {form}" if form else "the named laws do when bent a little"
+            description = f"what is left beyond noise is within what {other}"
         return LeftOver(Unexplained(False, description), "", False)
     if not final.effects:
         # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
@@ -88,14 +87,14 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
 
 
 def _form(done: Finished, final: Fit) -> str:
-    """Which freedoms of the friction law do most of what they do, in words."""
+    """Which freedoms of the friction law do most of what they do, in words; empty where names alone are free."""
     problem = done.problem
     parts = problem.bends * final.x[problem.first_bend : problem.nuisances]
     energy = {
         words: beyond_calibration(problem, final, parts[:, [own == words for own in done.form]].sum(axis=1))
         for words in dict.fromkeys(done.form) if words
     }
-    most = max(energy.values())
+    most = max(energy.values(), default=0.0)
     return " and ".join(words for words in sorted(energy, key=lambda words: -energy[words]) if energy[words] > MOSTLY * most)
 
 

@@ -30,8 +30,9 @@ SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
-TAKEN_OF_SETTLING = 0.06
-"""What FORM_TAKEN is of names that settle with time: how rubber, oil and sensors do is known less well than how they act."""
+TAKEN_OF_SLOW = 0.06
+"""What FORM_TAKEN is of names that settle with time, or follow the acceleration: how rubber, oil and sensors settle is known less well
+than how they act, and an acceleration only as smoothed as the angles ask for."""
 ROUNDS, ALIKE = 3, 0.1
 """Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -118,20 +119,20 @@ def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) ->
 def may_differ(problem: Problem, result: Fit, gains: Sequence[float]) -> float:
     """Energy that another form of the last names of ``result`` may make; ``gains``: what each of them took.
 
-    Shares of these, as beside a name its own law may bend along its coordinate; and where time is that, of all that its torque does
-    beyond a recalibration.
+    Shares of these, as beside a name its own law may bend along its coordinate; and where time or acceleration is that, of what every
+    joint has too, of all that its torque does beyond a recalibration.
     """
     first, found = len(result.effects) - len(gains), 0.0
-    for i, gain in enumerate(gains, first):
-        if _settles(result.effects[i][0].effect):
-            found += TAKEN_OF_SETTLING * beyond_calibration(problem, result, contribution(problem, result, i))
-        else:
-            found += FORM_TAKEN * gain
+    for i, (candidate, _) in enumerate(result.effects):
+        if _slow(candidate.effect):
+            found += TAKEN_OF_SLOW * beyond_calibration(problem, result, contribution(problem, result, i))
+        elif i >= first:
+            found += FORM_TAKEN * gains[i - first]
     return found
 
 
-def _settles(effect: Effect) -> bool:
-    return effect.coordinate == "dwell" or "lag" in effect.hooks
+def _slow(effect: Effect) -> bool:
+    return effect.coordinate in ("dwell", "steering acceleration") or "lag" in effect.hooks
 
 
 def tied(

@@ -44,6 +44,8 @@ HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 REST = 0.1
 """Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
+END = 0.01
+"""Share of its range within which a value stands at the end of it."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -123,8 +125,8 @@ def search(
 
 
 class _Step(NamedTuple):
-    """A name that may come next, in its problem and fit; whether it is ``short`` of what it needs; and the round without freedoms if it
-    stands there ``instead`` of them."""
+    """A name that may come next, in its problem and fit; whether it is ``short`` of what it needs, or goes as far as it may; and the
+    round without freedoms if it stands there ``instead`` of them."""
 
     problem: Problem
     fit: Fit
@@ -147,7 +149,8 @@ def _step(
         there, best, one = _closest([there] if names else worlds(there), weight, split, seen, current)
         whole = _everywhere(there, weight, best, names)
         one = replace(one, gain=one.gain + best.cost - whole.cost)
-        step = _Step(there, whole, one, one.gain < needed(there, whole, weight, stands))
+        short = one.gain < needed(there, whole, weight, stands) or _as_far_as_it_may(whole, len(names) + 1)
+        step = _Step(there, whole, one, short)
     if instead is not None and (step is None or step.short):
         step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
     return step
@@ -191,6 +194,16 @@ def _everywhere(problem: Problem, weight: Array, current: Fit, names: Sequence[F
         if tried.cost < current.cost + PARTIAL * item.gain:
             current = tried
     return current
+
+
+def _as_far_as_it_may(current: Fit, names: int) -> bool:
+    """Whether one of the last ``names`` of a fit acts as strongly as it ever does: it makes up for what is something else."""
+    for candidate, values in current.effects[len(current.effects) - names :]:
+        for name in candidate.effect.amplitudes:
+            parameter, value = candidate.parameter(name), values.get(name, 0.0)
+            if value and not (1.0 - END) * parameter.low < value < (1.0 - END) * parameter.high:
+                return True
+    return False
 
 
 def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
