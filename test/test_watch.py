@@ -90,7 +90,8 @@ def test_a_window_comes_back_as_it_was_written(tmp_path: Path) -> None:
     assert window.reason == "marked"
     assert window.recording.start_ns == T0 + 1_000_000_000
     assert set(window.recording.pressure) == {"main_a", "main_b", "aux_a", "aux_b"}
-    expected = [Strokes(VEHICLE).at(0.01 * i)[0] for i in range(100, 300)]
+    strokes = Strokes(VEHICLE)
+    expected = [strokes.at(0.01 * i)[0] for i in range(100, 300)]
     assert window.recording.angle["left"].value.tolist() == expected
     assert window.recording.angle["left"].time_s[-1] == pytest.approx(1.99)
 
