@@ -369,6 +369,21 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
         assert found[name][parameter].value == pytest.approx(value, rel=0.1)
 
 
+@pytest.mark.parametrize(("engage", "shift"), [(0.2, 0.3), (0.5, -0.3)])
+def test_a_stop_on_one_side_is_found_with_its_stiffness(tmp_path: Path, engage: float, shift: float) -> None:
+    """2000 N m/rad from 0.2 rad on, on the left or on the right alone; the joint turns 0.49 rad to either side."""
+    base = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    real = base.replace(effects=(EffectEntry("end_stop", {"stiffness": 2000.0, "engage_angle": engage, "shift": shift}),))
+    write_bag(tmp_path / "bag", simulate(real, motion_of(BUILT_IN["varied-rates"], real), sensing_of(real)), "test")
+    stop = next(e for e in diagnose([tmp_path / "bag"], base).effects if e.id == "end_stop").parameters
+    found = {key: stop[key].value for key in ("stiffness", "engage_angle", "shift")}
+    assert found["stiffness"] == pytest.approx(2000.0, rel=0.05)
+    left, right = found["engage_angle"], found["engage_angle"] + found["shift"]
+    near, far = (left, right) if shift > 0.0 else (right, left)
+    assert near == pytest.approx(0.2, abs=0.01)
+    assert far > 0.48
+
+
 def test_what_would_have_to_act_more_than_it_ever_does_is_not_named(tmp_path: Path) -> None:
     """Friction five times as high between 3 and 14 deg; an entry of the catalogue knows up to three times."""
     base = vehicle_file.load(CONFIG / "single_joint_example.yaml")

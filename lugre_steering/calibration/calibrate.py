@@ -50,7 +50,7 @@ from lugre_steering.fitting.keys import KEYS, Key
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Problem, SheetValue, calibrations_for
 from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
-from lugre_steering.fitting.weather import weather_findings
+from lugre_steering.fitting.weather import initial_of, weather_findings
 from lugre_steering.recording import Array, BagFinding, Recording
 from lugre_steering.report.words import number
 from lugre_steering.vehicle import Vehicle
@@ -182,7 +182,8 @@ def _summed_up(
     held = heldout_rmse(problem, fitted, priors)
     progress("what the data cannot tell")
     weak, assumed = identifiability(problem, fitted)
-    calibrated = with_terms(_rounded(apply_calibration(problem.vehicle, problem, fitted.x)), fitted)
+    changed = apply_calibration(problem.vehicle, problem, fitted.x).replace(initial=initial_of(problem, fitted.fit))
+    calibrated = with_terms(_rounded(changed), fitted)
     rows = [*parameter_rows(problem, fitted, calibrated, priors), *term_rows(problem, fitted)]
     rmse = _fitted_errors(problem, fitted)
     names = [calibration.name for calibration in problem.calibrations]

@@ -22,6 +22,7 @@ from lugre_steering.data.dataset import Run, motion
 from lugre_steering.fitting.fit import ROBUST, Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.problem import Effects, Problem
+from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Array
 
 DRAWS = 16
@@ -91,9 +92,13 @@ def estimate(
     refined = copy.copy(problem)
     refined.measured = problem.measured - step  # the same as adding the error to every prediction
     final = fit(refined, weight, first.effects, first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
+    information = final.pull**2  # as the prior rows of the fit have it
+    if problem.vehicle.rubber is not None and not weather_findings(problem, final):
+        # Values hold beside the temperatures of the file, against which nothing speaks; intervals know that these are not exact.
+        known = refined.with_known_weather()
+        final = fit(known, weight, final.effects, final.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     residual = refined.measured - final.prediction
     cluster = _clusters(problem, residual * weight)
-    information = final.pull**2  # as the prior rows of the fit have it
     blocks = np.unique(cluster[weight > 0.0]).size
     result = Estimate(
         final, weight, noise.floor, residual, noise.draws, step, cluster, information,

@@ -7,8 +7,10 @@ from __future__ import annotations
 import math
 
 from lugre_steering.chain.compiled import law
-from lugre_steering.effects.entry import Effect, Parameter
+from lugre_steering.effects.entry import Effect, Parameter, Seen, Variant
 
+BEGINS = (0.55, 0.65, 0.75, 0.82, 0.88, 0.94)
+"""Where a stop may begin, as shares of the largest angle."""
 TRAVEL_RAD = 0.002
 """Travel over which it changes between its loading and unloading branch."""
 
@@ -32,6 +34,17 @@ def torque(theta, turned, omega, stiffness, engage_angle, cubic_stiffness, loss,
     return math.copysign(push, theta), loading
 
 
+def knees(seen: Seen) -> list[Variant]:
+    """Stops on both sides, and on one alone: the other one's knee is then as far as was ever visited."""
+    largest = max(abs(seen.lowest), abs(seen.highest))
+    places = [share * largest for share in BEGINS]
+    return [
+        *({"engage_angle": place} for place in places),
+        *({"engage_angle": place, "shift": -seen.lowest - place} for place in places if place < min(-seen.lowest, seen.highest)),
+        *({"engage_angle": seen.highest, "shift": place - seen.highest} for place in places if place < min(-seen.lowest, seen.highest)),
+    ]
+
+
 EFFECT = Effect(
     id="end_stop",
     stage="parallel_torque",
@@ -48,7 +61,7 @@ EFFECT = Effect(
         Parameter("stiffness", "N m/rad", "k1 of one track", 5e4, 0.0, 1e7),
         Parameter(
             "engage_angle", "rad", "track angle at which the stop begins", 0.02, 0.02, 1.5,
-            (0.55, 0.65, 0.75, 0.82, 0.88, 0.94), "max_angle", example=0.3,
+            BEGINS, "max_angle", example=0.3,
         ),
         Parameter("cubic_stiffness", "N m/rad^3", "k3 of one track", 1e7, 0.0, 1e10, optional=True),
         Parameter("loss", "1", "share of the torque lost on unloading", 0.2, 0.0, 0.95, optional=True),
@@ -58,6 +71,7 @@ EFFECT = Effect(
     hooks={"torque": torque},
     acts_by=("stiffness", "cubic_stiffness", "damping"),
     rivals=("moment_arm_error", "relief_saturation", "soil_shear"),
+    variants=knees,
     memory={"loading": 1.0},  # 1 loading ... 0 unloading
     joint_title="Elastic end stop",
     one_sided=True,

@@ -8,7 +8,7 @@ Each hides the others while it is missing, so one after another they would be ju
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -30,16 +30,13 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> lis
 
     Each with the fit that has it and those before it, and its score against what the others leave.
     """
-    samples = float(np.count_nonzero(weight))
-    least = max(LEAST * samples, min(SHARE * (cost(problem, baseline, weight) - samples), SURE * samples))
-    known = {candidate.effect.id for candidate, _ in problem.standing}
-    terms = [c for c in candidates(problem, sorted(known)) if c.effect.of_every_joint]
-    full = _fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
+    least, terms = _least(problem, baseline, weight), _terms(problem, baseline)
+    full = fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
     problem = problem.doubted(doubt(problem, full, weight), problem.typical)
     order: list[Candidate] = []  # what can be spared first comes last
     while full.effects:
         rests = [[e for i, e in enumerate(full.effects) if i != index] for index in range(len(full.effects))]
-        leaner = [_fitted(problem, weight, rest, full) for rest in rests]
+        leaner = [fitted(problem, weight, rest, full) for rest in rests]
         index = min(range(len(leaner)), key=lambda i: cost(problem, leaner[i], weight))
         if order or cost(problem, leaner[index], weight) - cost(problem, full, weight) > least:
             order.insert(0, full.effects[index][0])
@@ -48,13 +45,46 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> lis
     current = baseline
     for candidate in order:
         (score,) = (s for s in screen(problem, current, weight, noise.draws, among=[candidate]) if s.candidate == candidate)
-        current = _fitted(problem, weight, [*current.effects, (candidate, score.values)], current)
+        current = fitted(problem, weight, [*current.effects, (candidate, score.values)], current)
         current = refine(problem, weight, Trial(score, current, cost(problem, current, weight))).fit
         found.append((current, score))
     return found
 
 
-def _fitted(problem: Problem, weight: Array, effects: Sequence[tuple[Candidate, Values]], near: Fit) -> Fit:
+def spared(problem: Problem, weight: Array, current: Fit, terms: int) -> Iterator[tuple[int, Fit]]:
+    """Those of the first ``terms`` effects of a fit that had only stood for what follows them, last first, each with the fit without it."""
+    least = _least(problem, current, weight)
+    for index in range(terms - 1, -1, -1):
+        rest = [effect for i, effect in enumerate(current.effects) if i != index]
+        leaner = fit(problem, weight, rest, current, tolerance=TRIAL_TOLERANCE)
+        if cost(problem, leaner, weight) - cost(problem, current, weight) < least:
+            current = leaner
+            yield index, leaner
+
+
+def wanted(problem: Problem, noise: Noise, weight: Array, current: Fit) -> Iterator[tuple[Fit, Score]]:
+    """Terms that a fit lacks beside all that it has, each with the fit that has it first, and its score."""
+    least = _least(problem, current, weight)
+    for candidate in _terms(problem, current):
+        score = next(s for s in screen(problem, current, weight, noise.draws, among=[candidate]) if s.candidate == candidate)
+        richer = fit(problem, weight, [(candidate, score.values), *current.effects], current.x, tolerance=TRIAL_TOLERANCE)
+        if cost(problem, current, weight) - cost(problem, richer, weight) > least:
+            current = richer
+            yield richer, score
+
+
+def _terms(problem: Problem, current: Fit) -> list[Candidate]:
+    """What every joint or axis may have and neither the vehicle file nor a fit has."""
+    known = {candidate.effect.id for candidate, _ in (*problem.standing, *current.effects)}
+    return [c for c in candidates(problem, sorted(known)) if c.effect.of_every_joint]
+
+
+def _least(problem: Problem, current: Fit, weight: Array) -> float:
+    samples = float(np.count_nonzero(weight))
+    return max(LEAST * samples, min(SHARE * (cost(problem, current, weight) - samples), SURE * samples))
+
+
+def fitted(problem: Problem, weight: Array, effects: Sequence[tuple[Candidate, Values]], near: Fit) -> Fit:
     """The better of the fits that begin at ``near`` and at the vehicle file: friction stretched into a soft spring passes for gravity,
     and from there the way back may be closed."""
     begun = (fit(problem, weight, effects, x, tolerance=TRIAL_TOLERANCE) for x in (near, problem.start()))

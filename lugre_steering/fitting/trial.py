@@ -179,6 +179,7 @@ def refine(problem: Problem, weight: Array, trial: Trial, worth: float = np.inf)
 
     A trial that even so cannot come to a cost ``worth`` anything is left unfinished.
     """
+    trial = _set_free(problem, weight, trial)
     *earlier, (candidate, values) = trial.fit.effects
     kept = [p.name for p in candidate.effect.parameters if p.optional and p.name not in candidate.free]
     start = {**{name: 0.2 * candidate.parameter(name).scale for name in kept}, **values}
@@ -198,6 +199,17 @@ def refine(problem: Problem, weight: Array, trial: Trial, worth: float = np.inf)
             break
         result, left, kept = leaner, after, [name for name in kept if name not in dropped]
     return Trial(trial.score, result, left) if left < trial.cost else trial
+
+
+def _set_free(problem: Problem, weight: Array, trial: Trial) -> Trial:
+    """The trial with those optional parts free that its shape began with, where that earns its place."""
+    *earlier, (candidate, values) = trial.fit.effects
+    begun = [name for name, _ in candidate.shapes if candidate.parameter(name).optional and name not in candidate.free]
+    if not begun:
+        return trial
+    freed = replace(candidate, free=(*candidate.free, *begun))
+    result = fit(problem, weight, [*earlier, (freed, values)], trial.fit, linearisations=12, tolerance=TRIAL_TOLERANCE)
+    return Trial(trial.score, result, result.cost) if result.cost < trial.cost - SURE_SIGMA**2 * problem.doubt * len(begun) else trial
 
 
 def _weak(result: Fit, values: Values, optional: Sequence[str], doubt: float) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Finding
+from lugre_steering.vehicle.sections import Initial
 
 MATTERS_K, SURE = 4.0, 2.0
 """Difference to the vehicle file from which a temperature is told, and standard deviations that it must be."""
@@ -34,3 +35,12 @@ def weather_findings(problem: Problem, result: Fit) -> dict[str, Finding]:
                 f"{initial.rubber_temperature_degC:.0f} degC; taken into account here (replay: --initial-temperature {rubber:.0f})",
             )  # fmt: skip
     return found
+
+
+def initial_of(problem: Problem, result: Fit) -> Initial | None:
+    """How warm rubber and air were at the start, on average of all bags: a calibration holds beside that."""
+    if problem.vehicle.rubber is None or problem.vehicle.initial is None:
+        return problem.vehicle.initial
+    found = [problem.temperatures(bag, result.x) for bag in range(len(problem.runs))]
+    rubber, air = (sum(values) / len(found) for values in zip(*found, strict=True))
+    return Initial(round(rubber, 3), round(air, 3))

@@ -12,9 +12,8 @@ from lugre_steering.diagnosis.result import NamedEffect
 from lugre_steering.effects.registry import ORIGINS
 from lugre_steering.fitting.apply import apply_calibration, seen_range
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.weather import weather_findings
+from lugre_steering.fitting.weather import initial_of, weather_findings
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
-from lugre_steering.vehicle.sections import Initial
 
 
 def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect], heldout_rmse: float) -> Vehicle:
@@ -24,7 +23,6 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
     if not whole.effects and not weather_findings(problem, whole):  # nothing speaks against the temperatures of the file
         problem = problem.with_known_weather()
         whole = fit(problem, done.weight, start=whole.x)
-        done = replace(done, problem=problem)
     entries = list(problem.vehicle.effects)
     last = len(problem.runs) - 1
     for candidate, values in whole.effects[: len(effects)]:
@@ -52,14 +50,4 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
         },
     }  # fmt: skip
     changed = apply_calibration(problem.vehicle, problem, whole.x)
-    return replace(changed, effects=each_once(entries), provenance=provenance, initial=_initial(done, whole))
-
-
-def _initial(done: Finished, whole: Fit) -> Initial | None:
-    """How warm rubber and air were at the start, on average: the calibration holds beside that."""
-    problem = done.problem
-    if problem.vehicle.rubber is None or problem.vehicle.initial is None:
-        return problem.vehicle.initial
-    found = [problem.temperatures(bag, whole.x) for bag in range(len(problem.runs))]
-    rubber, air = (sum(values) / len(found) for values in zip(*found, strict=True))
-    return Initial(round(rubber, 3), round(air, 3))
+    return replace(changed, effects=each_once(entries), provenance=provenance, initial=initial_of(problem, whole))

@@ -110,6 +110,9 @@ def search(
         if not waiting:
             sure = found, now, current
     found, now, current = sure
+    if len(found) > given and is_rig(problem.vehicle):
+        found, current = _given_beside(now, noise, weight, split, current, found)
+        given = sum(item.given for item in found)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
             found[i] = _told(item, _rivals(now, noise, weight, split, current, item, i))
@@ -167,6 +170,21 @@ def _given(
             found.append(Found(score, (), (), current.cost - result.cost, given=True))
             current = result
     return found, current
+
+
+def _given_beside(
+    problem: Problem, noise: Noise, weight: Array, split: Split, current: Fit, found: Sequence[Found]
+) -> tuple[list[Found], Fit]:
+    """What every joint has anew, beside the names for which much of it may have stood; all of both, with their fit."""
+    given, names = [item for item in found if item.given], [item for item in found if not item.given]
+    current = rig.fitted(problem, weight, current.effects, current)
+    for richer, score in rig.wanted(problem, noise, weight, current):
+        given.insert(0, Found(score, (), (), current.cost - richer.cost, given=True))
+        current = richer
+    for index, leaner in rig.spared(problem, weight, current, len(given)):
+        del given[index]
+        current = leaner
+    return [*(_told(item, _rivals(problem, noise, weight, split, current, item, i)) for i, item in enumerate(given)), *names], current
 
 
 def _closest(
