@@ -21,7 +21,7 @@ from lugre_steering.proof.made import Made, Wanted, beside, pooled_noise, pooled
 from lugre_steering.proof.measurable import measured
 from lugre_steering.proof.simulator import CaseData
 from lugre_steering.proof.sizing import make
-from lugre_steering.proof.worlds import LAW, SecondCase, mistake_of
+from lugre_steering.proof.worlds import LAW, SecondCase, maker, mistake_of
 
 PACKAGE = Path(__file__).resolve().parents[1]
 LONGEST_S = 900.0
@@ -78,8 +78,7 @@ def run(job: Job) -> Row:
         if diagnosis is not None:
             row["measured"] = measured(made, out / "augmented.yaml", diagnosis)
         if diagnosis is not None and LAW in hiding.effects:
-            row["unseen"] = foretold(bags, seen / "vehicle.yaml", out / "augmented.yaml", next(unseen.glob("run_unseen")), Path(temporary))
-            row["unseen"]["noise_Nm"] = made.unseen_noise_variance() ** 0.5
+            row["unseen"] = foretold(job, bags, seen / "vehicle.yaml", out / "augmented.yaml", unseen / "run_unseen", Path(temporary))
         if job.peers:
             from lugre_steering.proof.peers import compare
 
@@ -131,13 +130,21 @@ def diagnose(bags: Sequence[Path], vehicle: Path, out: Path, *more: str) -> tupl
     return kept, None
 
 
-def foretold(bags: Sequence[Path], sheet: Path, augmented: Path, unseen: Path, folder: Path) -> Row:
-    """Root mean square errors [N m] of replays on a manoeuvre that nobody recorded: recalibrated baseline, and diagnosed file."""
-    error, _ = called("calibrate", *map(str, bags), "--vehicle", str(sheet), "--out", str(folder / "calibrated"))
-    files = {"baseline_Nm": folder / "calibrated" / "calibrated.yaml", "augmented_Nm": augmented}
+def foretold(job: Job, bags: Sequence[Path], sheet: Path, augmented: Path, unseen: Path, folder: Path) -> Row:
+    """Root mean square errors [N m] of replays on a manoeuvre that nobody recorded: of the recalibrated baseline, of the diagnosed
+    file, and of the recalibrated baseline where the same case hides nothing, which is what is left to a perfect law."""
+    twin = maker(job.hiding, job.sheet_file)([Wanted(LAW, strength=0.0)])
+    plain = twin.write(folder / "plain", folder / "plain_unseen")
+    error = None
+    for name, recordings in (("calibrated", bags), ("plain_calibrated", plain)):
+        error = error or called("calibrate", *map(str, recordings), "--vehicle", str(sheet), "--out", str(folder / name))[0]
+    replays = {
+        "baseline_Nm": (unseen, folder / "calibrated" / "calibrated.yaml"), "augmented_Nm": (unseen, augmented),
+        "floor_Nm": (folder / "plain_unseen" / "run_unseen", folder / "plain_calibrated" / "calibrated.yaml"),
+    }  # fmt: skip
     found: Row = {}
-    for name, file in files.items():
-        error = error or called("replay", str(unseen), "--vehicle", str(file), "--out", str(folder / name))[0]
+    for name, (bag, file) in replays.items():
+        error = error or called("replay", str(bag), "--vehicle", str(file), "--out", str(folder / name))[0]
         if error is not None:
             return {"error": error}
         summary = json.loads((folder / name / "summary.json").read_text(encoding="utf-8"))

@@ -96,10 +96,6 @@ class Made(Protocol):
         """The same on a common clock that interpolates between samples."""
         ...
 
-    def unseen_noise_variance(self) -> float:
-        """The same of the manoeuvre that nobody recorded."""
-        ...
-
     def tangents(self) -> Array:
         """Changes of the torque of all bags in one row with each parameter that a recalibration may move, unit columns."""
         ...

@@ -290,13 +290,13 @@ def removed_without(row: Row) -> float | None:
 
 
 def foretold(row: Row) -> float | None:
-    """Share of the removable error on an unseen manoeuvre, that of the recalibrated baseline above the noise, which the diagnosed file
-    removes; None where there is next to none."""
+    """Share of the removable error on an unseen manoeuvre that the diagnosed file removes: of what the recalibrated baseline leaves there
+    beyond what it leaves where nothing is hidden; None where that is next to nothing."""
     squares = _unseen(row)
     if squares is None:
         return None
-    before, after, noise = squares
-    return (before - after) / (before - noise) if before - noise > 0.1 * noise else None
+    before, after, least = squares
+    return (before - after) / (before - least) if before - least > 0.1 * least else None
 
 
 def harmed(row: Row) -> bool | None:
@@ -306,11 +306,10 @@ def harmed(row: Row) -> bool | None:
 
 
 def _unseen(row: Row) -> tuple[float, float, float] | None:
-    """Mean squares [N2 m2] on an unseen manoeuvre: of the recalibrated baseline, the diagnosed file and the noise."""
-    unseen = row.get("unseen")
-    if not unseen or not unseen.get("baseline_Nm") or unseen.get("augmented_Nm") is None:
-        return None
-    return unseen["baseline_Nm"] ** 2, unseen["augmented_Nm"] ** 2, unseen["noise_Nm"] ** 2
+    """Mean squares [N2 m2] on an unseen manoeuvre: of the recalibrated baseline, the diagnosed file, and where nothing is hidden."""
+    unseen = row.get("unseen") or {}
+    squares = [unseen[key] ** 2 for key in ("baseline_Nm", "augmented_Nm", "floor_Nm") if unseen.get(key)]
+    return (squares[0], squares[1], squares[2]) if len(squares) == 3 else None
 
 
 def ratio_of(row: Row) -> float | None:

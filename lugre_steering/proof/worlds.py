@@ -50,14 +50,9 @@ class SecondCase:
 
     def seen_noise_variance(self, bag: int) -> float:
         """Lower than ``noise_variance`` for white noise, since interpolation averages: what is left to a perfect model there."""
-        return self._seen_variance(self.data.bags[bag])
-
-    def unseen_noise_variance(self) -> float:
-        return self._seen_variance(simulator.unseen_bag(self.data))
-
-    def _seen_variance(self, bag: BagData) -> float:
-        sheet = self.data.sheet
-        return seen_variance(bag, 0.1 * PERIOD_S, lambda seen, angles: hydraulics.torque_of(seen, hydraulics.line_gain(sheet, angles)))
+        return seen_variance(
+            self.bags[bag], 0.1 * PERIOD_S, lambda seen, angles: hydraulics.torque_of(seen, hydraulics.line_gain(self.data.sheet, angles))
+        )
 
     def tangents(self) -> Array:
         return self._tangents

@@ -207,14 +207,14 @@ def test_generated_laws_and_dirt_have_scores_of_their_own() -> None:
     cases = [row(["law"], "unlisted_physics", kind="law"), row(["law"], FOUND, effect("backlash"), kind="law")]
     for case in cases:
         case["truth"]["effects"][0]["parameters"] = law
-    cases[0]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 68.0, "noise_Nm": 60.0}
-    cases[1]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 112.0, "noise_Nm": 60.0}
+    cases[0]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 68.0, "floor_Nm": 60.0}
+    cases[1]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 112.0, "floor_Nm": 60.0}
     dirty = [row([], "insufficient_data", kind="dirty"), row([], FOUND, effect("relief_saturation"), kind="dirty")]
     part = scoreboard.part([*cases, *dirty])
     assert part["laws"]["called_unlisted"]["hits"] == 1
     assert part["laws"]["inside_grammar"]["of"] == 2
     assert part["laws"]["outside_grammar"]["of"] == 0
-    assert part["laws"]["foretold"]["median"] == pytest.approx(0.5 * (5376.0 - 2544.0) / 6400.0)  # of what is not noise
+    assert part["laws"]["foretold"]["median"] == pytest.approx(0.5 * (5376.0 - 2544.0) / 6400.0)  # of what hiding adds
     assert part["laws"]["harmed"]["hits"] == 1
     assert part["dirty"]["silent"]["share"] == 0.5
     assert part["dirty"]["named"] == {"relief_saturation": 1}

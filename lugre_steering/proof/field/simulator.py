@@ -229,20 +229,10 @@ class FieldCase:
 
     def seen_noise_variance(self, bag: int) -> float:
         """Variance of the torque that the sensors show on a common clock about the noise-free one [N2 m2], skews included."""
-        return self._seen_variance(self.bags[bag])
-
-    def unseen_noise_variance(self) -> float:
-        return self._seen_variance(self._unseen())
-
-    def _seen_variance(self, bag: Bag) -> float:
         machine_ = self.setting.machine
-        return seen_variance(bag, 0.2 * PERIOD_S, lambda seen, angles: hydraulics.torque_of(seen, hydraulics.gains(machine_, angles)))
-
-    def _unseen(self) -> Bag:
-        """The first drive quicker and wider, with all that is hidden."""
-        drive = self.setting.drives[0]
-        quick = replace(drive, name="unseen", mean=motion.hurried(drive.mean, FASTER, FURTHER))
-        return _bag(self.setting, quick, self.hidden, np.random.default_rng((self.setting.seed, 50)))
+        return seen_variance(
+            self.bags[bag], 0.2 * PERIOD_S, lambda seen, angles: hydraulics.torque_of(seen, hydraulics.gains(machine_, angles))
+        )
 
     def tangents(self) -> Array:
         return self._tangents
@@ -289,7 +279,9 @@ class FieldCase:
         truth = {effect.id: self.told(effect) for effect in self.hidden}
         (unseen / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")
         if any(effect.id == LAW for effect in self.hidden):
-            bag = self._unseen()
+            drive = self.setting.drives[0]
+            quick = replace(drive, name="unseen", mean=motion.hurried(drive.mean, FASTER, FURTHER))
+            bag = _bag(self.setting, quick, self.hidden, np.random.default_rng((self.setting.seed, 50)))
             self._write(unseen / "run_unseen", bag, 0)
             np.savez_compressed(unseen / "run_unseen_truth.npz", time=bag.time, torque=bag.torque, torque_without=bag.torque_without)
         return paths
