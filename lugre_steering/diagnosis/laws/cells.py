@@ -30,6 +30,8 @@ NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
 SMALL = {"conservative_torque": 1.0, "coulomb_friction": 1.0, "load_friction": 1e-3, "lag": 1e-3}
 SMALLEST = 1e-4
 """Sizes of the unit laws by which channels are traced, and share of the torque amplitude for the others."""
+RARE, SEEN = 0.005, 0.1
+"""Share of the time at either end of a coordinate that is too little to know f there, and share of its whole range that is left then."""
 TRACER, WIDE = 1e-6, 1e9
 """Size of the law that carries a coordinate out of the chain, and a range that holds any."""
 REMEMBERING = ("friction_level", "conservative_torque", "gain")
@@ -47,7 +49,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class Cell:
-    """Channel x f(axis), with the range [low, high] on which the recordings show the axis; ``period``: of a free f that repeats."""
+    """Channel x f(axis), with the range [low, high] on which the recordings show the axis; ``period``: of a free f that repeats;
+    ``often``: the range beyond which they hardly do, where a free f is held."""
 
     channel: str
     axis: Axis
@@ -55,18 +58,20 @@ class Cell:
     high: float
     pieces: int = PIECES
     period: float = 0.0
+    often: tuple[float, float] = (-np.inf, np.inf)
 
     def basis(self, places: Array) -> Array:
-        """Columns (n, pieces) of a free f at some places, held beyond the range."""
+        """Columns (n, pieces) of a free f at some places, held beyond the range that was often seen."""
         if self.pieces == 1:
             return np.ones((places.size, 1))
+        low, high = max(self.low, self.often[0]), min(self.high, self.often[1])
+        inside = np.clip(places, low, high)
         if self.period:
-            phase = 2.0 * np.pi * np.clip(places, self.low, self.high) / self.period
+            phase = 2.0 * np.pi * inside / self.period
             return np.column_stack([np.sin(phase), np.cos(phase)])
         degree = 1 if self.pieces == HATS else 3
-        inner = np.linspace(self.low, self.high, self.pieces - degree + 1)
-        knots = np.concatenate([[self.low] * degree, inner, [self.high] * degree])
-        return np.asarray(BSpline.design_matrix(np.clip(places, self.low, self.high), knots, degree).toarray())
+        knots = np.concatenate([[low] * degree, np.linspace(low, high, self.pieces - degree + 1), [high] * degree])
+        return np.asarray(BSpline.design_matrix(inside, knots, degree).toarray())
 
     def fields(self, f: Array, size: float = 1.0) -> dict[str, float | Array]:
         """The law with f (KNOTS,) as ``effects.laws.record`` has it."""
@@ -90,14 +95,16 @@ class Traces:
                 low, high = -1.0, 1.0
             if not high - low > 1e-9 * max(abs(low), abs(high)):
                 continue
+            first, last = np.quantile(np.concatenate(values, axis=None), (RARE, 1.0 - RARE))
+            often = (float(first), float(last)) if last - first > SEEN * (high - low) else (low, high)
             signs = axis.memory == "relay" or axis == Axis("direction")
             pieces = 1 if axis.coordinate == "none" else HATS if signs else PIECES
             for channel in self.signals if axis.memory == "none" else REMEMBERING:
-                yield Cell(channel, axis, low, high, pieces)
+                yield Cell(channel, axis, low, high, pieces, often=often)
                 if axis == Axis("angle") and channel in TOOTHED:
-                    yield Cell(channel, axis, low, high, FINE)
+                    yield Cell(channel, axis, low, high, FINE, often=often)
                     for cycles in CYCLES:
-                        yield Cell(channel, axis, low, high, 2, float((high - low) / cycles))
+                        yield Cell(channel, axis, low, high, 2, float((high - low) / cycles), often)
 
     def pieces(self, cell: Cell) -> list[Array]:
         """What each piece of a free f is, by bag (sides, n, pieces); the same for every channel."""
