@@ -19,7 +19,7 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
-from lugre_steering.diagnosis.laws.refine import closed_forms, free_law, with_law
+from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
 from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names
 from lugre_steering.diagnosis.laws.screen import Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
@@ -64,6 +64,17 @@ def named(problem: Problem, final: Fit) -> Finished:
 
 def by_run(part: object) -> Array:
     return np.concatenate([part(run) for run in NOTHING.runs])  # type: ignore[operator]
+
+
+def test_a_closed_form_is_fitted_as_the_vehicle_file_runs_it() -> None:
+    """Also where the vehicle goes beyond the range that the law was seen on: there a straight line goes on."""
+    cell = Cell("conservative_torque", Axis("angle"), -0.05, 0.05)
+    assert max(float(np.abs(run.theta).max()) for run in NOTHING.runs) > 2.0 * cell.high
+    room = Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1)
+    law = closed_law(room, cell, 0, "linear", {"value": 0.0}, {"slope": 2e4})
+    entry = LawEntry("conservative_torque", "angle", "linear", (cell.low, cell.high), {"value": 0.0, "slope": 2e4})
+    written = Problem(NOTHING.vehicle.replace(laws=(entry,)), NOTHING.runs)
+    np.testing.assert_allclose(room.predict_all(room.start(), [law]), written.predict_all(written.start()), rtol=1e-9, atol=1e-6)
 
 
 def test_a_loss_beyond_an_angle_is_found_with_its_place_and_size_and_runs_from_the_vehicle_file() -> None:

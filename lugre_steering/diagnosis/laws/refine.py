@@ -13,6 +13,7 @@ import numpy as np
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.effects import laws
 from lugre_steering.effects.entry import Effect, Parameter
+from lugre_steering.effects.law_entry import LawEntry, law_fields
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
@@ -45,7 +46,13 @@ class Law(Effect):
 
     def fields(self, values: Mapping[str, float] | Mapping[str, float | Array]) -> dict[str, float | Array]:
         numbers = {name: float(value) for name, value in values.items()}
-        made = self.at(numbers).fields(self.shape(numbers))
+        cell = self.at(numbers)
+        if self.form == laws.TABLE:
+            made = cell.fields(self.shape(numbers))
+        else:  # as a vehicle file has it, where closed forms go on beyond what was seen
+            axis, known = cell.axis, {**self.fixed, **{name: value for name, value in numbers.items() if name != "memory_size"}}
+            span = (cell.low, cell.high)
+            made = law_fields(LawEntry(cell.channel, axis.coordinate, self.form, span, known, (), axis.memory, axis.memory_size))
         return {f"{self.id}_{name}": value for name, value in made.items()}
 
 
