@@ -88,7 +88,9 @@ def traces(effect: Effect) -> list[Trace]:
     problems = _problems()
     others = [name for name in CATALOGUE if name != effect.id]
     variants = [variant for variant in candidates(problems[REFERENCE], others) if variant.bags is None]
-    example = variants[len(variants) // 2]
+    fewest = min(len(variant.shapes) for variant in variants)
+    plain_ones = [variant for variant in variants if len(variant.shapes) == fewest]  # a stop on both sides, not on one alone
+    example = plain_ones[len(plain_ones) // 2]
     found = [Trace(BUILT_IN[name], problem, example) for name, problem in problems.items()]
     return sorted(found, key=lambda trace: -trace.visible_rms)
 
