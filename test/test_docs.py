@@ -222,7 +222,7 @@ def test_notebooks_run_and_hold_no_outputs(notebook: Path, tmp_path: Path) -> No
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, env=environment(MPLBACKEND="Agg"), capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 # ------------------------------------------------------------------- tables
