@@ -226,7 +226,7 @@ def test_colcon_build_installs_what_ros2_run_and_launch_look_for(source: Path) -
         assert (installed / file).is_file(), file
     assert os.access(installed / "lib" / NAME / "estimator", os.X_OK)
     done = subprocess.run(
-        ["bash", "-c", f". install/local_setup.bash && python -c 'import {NAME}; print({NAME}.__file__)'"],
+        ["bash", "-c", f". install/local_setup.bash && {sys.executable} -c 'import {NAME}; print({NAME}.__file__)'"],
         cwd=source.parents[1],
         env={key: value for key, value in environment().items() if key != "PYTHONPATH"},
         capture_output=True,

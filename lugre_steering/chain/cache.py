@@ -6,6 +6,10 @@ Numba believes whatever lies in its cache: an empty or cut file stops every late
 do anything. So each file ends with the hash of what stands before it, which Numba, a reader of pickles, does not see.
 Of processes that start together, one compiles and the others wait for what it keeps. Copies of the package (a source tree,
 what is installed from it) share what they keep: it lies under the content of its source, not under the path.
+
+Symbols of compiled functions end with a number that Numba counts from 1 in every process. Code that two processes kept may then have
+one symbol for two functions, and a third process that loads both runs the first for either (numba issue 10486): a model without the
+effect that it was given. Here the numbers are random.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import secrets
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -21,7 +26,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import numba
-from numba.core import caching, ccallback, dispatcher
+from numba.core import bytecode, caching, ccallback, dispatcher
 
 _SEAL = hashlib.sha256
 _SEAL_BYTES = _SEAL().digest_size
@@ -168,7 +173,7 @@ class _KeptCode(caching.FunctionCache):
 
 
 def keep_safely() -> None:
-    """Let Numba keep the functions of this package sealed, and do without where there is no place to keep them."""
+    """Let Numba keep the functions of this package sealed and with symbols of their own, and do without where no place is."""
     plain = caching.FunctionCache
 
     def cache_of(function: Callable[..., Any]) -> Any:
@@ -179,6 +184,7 @@ def keep_safely() -> None:
         _tell(f"compiled code cannot be kept in {_folder() or 'any folder'}: every start compiles")
         return caching.NullCache()
 
+    bytecode.FunctionIdentity._unique_ids = iter(lambda: secrets.randbits(64), None)  # type: ignore[assignment]
     ccallback.FunctionCache = dispatcher.FunctionCache = cache_of  # type: ignore[attr-defined]
 
 

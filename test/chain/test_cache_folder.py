@@ -72,3 +72,50 @@ def test_laws_of_the_package_are_kept_and_those_of_users_are_not() -> None:
 
     assert lag_weights.stats.cache_path.startswith(numba.config.CACHE_DIR)
     assert law(users).stats.cache_path is None
+
+
+TWO_FORMS = """
+import math
+
+from numba import njit
+from numba.extending import overload
+
+import lugre_steering.chain.compiled
+
+
+def effect(p):
+    pass
+
+
+@overload(effect)
+def _effect(p):
+    size = 1.0 if "with_effect" in p.fields else 0.0
+    scope = {"math": math}
+    lines = ["def effect(p):", " x = p.torque", *100 * [" x += math.sin(x)"], f" return {size} * math.cos(x)"]  # too long to be inlined
+    exec(chr(10).join(lines), scope)
+    return scope["effect"]
+
+
+@njit(cache=True)
+def run(p):
+    return effect(p[0])
+"""
+RUN = """
+import sys
+
+import numpy as np
+from two_forms import run
+
+print(*(run(np.zeros(1, [("torque", float), (name, float)])) for name in sys.argv[1:]))
+"""
+
+
+def test_a_process_that_loads_what_two_others_kept_runs_each_in_its_place(tmp_path: Path) -> None:
+    (tmp_path / "two_forms.py").write_text(TWO_FORMS)
+    paths = os.pathsep.join([str(tmp_path), str(Path(lugre_steering.__file__).parents[1])])
+    env = {**os.environ, "PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    printed = [
+        subprocess.run([sys.executable, "-c", RUN, *names], env=env, capture_output=True, text=True, timeout=120, check=True).stdout.split()
+        for names in (["plain"], ["with_effect"], ["plain", "with_effect"])
+    ]
+    assert printed == [["0.0"], ["1.0"], ["0.0", "1.0"]]
