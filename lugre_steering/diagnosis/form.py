@@ -28,8 +28,8 @@ exponents from 0.5 to 2 make of a static level 15 % above the sliding one."""
 GROUND, PER_PRESLIDING, MOST_PLACES = 0.06, 2.0, 40
 """That along the ground, three times the 1 to 2 % of even pavements; and places per presliding length, as bristles blur what is shorter."""
 SHARPER, ROUNDER, REACH = 0.4, 0.08, 6.0
-"""Presliding stiffness, and level, along the way since a reversal, up to so many presliding lengths: between rounder and sharper than
-an exponential."""
+"""Presliding stiffness along the torque against the motion, on which it depends in every model of one state (Dahl's exponent, 1968);
+and it and the level along the way since a reversal, up to so many presliding lengths: between rounder and sharper than an exponential."""
 WARMTH, WARMTH_K = 0.05, 20.0
 """Level per so many kelvin, in which batches of one rubber differ."""
 RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
@@ -73,7 +73,7 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
-    own = {name: float(problem.model.parameters[0][0][name]) for name in ("stribeck_speed", "coulomb_torque", "sigma_0")}
+    own = {name: float(problem.model.parameters[0][0][name]) for name in ("stribeck_speed", "static_torque", "coulomb_torque", "sigma_0")}
     own |= problem.fields(fitted.x)
     presliding = own["coulomb_torque"] / own["sigma_0"]
     low, high = min(float(run.theta.min()) for run in problem.runs), max(float(run.theta.max()) for run in problem.runs)
@@ -88,6 +88,9 @@ def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
         ),
         Freedom("its level along the ground", "friction_level", "angle", low, high, GROUND * _places(low, high, presliding)),
     ]
+    most, loads = max(own["static_torque"], own["coulomb_torque"]), np.linspace(-1.0, 1.0, 7)
+    hats = np.array([np.interp(np.linspace(-1.0, 1.0, laws.KNOTS), loads, hat) for hat in np.eye(7)])
+    found.append(Freedom("its presliding", "presliding_stiffness", "opposing_torque", -most, most, SHARPER * hats))
     for way_of in ("since_reversal", "slip"):  # and on the first sweep, which no reversal has prepared
         found.append(Freedom("its presliding", "presliding_stiffness", way_of, 0.0, far, SHARPER * near[:4]))
         found.append(Freedom("its presliding", "friction_level", way_of, 0.0, far, ROUNDER * near[:5]))

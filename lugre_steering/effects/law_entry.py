@@ -58,7 +58,7 @@ STAGE_OF: Mapping[str, str] = {
 TOLD_BY = {
     "angle": "steering angle", "abs_angle": "|steering angle|", "rate": "steering rate", "abs_rate": "steering rate",
     "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "torque", "time": "time",
-    "slip": "accumulated slip", "dwell": "dwell", "rubber_temperature": "rubber temperature",
+    "slip": "accumulated slip", "dwell": "dwell", "rubber_temperature": "rubber temperature", "opposing_torque": "torque",
 }  # fmt: skip
 
 

@@ -31,9 +31,10 @@ CHANNELS = {
 COORDINATES = {
     "none": "1", "angle": "rad", "abs_angle": "rad", "rate": "rad/s", "abs_rate": "rad/s", "direction": "1", "since_reversal": "rad",
     "torque": "N m", "abs_torque": "N m", "power": "W", "time": "s", "slip": "rad", "work": "J", "dwell": "s",
-    "rubber_temperature": "degC", "air_temperature": "degC",
+    "rubber_temperature": "degC", "air_temperature": "degC", "opposing_torque": "N m",
 }  # fmt: skip
-"""What f may depend on, with its unit; angle, slip and work are those of one track."""
+"""What f may depend on, with its unit; angle, slip and work are those of one track. The opposing torque is that against the motion,
+less than zero where it drives."""
 MEMORIES = {"none": "", "lag": "s", "play": "", "relay": ""}
 """What stands between the coordinate and f: nothing, a first-order lag of so many seconds, a play or a relay of a half width in
 the unit of the coordinate."""
@@ -60,7 +61,9 @@ def coordinate(which, theta, omega, direction, since, torque, slip, work, dwell,
         return time if which == 10.0 else slip
     if which < 14.0:
         return work if which == 12.0 else dwell
-    return temperature if which == 14.0 else air
+    if which < 16.0:
+        return temperature if which == 14.0 else air
+    return torque * direction
 
 
 @law

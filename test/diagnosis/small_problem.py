@@ -25,9 +25,9 @@ DRIVE = Manoeuvre(
 )
 
 
-def small_problem(rate_Hz: float = 100.0) -> Problem:
+def small_problem(rate_Hz: float = 100.0, drive: Manoeuvre = DRIVE) -> Problem:
     sheet = load_vehicle(None)
-    runs = [prepare(recording, sheet) for recording in coverage.record(sheet, [DRIVE, replace(DRIVE, name="again")], 5, rate_Hz)]
+    runs = [prepare(recording, sheet) for recording in coverage.record(sheet, [drive, replace(drive, name="again")], 5, rate_Hz)]
     made = Problem(sheet, runs)
     return with_torque(made, made.predict_all(made.start()))
 

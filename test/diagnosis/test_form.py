@@ -14,9 +14,11 @@ from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import CYCLE
 from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
+from lugre_steering.simulate.manoeuvres import Manoeuvre, Sweep
 
 NOTHING = small_problem(33.0)
 RECORD = NOTHING.model.parameters[0][0]
@@ -46,16 +48,26 @@ STOP = np.concatenate([
 ])  # fmt: skip
 
 
+def left_beside_freedoms(known: Problem, torque: Array) -> float:
+    """Share of what a recalibration leaves that stays beside the freedoms too."""
+    problem = with_torque(known, torque)
+    plain = fit(problem, weight(problem))
+    freer, words = bent(problem, plain)
+    assert len(words) == freer.bends.shape[1]
+    beside = fit(freer, weight(problem), start=np.concatenate([plain.x, np.zeros(len(words))]))
+    return cost(freer, beside, weight(problem)) / cost(problem, plain, weight(problem))
+
+
 def test_friction_of_another_form_is_explained_by_the_freedoms_and_a_stop_is_not() -> None:
-    shares = []
-    for torque in (RUBBED, KNOWN + STOP):
-        problem = with_torque(NOTHING, torque)
-        plain = fit(problem, weight(problem))
-        freer, words = bent(problem, plain)
-        assert len(words) == freer.bends.shape[1]
-        beside = fit(freer, weight(problem), start=np.concatenate([plain.x, np.zeros(len(words))]))
-        shares.append(cost(freer, beside, weight(problem)) / cost(problem, plain, weight(problem)))
-    assert shares[0] < FORM_LEFT < shares[1]
+    assert left_beside_freedoms(NOTHING, RUBBED) < FORM_LEFT < left_beside_freedoms(NOTHING, KNOWN + STOP)
+
+
+@pytest.mark.parametrize("sharpness", [0.6, 1.5])
+def test_presliding_that_yields_by_another_power_is_explained_in_part_strokes_too(sharpness: float) -> None:
+    angles = np.cumsum([4.0, -1.5, 3.0, -6.0, 2.0, -4.0, 8.0, -2.0, 5.0, -12.0, 3.0])
+    strokes = small_problem(33.0, Manoeuvre("strokes", "", tuple(Sweep(angle, 3.0, 0.5) for angle in angles)))
+    other = np.concatenate([friction(run, sharpness, 0.0, 0.0) - friction(run, 1.0, 0.0, 0.0) for run in strokes.runs])
+    assert left_beside_freedoms(strokes, strokes.predict_all(strokes.start()) + other) < 0.2 * FORM_LEFT
 
 
 def test_no_name_is_given_to_friction_of_another_form() -> None:

@@ -35,7 +35,7 @@ COORDINATE_WORDS = {
     "angle": "angle", "abs_angle": "absolute angle", "rate": "steering rate", "abs_rate": "absolute steering rate",
     "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "absolute torque",
     "power": "power", "time": "time", "slip": "accumulated slip", "work": "accumulated work", "dwell": "dwell",
-    "rubber_temperature": "rubber temperature", "air_temperature": "air temperature",
+    "rubber_temperature": "rubber temperature", "air_temperature": "air temperature", "opposing_torque": "torque against the motion",
 }  # fmt: skip
 
 
@@ -178,7 +178,7 @@ _SIGNALS = {
 }  # fmt: skip
 _PLACES = {
     "angle": "theta", "abs_angle": "|theta|", "rate": "omega", "abs_rate": "|omega|", "direction": "sgn(omega)", "torque": "M",
-    "abs_torque": "|M|", "time": "t", "rubber_temperature": "T", "air_temperature": "T_air",
+    "abs_torque": "|M|", "time": "t", "rubber_temperature": "T", "air_temperature": "T_air", "opposing_torque": "M sgn(omega)",
 }  # fmt: skip
 
 
