@@ -34,6 +34,8 @@ RARE, SEEN = 0.005, 0.1
 """Share of the time at either end of a coordinate that is too little to know f there, and share of its whole range that is left then."""
 TRACER, WIDE = 1e-6, 1e9
 """Size of the law that carries a coordinate out of the chain, and a range that holds any."""
+FORM = "opposing_torque"
+"""What the stiffness of another friction law depends on, which its freedoms have; no law of its own is sought there."""
 REMEMBERING = ("friction_level", "conservative_torque", "gain")
 """Channels whose laws may remember."""
 
@@ -117,10 +119,10 @@ class Traces:
 
 
 def axes_of(problem: Problem) -> list[Axis]:
-    """All coordinates, and memories of those that may have one."""
+    """All coordinates but that of the friction law's own form, and memories of those that may have one."""
     travel = max(float(np.ptp(run.theta)) for run in problem.runs)
     torque = float(np.ptp(problem.measured)) / len(problem.vehicle.sides)
-    plain = [Axis(name) for name in laws.COORDINATES if name not in ("rubber_temperature", "air_temperature")]
+    plain = [Axis(name) for name in laws.COORDINATES if name not in ("rubber_temperature", "air_temperature", FORM)]
     if problem.vehicle.rubber is not None:
         plain += [Axis("rubber_temperature"), Axis("air_temperature")]
     lagged = [Axis(name, "lag", tau) for name in ("rate", "direction", "torque", "power") for tau in LAGS_S]
