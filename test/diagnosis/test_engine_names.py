@@ -53,10 +53,10 @@ def test_hidden_end_stop_is_named_placed_fitted_and_runs_in_replay(tmp_path: Pat
 
 @pytest.mark.parametrize(
     ("hidden", "count", "seconds"),
-    [("cylinder_friction", 1, 60.0), ("backlash", 1, 60.0), ("time_delay", 2, 130.0), ("carcass_heat_sink", 1, 130.0)],
+    [("cylinder_friction", 1, 60.0), ("backlash", 1, 60.0), ("time_delay", 2, 130.0), ("carcass_heat_sink", 2, 130.0)],
 )
 def test_one_effect_per_stage_is_named(tmp_path: Path, hidden: str, count: int, seconds: float) -> None:
-    """One minute is enough for some; heat takes two, and a delay is told from a clock that differs by two bags."""
+    """One minute is enough for some; heat takes two bags, and so does a delay, to be told from a clock that differs."""
     _, bags = made(tmp_path, Concealed(hidden))
     result = diagnose_recordings([cut(recording, seconds) for recording in thinned(bags[:count])], load(VEHICLE))
     assert result.json["verdict"] == "missing_physics"

@@ -76,7 +76,7 @@ def ordinary(measured: dict[str, Signal]) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize(("torque", "length"), [(1e-4, 1.0), (1e4, 1.0), (1.0, 1e-3), (1.0, 1e3)])
+@pytest.mark.parametrize(("torque", "length"), [(1e-4, 1e3), (1e4, 1e-3)])
 def test_the_answer_does_not_depend_on_the_size_of_the_machine(
     measured: dict[str, Signal], ordinary: dict[str, Any], torque: float, length: float
 ) -> None:

@@ -298,7 +298,7 @@ def test_what_stands_is_named_though_as_much_again_is_unlisted(slower: Problem) 
 def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem, uneven: float, names: list[str]) -> None:
     """Freedoms that can be the loss of each stretch of time by itself: nearly of one law in all, and by far not."""
     base = slower.predict_all(slower.start())
-    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=3e4)]) - base
+    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=1e5)]) - base
     stretch = np.arange(loss.size) * 16 // loss.size
     pieces = np.where(stretch[:, None] == np.arange(16), loss[:, None], 0.0)
     torque = pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))

@@ -16,6 +16,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.loudness import FORM_LEFT, beyond_calibration, form_energy, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search.compare import needed
 from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.trial import cost
@@ -105,11 +106,18 @@ def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> Le
 
 
 def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
-    """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells."""
-    pattern = done.found.pattern
+    """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells.
+
+    It must take as much of what is fitted as a name: freedoms that explain all of that may still err on what is held out, where they
+    had no such places or ways, and a pattern make up for it.
+    """
+    pattern, baseline = done.found.pattern, done.found.baseline
     if final.effects or pattern is None:
         return None, 0.0
-    before = cost(done.problem, done.found.baseline, done.held)
+    taken = cost(done.problem, baseline, done.fitted) - pattern.cost(done.problem, done.fitted)
+    if taken < needed(done.problem, baseline, done.fitted):
+        return None, 0.0
+    before = cost(done.problem, baseline, done.held)
     after = pattern.cost(done.problem, done.held)
     if before - after < FORM_LEFT * form_energy(done.problem, final, done.held):
         return None, 0.0

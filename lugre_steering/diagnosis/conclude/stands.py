@@ -15,8 +15,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
 from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names, room_for_laws
 from lugre_steering.diagnosis.result import Verdict
-from lugre_steering.fitting.clocks import LONGEST_S
-from lugre_steering.fitting.fit import Fit
+from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.problem import is_rig
 from lugre_steering.fitting.sheet import LEVELS, at_bounds
 
@@ -79,7 +78,7 @@ def _tested(done: Finished, seed: int) -> _Tested:
     beside_form = done.needs_form and not any(item.in_place for item in found.found)
     if found.found and beside_form and judged.gain > -CONTRADICTED:
         beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
-    clock = _clocks_alone(found.final, len(problem.runs))
+    clock = _clocks_alone(done)
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     better = judged.gain > -CONTRADICTED and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
@@ -116,11 +115,12 @@ def _left(done: Finished, named: bool) -> LeftOver:
     return left_over(done.compared, there.final if named else there.baseline, done.needs_form)
 
 
-def _clocks_alone(final: Fit, bags: int) -> bool:
-    """Whether all that was found is what two clocks may be apart in one recording; what all of several show is the machine's."""
-    return bool(final.effects) and all(
-        "delay" in candidate.effect.hooks
-        and abs(candidate.effect.law("delay", values)) < LONGEST_S
-        and (bags == 1 or candidate.bags is not None)
-        for candidate, values in final.effects
-    )
+def _clocks_alone(done: Finished) -> bool:
+    """Whether all that was found is what two clocks may be apart in one recording; what all of several show is the machine's, unless it is
+    no more than clocks may still be apart beside a law of another form."""
+    final, several = done.found.final, len(done.problem.runs) > 1
+    for candidate, values in final.effects:
+        longest = LONGEST_S if not several or candidate.bags is not None else APART_S if done.needs_form else 0.0
+        if "delay" not in candidate.effect.hooks or abs(candidate.effect.law("delay", values)) >= longest:
+            return False
+    return bool(final.effects)

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
     clearest,
@@ -84,7 +83,7 @@ def search(
     problem: Problem, noise: Noise, split: Split, baseline: Fit, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[Problem, Search]:
     """Add names one at a time while the best of those proposed takes more than the doubts; with the problem that this led to."""
-    weight, held = (np.where(part, 1.0 / noise.sigma, 0.0) for part in (split.fit, split.held))
+    weight = np.where(split.fit, 1.0 / noise.sigma, 0.0)
     found, current = _given(problem, noise, weight, baseline, progress)
     now, current = settled(problem, weight, current)
     found = [_told(item, _rivals(now, noise, weight, split, current, item, i)) for i, item in enumerate(found)]
@@ -96,7 +95,7 @@ def search(
         further = len(found) > given
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
-        step = _step(seen, current, found[given:], weight, held, split, progress)
+        step = _step(seen, current, found[given:], weight, split, progress)
         if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
             break
         there, both = step.problem, [*found, step.name]
@@ -140,14 +139,12 @@ class _Step(NamedTuple):
 
 
 def _step(
-    seen: Sequence[Proposal], current: Fit, names: Sequence[Found], weight: Array, held: Array, split: Split,
-    progress: Callable[[str], None],
+    seen: Sequence[Proposal], current: Fit, names: Sequence[Found], weight: Array, split: Split, progress: Callable[[str], None]
 ) -> _Step | None:
-    """The best of what is proposed beside ``current``, unless it takes far too little; ``names``: those that stand there; ``held`` (n,):
-    ``weight`` of the samples that are held out."""
+    """The best of what is proposed beside ``current``, unless it takes far too little; ``names``: those that stand there."""
     there, best = clearest(weight, seen)
     stands = may_differ(seen[0].problem, current, [item.gain for item in names])
-    instead = None if names else _in_place_of_form(seen, weight, held)
+    instead = None if names else _in_place_of_form(seen, weight)
     named = bool(best.effects[len(current.effects) :])
     step = None
     if named and _taken(there, weight, current, best) >= HOPELESS * needed(there, best, weight, stands):
@@ -227,17 +224,15 @@ def _as_far_as_it_may(current: Fit, names: int) -> bool:
     return False
 
 
-def _in_place_of_form(seen: Sequence[Proposal], weight: Array, held: Array) -> Proposal | None:
-    """The round without freedoms, if one name does there nearly all that the freedoms do without it, and explains nearly all on what
-    is held out: a name that imitates another friction law on some sweeps fails on others."""
+def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
+    """The round without freedoms, if one name does there nearly all that the freedoms do without it."""
     free, exact = seen[0], seen[-1]
     if free is exact or not exact.trials or not exact.problem.bends.shape[1]:
         return None
     best = exact.trials[0]
     if exact.before - best.cost < needed(exact.problem, best.fit, weight):
         return None
-    holds = excess(exact.problem, best.fit, held) < REST * excess(exact.problem, exact.current, held)
-    return exact if holds and best.cost - free.before < REST * (exact.before - free.before) else None
+    return exact if best.cost - free.before < REST * (exact.before - free.before) else None
 
 
 def _simplest(exact: Proposal, weight: Array, split: Split) -> tuple[Problem, Fit, Found]:
