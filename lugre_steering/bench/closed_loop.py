@@ -240,7 +240,7 @@ def draw(runs: list[Run], file: Path, made: Provenance) -> None:
         for ax, words in zip(axes[:, 0], titles, strict=True):
             ax.set_ylabel(words)
             ax.set_xlabel("time (s)")
-        axes[0, 0].legend(loc="upper right", fontsize=8)
+        axes[0, 0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)  # curves are everywhere inside
 
 
 def run(argv: list[str]) -> None:

@@ -9,7 +9,6 @@ import secrets
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timezone
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ from lugre_steering.proof.scoreboard import board
 from lugre_steering.provenance import source
 from lugre_steering.resources import config_folder
 from lugre_steering.serialise import plain
+from lugre_steering.version import __version__
 
 SIMULATORS = {"2": (2,), "3": (3,), "all": (2, 3)}
 QUICK_BUDGET_S = 225.0
@@ -94,11 +94,7 @@ def _chosen(seed: int, simulator: str, kinds: str | None, cases: str | None, qui
 
 
 def _versions() -> dict[str, str]:
-    try:
-        own = version("lugre_steering")
-    except PackageNotFoundError:
-        own = "source"
     return {
-        "lugre_steering": own, "python": platform.python_version(),
+        "lugre_steering": __version__, "python": platform.python_version(),
         "numpy": numpy.__version__, "scipy": scipy.__version__, "numba": numba.__version__,
     }  # fmt: skip
