@@ -54,11 +54,11 @@ class Provenance:
 
 
 def provenance(
-    command: str, options: Mapping[str, Any], vehicle: Path | None = None, bags: Sequence[Path] = ()
+    command: str, options: Mapping[str, Any], vehicle: Path | Source | None = None, bags: Sequence[Path] = ()
 ) -> Provenance:
-    """Of a result that ``command`` makes now from these files."""
+    """Of a result that ``command`` makes now from these files; ``vehicle`` as it was when it was read, if that was before."""
     date = _now().isoformat(timespec="seconds")
-    sheet = source(vehicle) if vehicle is not None else None
+    sheet = source(vehicle) if isinstance(vehicle, Path) else vehicle
     return Provenance(f"lugre_steering {__version__}", command, date, plain(options), sheet, tuple(map(source, bags)))
 
 
@@ -72,6 +72,11 @@ def source(path: Path) -> Source:
     """A file, or a folder with all files in it; one that cannot be read has no hash, as it was not used either."""
     files = [path] if path.is_file() else sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else []
     return Source(str(path), {file.name: digest for file in files if (digest := _sha256(file)) is not None})
+
+
+def hashed(file: Path) -> str:
+    """A single file with its hash, as one of the options."""
+    return f"{file} sha256 {source(file).sha256.get(file.name)}"
 
 
 def _sha256(file: Path) -> str | None:

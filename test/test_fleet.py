@@ -39,7 +39,7 @@ from lugre_steering.fleet.result import Fleet
 from lugre_steering.fleet.run import run
 from lugre_steering.fleet.tables import KINDS
 from lugre_steering.fleet.together import Together
-from lugre_steering.fleet.told import told
+from lugre_steering.fleet.told import folder_of, told
 from lugre_steering.fleet.vehicles import member_of, read_members
 from lugre_steering.fleet.work import FleetOptions, Task, process
 from lugre_steering.resources import config_folder
@@ -326,6 +326,8 @@ def test_the_page_begins_with_what_an_engineer_acts_on(tmp_path: Path, monkeypat
         assert words in first
     assert not {name for name in CATALOGUE if "_" in name and name in re.sub("<script.*", "", page, flags=re.DOTALL)}
     assert "'bags/seven 1'" in page.replace("&#x27;", "'")  # the command to look closer, as a shell takes it
+    assert "--out diagnosis_seven<" in page
+    assert folder_of("test vehicle, front axle (7/9)") == "diagnosis_test_vehicle_front_axle_7_9"
     result = json.loads((tmp_path / "out" / "fleet.json").read_text())
     jsonschema.validate(result, schema_of(Fleet))
     made = result["provenance"]

@@ -101,6 +101,9 @@ def test_recordings_tell_it(out: Path, tmp_path: Path) -> None:
     ):
         done = CliRunner().invoke(app, [str(argument) for argument in arguments])
         assert done.exit_code == 0, done.output
+    proposed = mapped.read_text()
+    assert f"# lugre_steering {lugre_steering.__version__} import --propose" in proposed
+    assert sha256(table) in proposed
     for folder, told in (
         (tmp_path / "synthetic_chirp", ("simulate", "seed = 3", "yaw_inertia:inertia=500", sha256(VEHICLE_FILE))),
         (tmp_path / "imported", ("import", sha256(table), sha256(mapped))),
@@ -123,3 +126,9 @@ def test_pictures_of_simulations_sheets_and_effects_tell_it(tmp_path: Path) -> N
         with image.open(tmp_path / command[0] / name) as picture:
             assert f"lugre_steering {lugre_steering.__version__} {command[0]}" in picture.info["Comment"]
             assert VEHICLE_FILE not in command or sha256(VEHICLE_FILE) in picture.info["Comment"]
+
+
+def test_a_vehicle_file_that_was_begun_tells_it(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["vehicle", str(tmp_path / "own.yaml"), "--new", "--yes"])
+    assert done.exit_code == 0, done.output
+    assert f"# lugre_steering {lugre_steering.__version__} vehicle --new, 20" in (tmp_path / "own.yaml").read_text()

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from lugre_steering.bench.neighbour import Strokes
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError
+from lugre_steering.provenance import provenance
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
 from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, Watch, weigh
@@ -23,6 +24,7 @@ from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, read_windo
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
 VEHICLE = load(FILE)
+MADE = provenance("node", {"watch_before_s": 30.0}, FILE)
 T0 = 1_790_000_000_000_000_000
 
 
@@ -85,7 +87,7 @@ def filled(seconds: float) -> SampleRing:
 
 def test_a_window_comes_back_as_it_was_written(tmp_path: Path) -> None:
     file = tmp_path / "window.npz"
-    write_window(file, VEHICLE, "marked", filled(3.0).since(T0 + 1_000_000_000))
+    write_window(file, VEHICLE, "marked", filled(3.0).since(T0 + 1_000_000_000), MADE)
     window = read_window(file, VEHICLE.channels)
     assert window.reason == "marked"
     assert window.recording.start_ns == T0 + 1_000_000_000
@@ -107,7 +109,7 @@ def test_the_ring_keeps_the_latest() -> None:
 
 def test_bad_windows_are_refused_in_words(tmp_path: Path) -> None:
     file = tmp_path / "window.npz"
-    write_window(file, VEHICLE, "marked", filled(1.0).since(0))
+    write_window(file, VEHICLE, "marked", filled(1.0).since(0), MADE)
     whole = file.read_bytes()
     for content in (b"", b"no window", whole[: len(whole) // 2], whole[:200] + bytes(100) + whole[300:]):
         file.write_bytes(content)
@@ -133,7 +135,7 @@ def test_bad_windows_are_refused_in_words(tmp_path: Path) -> None:
 
 def test_diagnose_reads_a_window(tmp_path: Path) -> None:
     file = tmp_path / "window.npz"
-    write_window(file, VEHICLE, "marked", filled(4.0).since(0))
+    write_window(file, VEHICLE, "marked", filled(4.0).since(0), MADE)
     arguments = ["diagnose", "--vehicle", str(FILE), "--out", str(tmp_path / "out"), "--no-report"]
     done = CliRunner().invoke(app, [*arguments, "--window", str(file)])
     assert done.exit_code == 0, done.output

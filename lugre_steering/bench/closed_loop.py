@@ -34,6 +34,7 @@ from lugre_steering.proof.field.hidden import IN_SERVICE
 from lugre_steering.proof.field.hydraulics import gains
 from lugre_steering.proof.field.motion import strokes
 from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
+from lugre_steering.provenance import Provenance, provenance
 from lugre_steering.recording import NODE, Array
 from lugre_steering.simulate.plant import with_effects
 from lugre_steering.vehicle import Vehicle, load, save
@@ -225,21 +226,21 @@ def campaign(seed: int, seconds: float) -> list[Run]:
     return runs
 
 
-def draw(runs: list[Run], file: Path) -> None:
+def draw(runs: list[Run], file: Path, made: Provenance) -> None:
     """The picture: wanted angle, torque fed forward, tracking error."""
     from lugre_steering.report.style import SERIES, figure
 
-    with figure(3, 1, "Closed loop with the live node: what feed-forward is worth", file) as axes:
+    with figure(3, 1, "Closed loop with the live node: what feed-forward is worth", file, made=made) as axes:
         axes[0, 0].plot(runs[0].time, np.degrees(runs[0].wanted), color="black")
         for run_, colour in zip(runs, SERIES, strict=True):
             axes[1, 0].plot(run_.time, 1e-3 * run_.torque, color=colour, linewidth=1.0)
             axes[2, 0].plot(run_.time, run_.error_deg, color=colour, linewidth=1.0)
             axes[0, 0].plot([], [], color=colour, label=f"{run_.feed_forward}: {run_.rms_deg:.2f} deg")
-        titles = "wanted angle [deg]", "torque fed forward, left [kN m]", "tracking error, left [deg]"
+        titles = "wanted angle (deg)", "torque fed forward, left (kN m)", "tracking error, left (deg)"
         for ax, words in zip(axes[:, 0], titles, strict=True):
             ax.set_ylabel(words)
             ax.set_xlabel("time (s)")
-        axes[0, 0].legend(loc="upper right", fontsize=8)
+        axes[0, 0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)  # curves are everywhere inside
 
 
 def run(argv: list[str]) -> None:
@@ -253,7 +254,8 @@ def run(argv: list[str]) -> None:
     os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
     runs = campaign(options.seed, options.seconds)
     if options.out is not None:
-        draw(runs, options.out)
+        made = provenance("bench closed_loop", {"seed": options.seed, "seconds": options.seconds})
+        draw(runs, options.out, made)
     if options.json:
         shown = ("feed_forward", "rms_deg", "peak_deg", "energy_kJ", "reversals", "late")
         json.dump([{key: asdict(run_)[key] for key in shown} for run_ in runs], sys.stdout, indent=2)

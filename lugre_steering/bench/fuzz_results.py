@@ -16,6 +16,7 @@ from lugre_steering.bench.replay import VEHICLE
 from lugre_steering.estimator import Estimator
 from lugre_steering.estimator.state_file import read_state, write_state
 from lugre_steering.files import read_record
+from lugre_steering.provenance import provenance
 from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.watch.window import SAMPLE, read_window, write_window
 
@@ -38,7 +39,7 @@ def corpus(folder: Path) -> None:
         estimator.push(channel, stamp_ns, angle)
         samples[i] = channel, stamp_ns, angle, np.nan
     write_state(folder / _STATE, vehicle, estimator.memory)
-    write_window(folder / _WINDOW, vehicle, "torque", samples)
+    write_window(folder / _WINDOW, vehicle, "torque", samples, provenance("node", {}))
     (folder / _RECORD).write_text('{"schema": "record/1", "values": [1.0, 2.0, {"a": "b"}]}', encoding="utf-8")
 
 

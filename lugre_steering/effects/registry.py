@@ -30,7 +30,7 @@ from lugre_steering.effects.declared import check_declared
 from lugre_steering.effects.entry import STAGES, Effect
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
-from lugre_steering.provenance import Provenance, provenance
+from lugre_steering.provenance import Provenance, Source, provenance
 
 GROUP = "lugre_steering.effects"
 VARIABLE = "LUGRE_STEERING_EFFECTS"
@@ -134,7 +134,7 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
     _sort()
 
 
-def made(command: str, options: Mapping[str, Any], vehicle: Path | None, bags: Sequence[Path]) -> Provenance:
+def made(command: str, options: Mapping[str, Any], vehicle: Path | Source | None, bags: Sequence[Path] = ()) -> Provenance:
     """How a result of these files came about, foreign physics included."""
     foreign = {effect_id: f"{origin.source} sha256 {origin.sha256}" for effect_id, origin in ORIGINS.items()}
     return provenance(command, {**options, **({"effects": foreign} if foreign else {})}, vehicle, bags)

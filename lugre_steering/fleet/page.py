@@ -89,7 +89,7 @@ def _acting(fleet: Fleet) -> str:
 def _numbers(fleet: Fleet) -> list[tuple[str, str, str]]:
     hours = sum(vehicle.hours for vehicle in fleet.vehicles)
     return [
-        ("recordings used", str(sum(vehicle.recordings for vehicle in fleet.vehicles)), f"{words.number(hours, 3)} h"),
+        ("recordings used", str(sum(vehicle.recordings for vehicle in fleet.vehicles)), f"{hours:.2f} h"),
         ("in quarantine", str(len(fleet.quarantine)), "reasons below" if fleet.quarantine else ""),
         ("worked on in this run", str(fleet.examined), f"{fleet.cached} known from earlier runs"),
     ]
@@ -213,7 +213,7 @@ def _outliers(fleet: Fleet) -> str:
 
 def _vehicles(fleet: Fleet) -> str:
     rows = [
-        (text(one.name), str(one.recordings), str(one.quarantined), text(words.number(one.hours, 3)), dated(day(one.first)),
+        (text(one.name), str(one.recordings), str(one.quarantined), text(f"{one.hours:.2f}"), dated(day(one.first)),
          dated(day(one.last)), text("-" if one.median_rmse_Nm is None else words.torque(one.vehicle, one.median_rmse_Nm)),
          text(", ".join(f"{VERDICTS[verdict][0].lower() if verdict in VERDICTS else verdict}: {count}"
                         for verdict, count in one.verdicts.items()) or "-"))

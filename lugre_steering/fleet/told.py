@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -109,9 +110,13 @@ def commands(fleet: Fleet) -> dict[str, str]:
         bags = together[0].bags if together else [claim.bag for claim in one.claims if claim.kind == "recording"][:MOST_TOGETHER]
         if bags and one.vehicle not in found:
             (file,) = (vehicle.file for vehicle in fleet.vehicles if vehicle.name == one.vehicle)
-            out = f"diagnosis_{one.vehicle.replace('/', '_')}"
-            found[one.vehicle] = shlex.join(["lugre-steering", "diagnose", *bags, "--vehicle", file, "--out", out])
+            found[one.vehicle] = shlex.join(["lugre-steering", "diagnose", *bags, "--vehicle", file, "--out", folder_of(one.vehicle)])
     return found
+
+
+def folder_of(vehicle: str) -> str:
+    """A folder for the diagnosis of a vehicle, whatever it is called, that a shell takes without quotes."""
+    return re.sub(r"\W+", "_", f"diagnosis {vehicle}").strip("_")
 
 
 def _sheet(fleet: Fleet, name: str) -> Vehicle:

@@ -21,6 +21,7 @@ from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.table import Table
 from lugre_steering.importing.words import WORDS, tells, unit_in
+from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
 _FEW = 5
@@ -301,7 +302,9 @@ def _map_text(
     table: Table,
 ) -> str:
     """The map, with the reasons as comments."""
-    lines = [f"# Proposed for {_flat(file.name)}. Check every line: names and units are guesses.", f"schema: {SCHEMA}"]
+    lines = [f"# Proposed for {_flat(file.name)}. Check every line: names and units are guesses."]
+    lines += [f"# {_flat(line)}" for line in provenance("import --propose", {"table": hashed(file)}).lines()]
+    lines.append(f"schema: {SCHEMA}")
     lines += [f"# {_flat(reason)}" for reason in reasons]
     default = asdict(Csv())
     if changed := {key: _plain(value) for key, value in asdict(options).items() if value != default[key]}:

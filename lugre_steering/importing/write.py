@@ -22,7 +22,7 @@ from lugre_steering.importing.channels import Imported, read_channels
 from lugre_steering.importing.map import Clock, ImportMap, load_map
 from lugre_steering.importing.plausible import check_units, doubts
 from lugre_steering.importing.read import read_table
-from lugre_steering.provenance import MADE, provenance, source
+from lugre_steering.provenance import MADE, hashed, provenance
 from lugre_steering.recording import IntArray
 from lugre_steering.vehicle import Topics, TorqueSensor
 
@@ -40,8 +40,7 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
     stamps = {name: _stamps(file, map_file, mapping, channel) for name, channel in channels.items()}
     messages = {name: _messages(channel, stamps[name]) for name, channel in channels.items()}
     logged = _log_times(mapping, channels, stamps)
-    hashes = {part: f"{path} sha256 {source(path).sha256.get(path.name)}" for part, path in (("table", file), ("map", map_file))}
-    origin = provenance("import", {**hashes, "storage": storage})
+    origin = provenance("import", {"table": hashed(file), "map": hashed(map_file), "storage": storage})
     marks = {"imported_from": file.name, "import_map": map_file.name, MADE: "\n".join(origin.lines())}
     with (
         staged(out) as folder,

@@ -15,12 +15,14 @@ from rclpy.node import Node
 
 from lugre_steering.chain.cache import tell_compiling
 from lugre_steering.chain.step import Records
+from lugre_steering.effects.registry import made
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.doubt import INPUTS
 from lugre_steering.live.health import Health
 from lugre_steering.live.inputs import Inputs
 from lugre_steering.live.outputs import Outputs
 from lugre_steering.live.parameters import Settings
+from lugre_steering.provenance import source
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.watch import detector
@@ -44,6 +46,7 @@ class Session:
         latency_window: int,
     ) -> None:
         self.settings, self.vehicle, self.active = settings, vehicle, False
+        self._sheet = source(settings.vehicle_file)  # as it was read
         tell_compiling(node.get_logger().info)
         warm_up(vehicle, settings.options)
         self.estimator = Estimator(vehicle, settings.options)
@@ -96,7 +99,7 @@ class Session:
         """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
         tell_compiling(self._node.get_logger().info)
         self.estimator = self.estimator.continued(vehicle)
-        self.vehicle = vehicle
+        self.vehicle, self._sheet = vehicle, source(self.settings.vehicle_file)
         self.watch = Watch(vehicle)
         self.health.set_vehicle(vehicle)
 
@@ -126,11 +129,12 @@ class Session:
         folder = self.settings.watch_folder
         if folder is None or self.samples is None:
             return None
+        options, sheet = {"watch_before_s": self.settings.watch_before_s}, self._sheet
         since_ns = (self.watch.since_ns or self._torque_ns) - round(self.settings.watch_before_s * 1e9)
         rows, vehicle, file = self.samples.since(since_ns), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
 
         def write() -> Path:
-            write_window(file, vehicle, reason, rows)
+            write_window(file, vehicle, reason, rows, made("node", options, sheet))
             return file
 
         return write

@@ -7,8 +7,8 @@ from __future__ import annotations
 import platform
 import secrets
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime, timezone
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,10 @@ from lugre_steering.proof import campaign
 from lugre_steering.proof.blind import source_version
 from lugre_steering.proof.journal import run_all
 from lugre_steering.proof.scoreboard import board
+from lugre_steering.provenance import source
 from lugre_steering.resources import config_folder
+from lugre_steering.serialise import plain
+from lugre_steering.version import __version__
 
 SIMULATORS = {"2": (2,), "3": (3,), "all": (2, 3)}
 QUICK_BUDGET_S = 225.0
@@ -56,15 +59,17 @@ def run(
     flags |= {f"--each {each}": each is not None, f"--kinds {kinds}": kinds is not None, f"--cases '{cases}'": cases is not None}
     command = " ".join(["lugre-steering prove --out DIR", f"--seed {seed}", *(flag for flag, given in flags.items() if given)])
     announce(f"{counted(len(chosen), 'case')}, seed {seed}; the same or an interrupted run again: {command.replace('DIR', str(out))}")
+    sheet = config_folder() / "test_vehicle.yaml"
     with output_folder(out):
         refuse_foreign([out / "scoreboard.json"])
         rows = run_all(
-            chosen, config_folder() / "test_vehicle.yaml", out / "cases.jsonl",
+            chosen, sheet, out / "cases.jsonl",
             peers=peers, budget_s=QUICK_BUDGET_S if quick else None, progress=progress,
         )  # fmt: skip
         result = board(rows, {
             "synthetic": True, "command": command, "seed": seed, "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
             "planned_cases": len(chosen), "source": source_version(), "versions": _versions(),
+            "vehicle": plain(replace(source(sheet), path=sheet.name)),
         })  # fmt: skip
         write_record(result, out / "scoreboard.json")
         try:
@@ -89,11 +94,7 @@ def _chosen(seed: int, simulator: str, kinds: str | None, cases: str | None, qui
 
 
 def _versions() -> dict[str, str]:
-    try:
-        own = version("lugre_steering")
-    except PackageNotFoundError:
-        own = "source"
     return {
-        "lugre_steering": own, "python": platform.python_version(),
+        "lugre_steering": __version__, "python": platform.python_version(),
         "numpy": numpy.__version__, "scipy": scipy.__version__, "numba": numba.__version__,
     }  # fmt: skip

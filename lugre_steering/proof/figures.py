@@ -5,16 +5,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lugre_steering.files import MAKER
 from lugre_steering.proof.scoreboard import OUTCOMES, TARGETS
+from lugre_steering.provenance import Provenance, Source
 from lugre_steering.report.style import SERIES, figure, whole_ticks
 
 Board = Mapping[str, Any]
 VERDICTS = [name for name in OUTCOMES if name not in ("right name", "wrong name", "extra name")]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How the cases of a picture came about: ``said`` below it, ``by`` inside its file."""
+
+    said: str
+    by: Provenance
 
 
 def draw_all(board: Board, folder: Path) -> list[Path]:
@@ -24,7 +35,8 @@ def draw_all(board: Board, folder: Path) -> list[Path]:
 
 def _draw_part(how: Mapping[str, Any], number: str, board: Board, folder: Path) -> list[Path]:
     cases = sum(board["cases"].values())
-    made = f"Synthetic recordings of simulator {number}, {cases} cases, diagnosed blind. Seed {how['seed']}, {how['date']}."
+    said = f"Synthetic recordings of simulator {number}, {cases} cases, diagnosed blind. Seed {how['seed']}, {how['date']}."
+    made = Origin(said, _provenance(how))
     wanted = {
         "power": (draw_power, any(power["detected"]["of"] for power in board["power"])),
         "confusion": (draw_confusion, bool(board["naming"]["confusion"])),
@@ -41,15 +53,23 @@ def _draw_part(how: Mapping[str, Any], number: str, board: Board, folder: Path) 
     return files
 
 
-def draw_power(board: Board, file: Path, made: str) -> None:
+def _provenance(how: Mapping[str, Any]) -> Provenance:
+    """What the board says of its own making, as far as it does."""
+    version = how.get("versions", {}).get(MAKER, "")
+    options = {name: how[name] for name in ("command", "seed", "source") if name in how}
+    sheet = Source(**how["vehicle"]) if "vehicle" in how else None
+    return Provenance(f"{MAKER} {version}".strip(), "prove", how["date"], options, sheet, ())
+
+
+def draw_power(board: Board, file: Path, made: Origin) -> None:
     """Share detected and share rightly named against effect-to-noise ratio, with 95 % intervals; nulls as false alarms."""
     nulls = board["nulls"]["silent"]
     alarms = "" if nulls["share"] is None else f" False alarms on nulls: {nulls['of'] - nulls['hits']} of {nulls['of']}."
     caption = (
         "Bars: 95 % Wilson intervals. The ratio is the variance an effect adds to the torque after the baseline is recalibrated, over the "
-        f"variance of the measurement noise.{alarms}\n{made}"
+        f"variance of the measurement noise.{alarms}\n{made.said}"
     )
-    with figure(1, 1, caption, file, row_inches=4.0, width=8.0) as axes:
+    with figure(1, 1, caption, file, made=made.by, row_inches=4.0, width=8.0) as axes:
         axis = axes[0, 0]
         curves = {
             "detected": [power["detected"] for power in board["power"]],
@@ -71,7 +91,7 @@ def draw_power(board: Board, file: Path, made: str) -> None:
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)  # bars may be anywhere inside
 
 
-def draw_confusion(board: Board, file: Path, made: str) -> None:
+def draw_confusion(board: Board, file: Path, made: Origin) -> None:
     """True effect against answer."""
     table = board["naming"]["confusion"]
     given = {answer for row in table.values() for answer in row}
@@ -81,9 +101,9 @@ def draw_confusion(board: Board, file: Path, made: str) -> None:
     counts = np.array([[table[row].get(column, 0) for column in columns] for row in rows])
     caption = (
         "Effects at a ratio of 0.3 and above. A row is what was hidden, a column what was answered; 'right tie' means that the truth is "
-        f"among the names the engine says it cannot tell apart. A dot marks the right column.\n{made}"
+        f"among the names the engine says it cannot tell apart. A dot marks the right column.\n{made.said}"
     )
-    with figure(1, 1, caption, file, row_inches=0.24 * len(rows) + 2.2, width=max(0.3 * len(columns) + 4.0, 7.0)) as axes:
+    with figure(1, 1, caption, file, made=made.by, row_inches=0.24 * len(rows) + 2.2, width=max(0.3 * len(columns) + 4.0, 7.0)) as axes:
         right = [["right tie", row] if row in board["effects"] and row not in _unlisted(board) else ["unlisted"] for row in rows]
         shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
         _matrix(axes[0, 0], shares, [[str(n) if n else "" for n in row] for row in counts])
@@ -95,13 +115,13 @@ def draw_confusion(board: Board, file: Path, made: str) -> None:
         axes[0, 0].set(title="What was hidden and what was answered", xlabel="answer", ylabel="truth")
 
 
-def draw_location(board: Board, file: Path, made: str) -> None:
+def draw_location(board: Board, file: Path, made: Origin) -> None:
     """Histogram of intersection over union."""
     caption = (
         "Time in which the effect acts by more than 5 % of its largest torque, true against reported, for effects that act in less than "
-        f"60 % of the time.\n{made}"
+        f"60 % of the time.\n{made.said}"
     )
-    with figure(1, 1, caption, file, row_inches=3.2, width=7.0) as axes:
+    with figure(1, 1, caption, file, made=made.by, row_inches=3.2, width=7.0) as axes:
         axes[0, 0].hist(board["location"]["values"], np.linspace(0.0, 1.0, 21), color=SERIES[0])
         whole_ticks(axes[0, 0].yaxis)
         axes[0, 0].axvline(TARGETS["location_iou"].value, color="k", linestyle="--", label="target")
@@ -109,11 +129,11 @@ def draw_location(board: Board, file: Path, made: str) -> None:
         axes[0, 0].legend()
 
 
-def draw_parameters(board: Board, file: Path, made: str) -> None:
+def draw_parameters(board: Board, file: Path, made: Origin) -> None:
     """Median and quartiles of the relative error of each parameter."""
     errors = board["parameters"]["error"]
-    caption = f"Dot: median; line: quartiles; number: cases. Only parameters that mean the same in both laws.\n{made}"
-    with figure(1, 1, caption, file, row_inches=0.22 * len(errors) + 1.0, width=8.0) as axes:
+    caption = f"Dot: median; line: quartiles; number: cases. Only parameters that mean the same in both laws.\n{made.said}"
+    with figure(1, 1, caption, file, made=made.by, row_inches=0.22 * len(errors) + 1.0, width=8.0) as axes:
         for i, entry in enumerate(errors.values()):
             axes[0, 0].plot(np.maximum(entry["quartiles"], 1e-3), [i, i], color=SERIES[0])
             axes[0, 0].plot(max(entry["median"], 1e-3), i, "o", color=SERIES[0])
@@ -124,7 +144,7 @@ def draw_parameters(board: Board, file: Path, made: str) -> None:
         axes[0, 0].set_title("Parameters against the truth (dashed: 10 %)")
 
 
-def draw_effects(board: Board, file: Path, made: str) -> None:
+def draw_effects(board: Board, file: Path, made: Origin) -> None:
     """Every effect at every size and in every disguise: how many were answered rightly."""
     effects = board["effects"]
     cells = list(next(iter(effects.values()))["right"])
@@ -132,19 +152,19 @@ def draw_effects(board: Board, file: Path, made: str) -> None:
     texts = [[f"{right}/{of}" if of else "" for right, of in entry["right"].values()] for entry in effects.values()]
     caption = (
         "Right name or tie (unlisted physics: called unlisted) of all cases; columns: effect-to-noise ratio after recalibration, then "
-        f"disguises.\n{made}"
+        f"disguises.\n{made.said}"
     )
-    with figure(1, 1, caption, file, row_inches=0.24 * len(effects) + 1.2, width=8.0) as axes:
+    with figure(1, 1, caption, file, made=made.by, row_inches=0.24 * len(effects) + 1.2, width=8.0) as axes:
         _matrix(axes[0, 0], shares, texts)
         axes[0, 0].set_xticks(range(len(cells)), cells, fontsize=8.5)
         axes[0, 0].set_yticks(range(len(effects)), list(effects), fontsize=7.5)
         axes[0, 0].set_title("Effect by effect")
 
 
-def draw_peers(board: Board, file: Path, made: str) -> None:
+def draw_peers(board: Board, file: Path, made: Origin) -> None:
     """Error removed against false alarms for every method."""
-    caption = f"Held-out error removed: median over effects at a ratio of 0.3 and above. False alarms: share of nulls.\n{made}"
-    with figure(1, 1, caption, file, row_inches=3.6, width=7.0) as axes:
+    caption = f"Held-out error removed: median over effects at a ratio of 0.3 and above. False alarms: share of nulls.\n{made.said}"
+    with figure(1, 1, caption, file, made=made.by, row_inches=3.6, width=7.0) as axes:
         for k, (name, entry) in enumerate(board["peers"].items()):
             x, y = entry["false_alarms"]["share"], entry["removed"]["median"]
             if x is not None and y is not None:

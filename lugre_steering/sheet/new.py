@@ -16,7 +16,8 @@ from typing import Any
 import yaml
 
 from lugre_steering.errors import DataError, VehicleFileError
-from lugre_steering.files import read_text, write_text
+from lugre_steering.files import comments, read_text, write_text
+from lugre_steering.provenance import provenance
 from lugre_steering.resources import config_folder
 from lugre_steering.schema import Reader, meanings_of, section_in, unit_of
 from lugre_steering.vehicle import Vehicle, from_mapping, pavements
@@ -75,8 +76,11 @@ def begin_sheet(file: Path, ask: Ask, say: Say) -> list[Path]:
     if kind == "tracks":
         write_text(read_text(Path(sheet["rubber"]["dma_csv"]), LONGEST_TABLE), table)
         sheet["rubber"]["dma_csv"] = table.name
-    begun = "# Vehicle sheet, begun by 'lugre-steering vehicle --new'; check it with 'lugre-steering vehicle FILE'."
-    write_text("\n".join([begun, *_lines(sheet, Vehicle), ""]), file)
+    begun = comments([
+        "Vehicle sheet, begun by 'lugre-steering vehicle --new'; check it with 'lugre-steering vehicle FILE'.",
+        *provenance("vehicle --new", {}).lines(),
+    ])  # fmt: skip
+    write_text(begun + "\n".join([*_lines(sheet, Vehicle), ""]), file)
     return [file, table] if kind == "tracks" else [file]
 
 

@@ -16,7 +16,9 @@ import numpy as np
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
 from lugre_steering.files import replacing
+from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Channel, IntArray, Kind, Recording, Signal
+from lugre_steering.serialise import plain
 from lugre_steering.vehicle import Vehicle
 
 SCHEMA = "lugre_steering/window/1"
@@ -55,9 +57,12 @@ def _label(channel: Channel) -> str:
     return f"{channel.kind.name.lower()}/{channel.name}"
 
 
-def write_window(file: Path, vehicle: Vehicle, reason: str, samples: Records) -> None:
-    """Write samples and reason; ``OSError`` if that is not possible."""
-    about = {"schema": SCHEMA, "vehicle": vehicle.name, "reason": reason, "channels": [_label(channel) for channel in vehicle.channels]}
+def write_window(file: Path, vehicle: Vehicle, reason: str, samples: Records, made: Provenance) -> None:
+    """Write samples, reason and how the window came about; ``OSError`` if that is not possible."""
+    about = {
+        "schema": SCHEMA, "vehicle": vehicle.name, "reason": reason, "channels": [_label(channel) for channel in vehicle.channels],
+        "provenance": plain(made),
+    }  # fmt: skip
     with replacing(file) as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), samples=samples)
 

@@ -4,13 +4,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
-from live_harness import NAME, Driver, LiveNode, World, call
+from live_harness import NAME, VEHICLE, Driver, LiveNode, World, call
 from std_srvs.srv import Trigger
 
 from lugre_steering.watch.window import read_window
@@ -21,9 +24,13 @@ def test_a_marked_window_is_written(tmp_path: Path) -> None:
         Driver(world).steer(2.0)
         answer = call(world, Trigger, f"{NAME}/mark", Trigger.Request())
         assert answer.success, answer.message
-        recording = read_window(Path(answer.message), world.vehicle.channels).recording
+        file = Path(answer.message)
+        recording = read_window(file, world.vehicle.channels).recording
         assert recording.angle["left"].value.size == 200
         assert recording.angle["right"].value.size == 200
+    made = json.loads(str(np.load(file)["about"]))["provenance"]
+    assert (made["command"], made["options"]) == ("node", {"watch_before_s": 60.0})
+    assert made["vehicle"]["sha256"] == {VEHICLE.name: hashlib.sha256(VEHICLE.read_bytes()).hexdigest()}
 
 
 def test_without_a_folder_there_is_none() -> None:

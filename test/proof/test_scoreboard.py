@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -251,7 +252,8 @@ def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
         {**row(["slope_bias"], FOUND, effect("slope_bias")), "peers": {"SINDy ensemble": entry}},
         {**row([], "consistent", kind="null"), "peers": {"SINDy ensemble": entry}},
     ]
-    board = scoreboard.board(rows, {"seed": 1, "date": "2026-01-01"})
+    how = {"seed": 1, "date": "2026-01-01", "vehicle": {"path": "test_vehicle.yaml", "sha256": {"test_vehicle.yaml": "ab12"}}}
+    board = scoreboard.board(rows, how)
     part = board["simulators"]["2"]
     peer = part["peers"]["SINDy ensemble"]
     assert peer["removed"]["median"] == pytest.approx(0.5)
@@ -259,11 +261,16 @@ def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
     assert peer["named"]["share"] == 1.0
     assert part["peers"]["lugre_steering"]["false_alarms"]["share"] == 0.0
     pytest.importorskip("matplotlib")
+    from PIL import Image
+
     from lugre_steering.proof.figures import draw_all
 
     files = draw_all(board, tmp_path)
     assert {file.stem for file in files} == {f"proof_{name}" for name in ("power", "confusion", "location", "effects", "peers")}
     assert all(file.stat().st_size > 5000 for file in files)
+    for file in files:
+        with Image.open(file) as picture:
+            assert re.search(r"prove, 2026-01-01\noptions: seed = 1\nvehicle .*ab12$", picture.info["Comment"])
 
 
 @pytest.mark.parametrize("simulator", [2, 3])
