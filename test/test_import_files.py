@@ -55,7 +55,7 @@ def test_metadata_several_header_rows_a_header_that_comes_again_and_a_footer(tmp
     found = read_table(file, Csv(**options, allow=("text_rows",)))
     assert (list(found.column("t")), list(found.column("angle"))) == ([0.0, 1.0, 2.0], [1.0, 2.0, 3.0])
     assert found.left_out == {"repeated header rows": 1, "rows without a number": 2}
-    assert found.units["angle"] == "[deg] raw"
+    assert found.titles["angle"] == ("[deg]", "raw")
 
 
 def test_names_in_the_second_header_row_and_the_same_name_twice(tmp_path: Path) -> None:

@@ -94,6 +94,32 @@ def test_a_logger_with_metadata_unit_row_repeated_header_short_rows_and_another_
     assert "1 repeated header rows" in found["format"]
 
 
+def test_names_between_a_row_of_groups_and_one_of_units(tmp_path: Path) -> None:
+    head = ["Run 7,,Right side,,,Weather", "Time,Angle left,Angle right,p main A,p main B,T air", "ms,mrad,mrad,kPa,kPa,K"]
+    rows = [f"{10 * i},{i % 7},{i % 5},{900 + i},{800 + i},290" for i in range(60)]
+    (tmp_path / "log.csv").write_text("\n".join([*head, *rows]))
+    found = proposal(tmp_path / "log.csv")
+    assert units(found) == {
+        "time": ("Time", "ms"), "angle/left": ("Angle left", "mrad"), "angle/right": ("Angle right", "mrad"),
+        "pressure/main_a": ("p main A", "kPa"), "pressure/main_b": ("p main B", "kPa"), "air_temperature": ("T air", "K"),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("commas", [",", ",,,"])
+def test_rows_that_end_in_more_commas_than_their_header(tmp_path: Path, commas: str) -> None:
+    rows = [f"{0.01 * i:.2f},{i % 7},{100 + i}{commas}" for i in range(60)]
+    (tmp_path / "log.csv").write_text("\n".join(["Machine 3", "t [s],angle [deg],p_cap_bar", *rows]))
+    found = proposal(tmp_path / "log.csv")
+    assert units(found) == {"time": ("t [s]", "s"), "angle/left": ("angle [deg]", "deg"), "pressure/cap": ("p_cap_bar", "bar")}
+    assert load_map(tmp_path / "map.yaml").csv.skip_rows == 1
+
+
+def test_a_stroke_is_told_to_be_no_angle_yet(tmp_path: Path) -> None:
+    found = proposal(csv_of(tmp_path, {"t [s]": T, "stroke left [mm]": 200.0 * ANGLE, "p_cap [bar]": 50.0 + T}))
+    assert list(units(found)) == ["time", "pressure/cap"]
+    assert "a length in mm: by 'pivots' or a 'polynomial' an angle" in found["unused"][0]["why"]
+
+
 def test_two_clocks_in_one_file(tmp_path: Path) -> None:
     table = tmp_path / "log.csv"
     slow = [f"{0.1 * i:.1f},{100 + i}" if i < 40 else "," for i in range(400)]

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import sqlite3
 import tempfile
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -104,8 +105,7 @@ class Bag:
 
     def _locate(self) -> list[Path]:
         """The storage files of the bag."""
-        if not os.path.exists(self.path):
-            raise BagError(f"{self.path}: no such file or folder")
+        must_exist(self.path)
         if not self.path.is_dir():
             if not self.path.is_file():
                 raise BagError(f"{self.path}: neither a file nor a folder (a pipe or device?)")
@@ -359,6 +359,16 @@ class Bag:
             if topics:
                 result[channel] = topics[0]
         return result
+
+
+def must_exist(path: Path) -> None:
+    """Refuse a bag that is not there; what is named almost like it, there, is told."""
+    if os.path.exists(path):
+        return
+    near: list[str] = []
+    with suppress(OSError):
+        near = difflib.get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
+    raise BagError(f"{path}: no such file or folder" + (f"; did you mean '{near[0]}'?" if near else ""))
 
 
 def bag_name(path: Path) -> str:

@@ -262,12 +262,12 @@ def run(arguments: list[str]) -> None:
         print(as_json({"kernel": rows}))
         return
     print("one step of one track; error: the largest, as a share of the torque range")
-    print(f"{'way':<46} {'ns/step':>11} {'/ kernel':>9} {'error':>8}")
+    print(f"{'way':<50} {'ns/step':>11} {'/ kernel':>9} {'error':>8}")
     base = float(str(rows[0]["ns_per_step_and_track"]))
     for row in rows:
         ns, error = float(str(row["ns_per_step_and_track"])), float(str(row["relative_error"]))
         shown = "-" if math.isnan(error) else f"{error:.1e}"
-        print(f"{row['name']!s:<46} {ns:>11,.1f} {ns / base:>9,.4g} {shown:>8}")
+        print(f"{row['name']!s:<50} {ns:>11,.1f} {ns / base:>9,.4g} {shown:>8}")
     print(verdict(rows))
     if not any("C loop" in str(row["name"]) for row in rows):
         print("C loop skipped: gcc not found.")

@@ -89,7 +89,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     topics = [channel.topic for channel in vehicle.channels if channel.kind is not Kind.AIR_TEMPERATURE]
     for topic, (name, signal) in zip(topics, signals.items(), strict=True):
         if signal is None or signal.time_s.size < 20:
-            found = "nothing" if signal is None else f"{signal.time_s.size} samples"
+            found = "nothing" if signal is None else f"{signal.time_s.size} samples that can be used"
             raise DataError(f"{recording.name}: {name} (topic '{topic}'): got {found}, expected at least 20 samples")
     present = {name: signal for name, signal in signals.items() if signal is not None}
     present = {name: evened(signal)[0] for name, signal in present.items()}

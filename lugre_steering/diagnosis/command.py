@@ -13,10 +13,11 @@ from typing import Any
 from lugre_steering.bag.batch import read_of_machine
 from lugre_steering.bag.find import Skipped
 from lugre_steering.bag.load import distinct
+from lugre_steering.bag.reader import must_exist
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, picture_names
 from lugre_steering.effects.registry import leaving_out, made
-from lugre_steering.errors import BagError, DataError
+from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder
 from lugre_steering.vehicle import load
 from lugre_steering.watch.window import read_window
@@ -86,8 +87,7 @@ def _check_given(bags: Sequence[Path], windows: Sequence[Path], material: float)
     if not bags and not windows:
         raise DataError("no recording is given, expected a BAG or --window FILE")
     for bag in bags:
-        if not bag.exists():
-            raise BagError(f"{bag}: no such bag, expected a rosbag2 folder or an .mcap or .db3 file")
+        must_exist(bag)
 
 
 def _write_report(result: Diagnosis, out: Path) -> None:

@@ -15,8 +15,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lugre_steering.bag.find import Skipped
+from lugre_steering.bag.reader import must_exist
 from lugre_steering.effects.registry import made
-from lugre_steering.errors import BagError, DataError
+from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, output_folder, write_record
 from lugre_steering.fleet.changes import differences
 from lugre_steering.fleet.claims import BUDGET, Claim, by_vehicle, claims, shared, unusual, worth_pooling
@@ -56,7 +57,7 @@ def run(
     """
     need_parquet()
     if bags and not any(bag.exists() for bag in bags):
-        raise BagError(f"{bags[0]}: no such file or folder")
+        must_exist(bags[0])
     options, version, begun = options or FleetOptions(), version or code_version(), time.perf_counter()
     members = read_members(vehicles)
     jobs = jobs or processors()

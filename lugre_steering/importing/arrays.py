@@ -69,7 +69,7 @@ def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
 def read_parquet(file: Path) -> Table:
     """The numbers, truth values and times (as ns) of a Parquet file."""
     parquet, arrow = optional(file, "pyarrow.parquet", "pyarrow"), optional(file, "pyarrow", "pyarrow")
-    found, units = Gathering(file), {}
+    found, titles = Gathering(file), {}
     with parquet.ParquetFile(file) as source:
         schema, metadata = source.schema_arrow, source.metadata
         if len(schema.names) > MAX_COLUMNS:
@@ -96,8 +96,8 @@ def read_parquet(file: Path) -> Table:
         for name, pieces in parts.items():
             found.columns[name] = np.concatenate(pieces) if pieces else np.empty(0)
             if arrow.types.is_temporal(schema.field(name).type):
-                units[name] = "ns"
-    return found.table(units)
+                titles[name] = ("ns",)
+    return found.table(titles)
 
 
 def _is_number(types: Any, kind: Any) -> bool:

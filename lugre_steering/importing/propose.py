@@ -192,7 +192,9 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
         side = next((side for side in ("left", "right") if tells(name, side)), None)
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
-        plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1])
+        plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1]).strip()
+        if unit_in(plain) is not None:  # 'p_left_cap_bar' is the line left_cap
+            plain = re.sub(r"[\s_]+[^\W_]+$", "", plain)
         line = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_").lower()
         line = _OF_PRESSURE.sub("", line)  # 'p main A' and 'pressure_main_a' are the line main_a of a vehicle file
         return f"pressure/{line if line[:1].isalpha() else f'line_{line}'}", "the name or unit tells of pressure"
@@ -201,12 +203,14 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
     if kind == "air_temperature":
         return kind, "the name tells of air temperature"
     none = {"command": "a command or state, nothing measured", "temperature": "a temperature, but not said to be of the air"}
+    if kind is None and (unit := _stated(table, name, ("length",))) is not None:
+        return None, f"a length in {unit}: by 'pivots' or a 'polynomial' an angle, on a linear axis the angle itself"
     return None, none.get(kind or "", "the name tells nothing known")
 
 
 def _stated(table: Table, name: str, dimensions: tuple[str, ...] | None) -> str | None:
     """The unit that the file gives, by a row of units or in the name."""
-    for text, whole in ((table.units.get(name, ""), True), (name, False)):
+    for text, whole in (*((title, True) for title in table.titles.get(name, ())), (name, False)):
         unit = unit_in(text, whole)
         if unit is not None and (dimensions is None or READABLE_UNITS[unit][0] in dimensions):
             return unit

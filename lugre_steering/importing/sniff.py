@@ -39,9 +39,10 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
     begin = _begin(rows, decimal)
     if begin is None:
         raise MapFileError(f"{file}: no row of numbers among the first {len(lines)} lines, expected a table")
-    width = Counter(len(cells) for _, cells in rows[begin:]).most_common(1)[0][0]
+    data = [cells for _, cells in rows[begin:] if _is_data(cells, decimal)]
+    widths = max(len(_filled(cells)) for cells in data), max(map(len, data))
     top = begin
-    while top > 0 and _is_title(rows[top - 1][1], width, decimal):
+    while top > 0 and _is_title(rows[top - 1][1], *widths, decimal):
         top -= 1
     header = [cells for _, cells in rows[top:begin]]
     skip = rows[top][0] - 1 if any(line.strip() and line[0] != comment for line in lines[: rows[top][0] - 1]) else 0
@@ -103,10 +104,10 @@ def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
     return None
 
 
-def _is_title(cells: Sequence[str], width: int, decimal: str) -> bool:
-    """A row of words as wide as the data; remarks of a logger are narrower."""
+def _is_title(cells: Sequence[str], numbers: int, width: int, decimal: str) -> bool:
+    """A row of words as wide as the data, whose ``numbers`` may end before their ``width``; remarks of a logger are narrower."""
     filled = [cell for cell in cells if cell.strip()]
-    wide = len(cells) >= width - 1 and 2 * len(filled) >= width and len(_filled(cells)) <= width
+    wide = len(cells) >= numbers and 2 * len(filled) >= numbers and len(_filled(cells)) <= width
     return wide and all(number(cell, decimal) is None for cell in filled)
 
 

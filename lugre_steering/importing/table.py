@@ -27,15 +27,15 @@ MAX_DEPTH = 64
 class Table:
     """Columns (n,) and single numbers of one file; columns may have different lengths.
 
-    ``unusable``: columns that hold no numbers, and why. ``units``: as the file itself gives them. ``left_out``: what was
-    not read, and how often.
+    ``unusable``: columns that hold no numbers, and why. ``titles``: what the file says of a column beside its name: other header
+    rows, the unit of its type. ``left_out``: what was not read, and how often.
     """
 
     file: Path
     columns: Mapping[str, Array]
     scalars: Mapping[str, float] = field(default_factory=dict)
     unusable: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
+    titles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     left_out: Mapping[str, int] = field(default_factory=dict)
 
     def column(self, name: str) -> Array:
@@ -102,8 +102,8 @@ class Gathering:
         if len(self.columns) + len(self.unusable) > MAX_COLUMNS:
             raise MapFileError(f"{self.file}: holds more than {MAX_COLUMNS} columns")
 
-    def table(self, units: Mapping[str, str] | None = None) -> Table:
-        return Table(self.file, self.columns, self.scalars, self.unusable, units or {})
+    def table(self, titles: Mapping[str, tuple[str, ...]] | None = None) -> Table:
+        return Table(self.file, self.columns, self.scalars, self.unusable, titles or {})
 
 
 def size_of(shape: tuple[int, ...]) -> int:

@@ -161,7 +161,7 @@ class _Columns:
             name: np.frombuffer(column, np.float64)
             for name, column in zip(self.names, self.values, strict=True) if name not in self.unusable
         }  # fmt: skip
-        return Table(self.file, columns, {}, self.unusable, self._units(), dict(self.left_out))
+        return Table(self.file, columns, {}, self.unusable, self._titles(), dict(self.left_out))
 
     def _row(self, found: Row) -> Row | None:
         """The cells of the columns; nothing if the row is to be left out."""
@@ -216,8 +216,8 @@ class _Columns:
             found.append(value)
         return found
 
-    def _units(self) -> dict[str, str]:
+    def _titles(self) -> dict[str, tuple[str, ...]]:
         """What the other header rows say; which are units is for the proposal to find out."""
         others = [row for i, row in enumerate(self.header, 1) if i != self.options.name_row]
         columns = zip(self.names, *(row + [""] * (len(self.names) - len(row)) for row in others), strict=False)
-        return {name: " ".join(filter(None, cells)) for name, *cells in columns if any(cells)}
+        return {name: tuple(filter(None, cells)) for name, *cells in columns if any(cells)}

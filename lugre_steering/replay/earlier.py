@@ -13,7 +13,7 @@ import yaml
 
 from lugre_steering import yaml_text
 from lugre_steering.bag.find import REPLAYED
-from lugre_steering.bag.reader import bag_name
+from lugre_steering.bag.reader import bag_name, must_exist
 from lugre_steering.errors import BagError
 from lugre_steering.files import is_ours, read_record, read_text
 from lugre_steering.recording import unused_name
@@ -24,8 +24,7 @@ def names_for(bags: Sequence[Path], out: Path) -> list[str]:
     """A name for the result of each bag; refuses to touch an input or anything that is not an earlier result."""
     names: list[str] = []
     for path in bags:
-        if not path.exists():
-            raise BagError(f"{path}: no such file or folder")
+        must_exist(path)
         names.append(unused_name(bag_name(path), names))
     for name in names:
         result = (out / name).resolve()

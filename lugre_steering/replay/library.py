@@ -9,9 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from lugre_steering.bag.given import Given, each, files, with_both_tracks
-from lugre_steering.bag.reader import bag_name
+from lugre_steering.bag.reader import bag_name, must_exist
 from lugre_steering.effects.registry import made
-from lugre_steering.errors import BagError
 from lugre_steering.estimator import Options
 from lugre_steering.online import Comparison
 from lugre_steering.recording import Recording, unused_name
@@ -33,10 +32,9 @@ def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, opti
         passage = Passage(path, unused_name(name, [bag.name for bag in bags]), model, timing)
         if isinstance(item, Recording):
             bags.append(passage.remember_recording(with_both_tracks(item, model.channels)))
-        elif path.exists():
-            bags.append(passage.remember())
         else:
-            raise BagError(f"{path}: no such file or folder")
+            must_exist(path)
+            bags.append(passage.remember())
         overall.merge(passage.fit)
     source = model.name if isinstance(vehicle, Vehicle) else str(vehicle)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)

@@ -245,8 +245,10 @@ def test_not_a_bag(tmp_path: Path) -> None:
         with pytest.raises(BagError, match=reason) as error:
             Bag(file)
         assert name in str(error.value)
-    with pytest.raises(BagError, match="no such file"):
+    with pytest.raises(BagError, match=r"no such file or folder$"):
         Bag(tmp_path / "absent")
+    with pytest.raises(BagError, match=r"no such file or folder; did you mean 'image\.db3'\?"):
+        Bag(tmp_path / "images.db3")
     (tmp_path / "folder").mkdir()
     with pytest.raises(BagError, match=r"no \.mcap or \.db3"):
         Bag(tmp_path / "folder")
