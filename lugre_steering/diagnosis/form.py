@@ -62,7 +62,7 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
         law = given_law(Cell(freedom.channel, Axis(freedom.coordinate), freedom.low, freedom.high), place, SMALL * f)
         return np.asarray((np.concatenate([lawful.predict(bag, x, [law]) for bag in bags]) - base) / SMALL)
 
-    shapes = [(freedom, f) for freedom in _freedoms(problem, fitted) for f in freedom.shapes]
+    shapes = [(freedom, f) for freedom in freedoms(problem, fitted) for f in freedom.shapes]
     columns = in_threads(lambda shape: column(*shape), shapes)
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
@@ -72,7 +72,8 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
     return freer.bent([still_apart(problem, base)]), words
 
 
-def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
+def freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
+    """Those of the friction law, whose sizes come first among the bends of ``bent``; of the same problem and fit the same."""
     own = {name: float(problem.model.parameters[0][0][name]) for name in ("stribeck_speed", "static_torque", "coulomb_torque", "sigma_0")}
     own |= problem.fields(fitted.x)
     presliding = own["coulomb_torque"] / own["sigma_0"]

@@ -96,6 +96,24 @@ def given_law(cell: Cell, place: int, f: Array) -> tuple[Candidate, dict[str, fl
     return Candidate(_law(cell, place, laws.TABLE, (), shape=lambda _: f)), {}
 
 
+def sized_law(cell: Cell, place: int, shapes: Array, sizes: Array, typical: float) -> tuple[Candidate, dict[str, float]]:
+    """The cell with f a sum of ``shapes`` (k, KNOTS), whose ``sizes`` (k,) are free and pulled to zero from ``typical`` on."""
+    names = [f"size_{i}" for i in range(len(shapes))]
+    parameters = [Parameter(name, "1", "size of a shape", 1.0, -1.0, 1.0, pull=1.0 / typical) for name in names]
+
+    def shape(values: Mapping[str, float]) -> Array:
+        return np.asarray(np.array([values[name] for name in names]) @ shapes)
+
+    start = dict(zip(names, (float(size) for size in sizes), strict=True))
+    return Candidate(_law(cell, place, laws.TABLE, parameters, shape=shape), free=tuple(names)), start
+
+
+def law_of(effect: Effect) -> Law:
+    """An effect of a fit that is a law."""
+    assert isinstance(effect, Law)
+    return effect
+
+
 VARIANTS: tuple[tuple[str, Mapping[str, float], tuple[str, ...]], ...] = (
     ("constant", {}, ()), ("linear", {"value": 0.0}, ()), ("linear", {}, ()),
     ("power", {}, ("exponent",)), ("hinge", {"value": 0.0, "below": 0.0}, ("at",)), ("hinge", {"value": 0.0, "above": 0.0}, ("at",)),

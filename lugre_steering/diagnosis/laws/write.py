@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.laws.cells import Traces, trace
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, Tried, cell_of
-from lugre_steering.diagnosis.laws.refine import Law
+from lugre_steering.diagnosis.laws.refine import Law, law_of
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.effects import laws
 from lugre_steering.recording import Array
@@ -49,7 +49,7 @@ def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
         first += len(candidate.free)
         if index < found.names:
             continue
-        law = _law(candidate.effect)
+        law = law_of(candidate.effect)
         cell = law.at(values)
         numbers: dict[str, float] = {}
         knots: tuple[float, ...] = ()
@@ -68,11 +68,6 @@ def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
             law_words(law, values, found.problem.vehicle), intervals, round(gain, 4),
         ))  # fmt: skip
     return tuple(made)
-
-
-def _law(effect: object) -> Law:
-    assert isinstance(effect, Law)
-    return effect
 
 
 def shown(coordinate: str, value: float, vehicle: Vehicle) -> str:
@@ -128,11 +123,11 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
     torque = 0.5 * float(np.ptp(found.problem.measured))
     made = []
     effects = found.fit.effects[found.names :]
-    cells = [_law(candidate.effect).at(values) for candidate, values in effects]
+    cells = [law_of(candidate.effect).at(values) for candidate, values in effects]
     last = len(found.problem.vehicle.laws) + MOST_LAWS - 1  # a place that is free, or that of the last law itself
     traces = trace(found.problem, found.fit, last, [cell.axis for cell in cells])
     for index, (entry, (candidate, values)) in enumerate(zip(entries(found), effects, strict=True)):
-        law = _law(candidate.effect)
+        law = law_of(candidate.effect)
         largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, found.names + index)), 99.0))
         made.append({
             "id": law.id, "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
