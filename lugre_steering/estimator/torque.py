@@ -17,7 +17,6 @@ from lugre_steering.estimator.doubt import (
     RANGE,
     TABLE,
     angle_doubts,
-    noise_of,
     re_anchor,
     standing_doubts,
     trust,
@@ -25,6 +24,7 @@ from lugre_steering.estimator.doubt import (
     watch_leap,
 )
 from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
+from lugre_steering.estimator.noise import lose_bristle, noise_of
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
 from lugre_steering.estimator.release import release
@@ -170,6 +170,7 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
         rates.travel += abs(motion.theta - before)
         call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)
+        lose_bristle(core, side, stamp_ns, value)
     if g.unseen_ns != 0:
         drive_bounds(core, side, dt)
     ch.last_ns = stamp_ns
