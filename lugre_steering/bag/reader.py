@@ -35,6 +35,7 @@ MESSAGE_TYPE = {
 SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 _TOPICS_LIMIT = 5_000  # no vehicle has as many; each costs time and memory with every block
 _LONGEST = 1 << 20  # bytes of a message of one of these types, with thousands of joints
+_HOLES_FROM = 1 << 30
 _PEEK = 500_000  # messages looked at to find which topic carries a joint
 
 
@@ -135,6 +136,7 @@ class Bag:
         """Open one file by its content, not by its name."""
         shown, reason, packed = path, "", 0
         try:
+            _refuse_holes(path)
             with path.open("rb") as file:
                 head = file.read(16)
             if head.startswith(ZSTD_MAGIC):
@@ -359,6 +361,13 @@ class Bag:
             if topics:
                 result[channel] = topics[0]
         return result
+
+
+def _refuse_holes(path: Path) -> None:
+    """A file of which the disk holds next to nothing has no messages where the rest should be, and takes for ever to look through."""
+    known = path.stat()
+    if known.st_size > _HOLES_FROM and known.st_blocks * 512 < known.st_size // 100:
+        raise BagError(f"{path}: has {known.st_size >> 20} MB, of which the disk holds {known.st_blocks >> 11} MB (a sparse file)")
 
 
 def bag_name(path: Path) -> str:
