@@ -63,8 +63,9 @@ REPEATING, REPEATS_MEMORY = 0.1, 50.0
 DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
+    "outside the range of a law",
 )  # fmt: skip
-JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN = (1 << bit for bit in range(len(DOUBTS)))
+JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW = (1 << bit for bit in range(len(DOUBTS)))
 
 INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN
 """What speaks against the sensors and not against the model."""
