@@ -99,6 +99,7 @@ GUARD = np.dtype(
         ("even", np.bool_),  # whether they took about the same time
         ("noise", np.float64),  # variance of the reading of late, as neighbours tell it [rad2]
         ("rough", np.float64),  # the same over more samples [rad2]
+        ("quiet", np.int64),  # second differences in a row that are no larger than sound ones
     ]
 )
 

@@ -24,6 +24,9 @@ WIDER_SIGMA = 2.0
 """Noise this many times the sheet's is believed: chance alone has not made it over ``ROUGH_SAMPLES`` in a million samples."""
 SHARE_OF_BENDS = 0.359
 """Variance of white noise over the mean square of the smaller of two neighbouring second differences (with a sign, see below)."""
+QUIET_SIGMA, QUIET_SAMPLES, LEFT_SIGMA = 6.0, 15, 3.0
+"""Noise of ``ROUGH_SIGMA`` makes one second difference of two larger than that; where none of so many in a row is, no more noise than
+``LEFT_SIGMA`` can be left."""
 UNEVEN = 1.5
 """Samples whose intervals differ more say little of the noise."""
 STEPS = 4.0
@@ -81,6 +84,10 @@ def learn_noise(core, side, dt, change):
         if even and g.even:
             square = math.copysign(min(limit, SHARE_OF_BENDS * min(bend * bend, g.bend * g.bend)), square)
             g.rough = max(0.0, g.rough + (square - g.rough) / ROUGH_SAMPLES)
+    g.quiet = g.quiet + 1 if abs(bend) < QUIET_SIGMA * _expected(core, side) else 0
+    if g.quiet >= QUIET_SAMPLES:
+        left = (LEFT_SIGMA * _expected(core, side)) ** 2
+        g.noise, g.rough = min(g.noise, left), min(g.rough, left)
     g.before, g.before_s, g.bend, g.even = change, dt, bend, even
 
 
