@@ -96,7 +96,7 @@ GUARD = np.dtype(
         ("before", np.float64),  # last change of the reading [rad]
         ("before_s", np.float64),  # and the time that it took [s]
         ("bend", np.float64),  # difference of the last two changes [rad]
-        ("even", np.bool_),  # whether they took about the same time
+        ("straight", np.float64),  # the same, less what the times that they took explain [rad]; NaN: those differ too much
         ("noise", np.float64),  # variance of the reading of late, as neighbours tell it [rad2]
         ("rough", np.float64),  # the same over more samples [rad2]
         ("quiet", np.int64),  # second differences in a row that are no larger than sound ones

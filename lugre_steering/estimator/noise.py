@@ -73,22 +73,24 @@ def noise_of(core, side):
 def learn_noise(core, side, dt, change):
     """Learn from the next ``change`` [rad] of the reading, ``dt`` [s] after the last."""
     g, sigma = core.guard[side], core.config[0].angle_noise
-    even = dt < UNEVEN * g.before_s and g.before_s < UNEVEN * dt
+    ratio = dt / g.before_s if g.before_s > 0.0 and dt > 0.0 else math.inf
     if dt <= 0.0 or dt > NOISE_MEMORY_S:
         g.before = math.nan  # neither the first sample nor a silence has neighbours
-    bend = change - g.before
+    bend, straight = change - g.before, change - ratio * g.before
     limit = (3.0 * NOISY_SIGMA * sigma) ** 2  # one spike is no noise
     if not math.isnan(bend * g.bend):
         square = max(-limit, min(limit, -0.25 * bend * g.bend))
         g.noise = max(0.0, g.noise + (square - g.noise) * dt / NOISE_MEMORY_S)
-        if even and g.even:
-            square = math.copysign(min(limit, SHARE_OF_BENDS * min(bend * bend, g.bend * g.bend)), square)
-            g.rough = max(0.0, g.rough + (square - g.rough) / ROUGH_SAMPLES)
-    g.quiet = g.quiet + 1 if abs(bend) < QUIET_SIGMA * _expected(core, side) else 0
+    g.quiet = g.quiet + 1 if abs(straight) < QUIET_SIGMA * max(1.0, ratio) * _expected(core, side) else 0
+    if not 1.0 / UNEVEN < ratio < UNEVEN:
+        straight = math.nan
+    if not math.isnan(straight * g.straight):
+        square = min(limit, SHARE_OF_BENDS * min(straight * straight, g.straight * g.straight))
+        g.rough = max(0.0, g.rough + (math.copysign(square, -straight * g.straight) - g.rough) / ROUGH_SAMPLES)
     if g.quiet >= QUIET_SAMPLES:
         left = (LEFT_SIGMA * _expected(core, side)) ** 2
         g.noise, g.rough = min(g.noise, left), min(g.rough, left)
-    g.before, g.before_s, g.bend, g.even = change, dt, bend, even
+    g.before, g.before_s, g.bend, g.straight = change, dt, bend, straight
 
 
 @inner
