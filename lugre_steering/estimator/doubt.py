@@ -29,8 +29,9 @@ from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
 from lugre_steering.recording import Kind
 
 TRUSTED_S = 10.0
-SUPPORTED_S, SUPPORT_SHARE = 0.3, 0.25
-"""A jump is believed as soon as this, where the measured torque stays within such a share of the estimate and both are large."""
+SUPPORTED_S, SUPPORT_SHARE, SUPPORT_LEVEL = 0.3, 0.25, 0.5
+"""A jump is believed as soon as this, where the measured torque stays within such a share of the estimate and both are at least such a
+share of the static friction."""
 SETTLED_S = 0.2
 """For so long after a return the angle stays in doubt."""
 FASTEST_MEMORY_S = 0.1
@@ -53,7 +54,7 @@ seals and rubber relax."""
 PRESSURE_MEMORY_S = 1.0
 """Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
 RESIDUAL_MEMORY_S = 2.0
-SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.5
+SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.35
 """A residual as large as the torque, where that is at least this share of the static friction, needs no long look."""
 BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
@@ -233,7 +234,7 @@ def weigh_pressures(core, stamp_ns, measured):
 def _supported(c):
     """Whether the measured torque has just spoken for the estimate."""
     smaller = math.sqrt(min(c.measured_now, c.estimate_now))
-    return smaller > SUDDEN_SHARE * c.friction and math.sqrt(c.residual_now) < SUPPORT_SHARE * smaller
+    return smaller > SUPPORT_LEVEL * c.friction and math.sqrt(c.residual_now) < SUPPORT_SHARE * smaller
 
 
 @inner
