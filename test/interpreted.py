@@ -15,7 +15,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from lugre_steering.chain import compiled, doors, step
+from lugre_steering.chain import compiled, doors, hydraulics, step
 from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.layout import LINE
 
@@ -77,6 +77,7 @@ def _entered(function: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
+vars(hydraulics.moment_arm)["py_func"] = hydraulics.moment_arm
 vars(compiled)["_power_of_two"] = lambda shifted: math.ldexp(1.0, int(shifted - compiled._ROUND))
 vars(doors).update(row=lambda numbers, index, kind: Row(numbers[index], kind), call_step=_call_step, call_number=_call_number, doors=_doors)
 vars(step).update(_run=_entered(step._run), _torques=_entered(step._torques))
