@@ -208,6 +208,7 @@ def test_npz(tmp_path: Path) -> None:
         (npy_header("(-5,)"), "d.npz"),
         (npy_header("(2,)", "'<f8'") + bytes(15), "more than the file holds|d.npz"),
         (b"nonsense", "is not a readable npz file"),
+        (b"\x93NUMPY\x01\x00\x0b\x00{'descr': (", "is not a readable npz file"),
         (npy_header("(1,)", "__import__('os')"), "is not a readable npz file"),
     ],
 )

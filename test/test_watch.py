@@ -117,6 +117,11 @@ def test_bad_windows_are_refused_in_words(tmp_path: Path) -> None:
             read_window(file, VEHICLE.channels)
     with zipfile.ZipFile(io.BytesIO(whole)) as archive:
         about = archive.read("about.npy")
+    for header in (b"{'descr': (", b"  {\n {"):
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("about.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header)
+        with pytest.raises(DataError, match="damaged"):
+            read_window(file, VEHICLE.channels)
     claim = io.BytesIO()
     np.lib.format.write_array_header_1_0(
         claim, {"descr": np.lib.format.dtype_to_descr(SAMPLE), "fortran_order": False, "shape": (10**12,)}

@@ -30,6 +30,7 @@ WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 _FIELD = {FLUID_PRESSURE: 0, TEMPERATURE: 0, WRENCH_STAMPED: 5}
 _STAMP_AT = 4
 _LAYOUTS_TRIED = 16
+_MOST_JOINTS = 10_000  # in one message: walking millions of names would hold the reader up
 
 
 class _MalformedError(Exception):
@@ -98,7 +99,10 @@ def joint_names(raw: bytes) -> list[str]:
 
 
 def _names(cursor: _Cursor) -> list[str]:
-    return [cursor.text(is_structure=True).decode("utf-8", "replace") for _ in range(cursor.count())]
+    count = cursor.count()
+    if count > _MOST_JOINTS:
+        raise _MalformedError
+    return [cursor.text(is_structure=True).decode("utf-8", "replace") for _ in range(count)]
 
 
 def _layout(cursor: _Cursor, msgtype: str, joints: Sequence[str]) -> _Layout:

@@ -36,6 +36,7 @@ MESSAGE_TYPE = {
 SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 _TOPICS_LIMIT = 5_000  # no vehicle has as many; each costs time and memory with every block
 _LONGEST = 1 << 20  # bytes of a message of one of these types, with thousands of joints
+_HOLES_FROM = 1 << 30
 _PEEK = 500_000  # messages looked at to find which topic carries a joint
 
 
@@ -135,6 +136,7 @@ class Bag:
         """Open one file by its content, not by its name."""
         shown, reason, packed = path, "", 0
         try:
+            _refuse_holes(path)
             with path.open("rb") as file:
                 head = file.read(16)
             if head.startswith(ZSTD_MAGIC):
@@ -369,6 +371,13 @@ def must_exist(path: Path) -> None:
     with suppress(OSError):
         near = difflib.get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
     raise BagError(f"{path}: no such file or folder" + (f"; did you mean '{near[0]}'?" if near else ""))
+
+
+def _refuse_holes(path: Path) -> None:
+    """A file of which the disk holds next to nothing has no messages where the rest should be, and takes for ever to look through."""
+    known = path.stat()
+    if known.st_size > _HOLES_FROM and known.st_blocks * 512 < known.st_size // 100:
+        raise BagError(f"{path}: has {known.st_size >> 20} MB, of which the disk holds {known.st_blocks >> 11} MB (a sparse file)")
 
 
 def bag_name(path: Path) -> str:

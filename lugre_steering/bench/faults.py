@@ -124,7 +124,8 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
     hour = 3600 * SECOND
 
     jumped = ("angle jumped", "spike")
-    frozen, stale, unlike = ("angle frozen",), ("stale",), ("residual", "frozen", "pressure")
+    frozen, stale = ("angle frozen",), ("stale",)
+    unlike = ("residual implausible", "pressure frozen")  # "residual formed" is told all the time
     return {
         # First, while the rubber is as cold as at the beginning to which the latter goes back.
         "clock an hour ahead": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns + hour)), ("time_jump",)),

@@ -22,14 +22,16 @@ from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.estimator.layout import ANGLE_JUMP
+from lugre_steering.estimator.noise import learn_noise, noisy
 from lugre_steering.estimator.preview import departs
 from lugre_steering.estimator.unseen import AGREED_SHARE, FASTER, UNSEEN_SIGMA, farthest, lose_sight, part
 from lugre_steering.online import LARGE_SHARE, NOTABLE_SHARE
 from lugre_steering.recording import Kind
 
 TRUSTED_S = 10.0
-SUPPORTED_S, SUPPORT_SHARE = 0.3, 0.25
-"""A jump is believed as soon as this, where the measured torque stays within such a share of the estimate and both are large."""
+SUPPORTED_S, SUPPORT_SHARE, SUPPORT_LEVEL = 0.3, 0.25, 0.5
+"""A jump is believed as soon as this, where the measured torque stays within such a share of the estimate and both are at least such a
+share of the static friction."""
 SETTLED_S = 0.2
 """For so long after a return the angle stays in doubt."""
 FASTEST_MEMORY_S = 0.1
@@ -46,15 +48,13 @@ UNSEEN_STEPS = 3.0
 """Motion of so many of an encoder's steps must change its reading, though the sides do not go equally far."""
 CREEP_MEMORY_S = 1.0
 """Motion of the other side that comes slower than this does not speak against an angle that stands but for its noise."""
-NOISY_SIGMA = 10.0
-NOISE_MEMORY_S = 0.2
 SWING_SHARE = 0.1
 """Torque up to this share of the static friction may come or go while angles stand, seen by their noise to be alive: cylinders stick,
 seals and rubber relax."""
 PRESSURE_MEMORY_S = 1.0
 """Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
 RESIDUAL_MEMORY_S = 2.0
-SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.5
+SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.35
 """A residual as large as the torque, where that is at least this share of the static friction, needs no long look."""
 BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
@@ -64,8 +64,9 @@ REPEATING, REPEATS_MEMORY = 0.1, 50.0
 DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
+    "outside the range of a law",
 )  # fmt: skip
-JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN = (1 << bit for bit in range(len(DOUBTS)))
+JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW = (1 << bit for bit in range(len(DOUBTS)))
 
 INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN
 """What speaks against the sensors and not against the model."""
@@ -93,19 +94,15 @@ GUARD = np.dtype(
         ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not
         ("frozen_at", np.float64),  # reading then [rad]
         ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault
-        ("before", np.float64),  # change of the reading before the last [rad]
+        ("before", np.float64),  # last change of the reading [rad]
+        ("before_s", np.float64),  # and the time that it took [s]
         ("bend", np.float64),  # difference of the last two changes [rad]
-        ("noise", np.float64),  # variance of the reading, as neighbours tell it [rad2]
+        ("straight", np.float64),  # the same, less what the times that they took explain [rad]; NaN: those differ too much
+        ("noise", np.float64),  # variance of the reading of late, as neighbours tell it [rad2]
+        ("rough", np.float64),  # the same over more samples [rad2]
+        ("quiet", np.int64),  # second differences in a row that are no larger than sound ones
     ]
 )
-
-
-@inner
-def noise_of(core, side):
-    """Noise [rad] of one angle sample of a side: the sheet's, or what it is where that is far more."""
-    sigma = core.config[0].angle_noise
-    measured = core.guard[side].noise
-    return math.sqrt(measured) if measured > (NOISY_SIGMA * sigma) ** 2 and sigma > 0.0 else sigma
 
 
 @inner
@@ -128,10 +125,7 @@ def _thaw(core, side, ch, stamp_ns, value):
 
 @inner
 def watch(core, side, ch, stamp_ns, dt, value):
-    """Learn from the next reading [rad] of a side, ``dt`` [s] after the last: whether it stands still, and its noise.
-
-    Neighbouring second differences of a smooth motion have one sign; of white noise their product is -4 variances.
-    """
+    """Learn from the next reading [rad] of a side, ``dt`` [s] after the last: whether it stands still, and its noise."""
     g, sigma = core.guard[side], core.config[0].angle_noise
     change = value - ch.last_value
     if g.frozen_ns != 0:
@@ -146,13 +140,7 @@ def watch(core, side, ch, stamp_ns, dt, value):
         if g.still < STILL_SAMPLES:
             g.place += (value - g.place) / (g.still + 1)
         g.same = same
-    if dt > NOISE_MEMORY_S:
-        g.before = math.nan  # a silence has no neighbours
-    bend = change - g.before
-    limit = (3.0 * NOISY_SIGMA * sigma) ** 2  # one spike is no noise
-    if not math.isnan(bend * g.bend):
-        g.noise = max(0.0, g.noise + (max(-limit, min(limit, -0.25 * bend * g.bend)) - g.noise) * dt / NOISE_MEMORY_S)
-    g.before, g.bend = change, bend
+    learn_noise(core, side, dt, change)
 
 
 @inner
@@ -216,7 +204,7 @@ def angle_doubts(core, side, dt, stamp_ns):
         found |= FROZEN
     if g.unseen_ns != 0:
         found |= UNSEEN
-    if noise_of(core, side) > c.angle_noise:
+    if noisy(core, side):
         found |= NOISY
     return found
 
@@ -246,7 +234,7 @@ def weigh_pressures(core, stamp_ns, measured):
 def _supported(c):
     """Whether the measured torque has just spoken for the estimate."""
     smaller = math.sqrt(min(c.measured_now, c.estimate_now))
-    return smaller > SUDDEN_SHARE * c.friction and math.sqrt(c.residual_now) < SUPPORT_SHARE * smaller
+    return smaller > SUPPORT_LEVEL * c.friction and math.sqrt(c.residual_now) < SUPPORT_SHARE * smaller
 
 
 @inner
@@ -355,7 +343,7 @@ def re_anchor(core, side, ch, stamp_ns, value):
     _stand(g, stamp_ns, value)
     for other in range(core.motion.size):  # a jump is no motion
         core.guard[other].still_other, core.guard[other].apart = math.nan, 0
-    g.before = g.bend = 0.0
+    g.before = g.before_s = g.bend = 0.0
     _stand_at(motion, value)
 
 

@@ -273,7 +273,7 @@ class Estimator:
     def law_left_steps(self) -> Mapping[str, int]:
         """Steps so far with the coordinate of a law outside the range on which it was seen, by the law's place in the file; what
         was counted before a restart is forgotten."""
-        return {f"laws[{i}]": int(self._state[f"{slot(i).id}_outside"].sum()) for i in range(len(self.vehicle.laws))}
+        return {f"laws[{i}]": int(self._state[_law_left(i)].sum()) for i in range(len(self.vehicle.laws))}
 
     def snapshot(self) -> Snapshot:
         """A copy of the whole state, for ``restore``."""
@@ -300,6 +300,11 @@ def doubts(row: Records) -> list[str]:
     """Why the feed-forward of an estimate is held back, in words; nothing where it is not."""
     bits = int(row["doubts"])
     return [text for bit, text in enumerate(DOUBTS) if bits >> bit & 1]
+
+
+def _law_left(place: int) -> str:
+    """The field of the state that counts the steps outside the range of a law."""
+    return f"{slot(place).id}_outside"
 
 
 def _label(kind: Kind, name: str) -> str:
@@ -360,6 +365,12 @@ def _cylinders(vehicle: Vehicle) -> tuple[Array, Array, IntArray]:
     return table.geometry, table.areas, table.lines
 
 
+def _place(kind: np.dtype[np.void], field: str) -> int:
+    """Which number of a row a field of a record is."""
+    assert kind.fields is not None
+    return kind.fields[field][1] // 8
+
+
 def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
     """The composition of a vehicle's effects, and the core that runs it."""
     model = build_model(vehicle, lean=True)
@@ -391,6 +402,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
         geometry=geometry,
         areas=areas,
         lines=line_index,
+        law_left=np.array([_place(composition.state, _law_left(i)) for i in range(len(vehicle.laws))], np.int64),
         plan_ns=np.zeros(PLAN_POINTS, np.int64),
         plan_theta=np.zeros((sides, PLAN_POINTS)),
         scratch_value=np.zeros(lines),

@@ -156,6 +156,8 @@ class Core(NamedTuple):
     geometry: Array
     areas: Array
     lines: IntArray
+    law_left: IntArray
+    """For each law of the vehicle file, where in a row of ``state`` its steps outside the range on which it was seen are counted."""
     plan_ns: IntArray
     plan_theta: Array
     scratch_value: Array

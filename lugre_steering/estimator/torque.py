@@ -13,11 +13,11 @@ from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.chain.rates import follow
 from lugre_steering.estimator.admission import restart
 from lugre_steering.estimator.doubt import (
+    LAW,
     LEAP_RATE_RAD_S,
     RANGE,
     TABLE,
     angle_doubts,
-    noise_of,
     re_anchor,
     standing_doubts,
     trust,
@@ -25,6 +25,7 @@ from lugre_steering.estimator.doubt import (
     watch_leap,
 )
 from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
+from lugre_steering.estimator.noise import lose_bristle, noise_of
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
 from lugre_steering.estimator.release import release
@@ -132,9 +133,19 @@ def _wait(waiting, stamp_ns, state, motion, output):
 
 
 @inner
-def _outside(c, state, motion, saturated):
-    """Doubts about a side outside its rubber table (``saturated``: steps so far), or what its calibration has seen."""
-    doubts = TABLE if state.saturated > saturated else 0
+def _law_left(core, side):
+    """Steps of a side so far with the coordinate of a law outside the range on which that was seen."""
+    steps = 0.0
+    for i in range(core.law_left.size):
+        steps += core.state[side, core.law_left[i]]
+    return steps
+
+
+@inner
+def _outside(c, state, motion, saturated, beyond):
+    """Doubts about a side outside its rubber table (``saturated``: steps before), the range of a law (``beyond``: whether), or what its
+    calibration has seen."""
+    doubts = (TABLE if state.saturated > saturated else 0) | (LAW if beyond else 0)
     if abs(motion.theta) > c.seen_angle or abs(motion.omega) > c.seen_rate:
         doubts |= RANGE
     return doubts
@@ -150,7 +161,7 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     c, ch = core.config[0], core.channels[k]
     side = ch.index
     state, motion, output = row(core.state, side, STATE), core.motion[side], core.output[side]
-    saturated = state.saturated
+    saturated, law_left = state.saturated, _law_left(core, side)
     dt = _elapsed(c, ch, state, stamp_ns)
     g = core.guard[side]
     if jumped:
@@ -170,13 +181,14 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
         rates.travel += abs(motion.theta - before)
         call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)
+        lose_bristle(core, side, stamp_ns, value)
     if g.unseen_ns != 0:
         drive_bounds(core, side, dt)
     ch.last_ns = stamp_ns
     ch.last_value = value
     waiting = core.waiting[side, _seat(ch, core.waiting.shape[1])]
     _wait(waiting, stamp_ns, state, motion, output)
-    waiting.doubts = angle_doubts(core, side, dt, stamp_ns) | _outside(c, state, motion, saturated)
+    waiting.doubts = angle_doubts(core, side, dt, stamp_ns) | _outside(c, state, motion, saturated, _law_left(core, side) > law_left)
     waiting.feed_forward = preview(core, side, stamp_ns)
     latest = _pair(core)
     if latest == 0:

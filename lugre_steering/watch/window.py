@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -81,6 +82,7 @@ def read_window(file: Path, channels: Sequence[Channel]) -> Window:
         raise DataError(f"{file}: cannot be read ({error.strerror or error})") from error
     except (
         ValueError, KeyError, TypeError, EOFError, NotImplementedError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error,
+        SyntaxError, tokenize.TokenError,  # NumPy reads headers as text of Python
     ) as error:  # fmt: skip
         raise DataError(f"{file}: is damaged or no window file, expected one that the live node wrote") from error
     if not known:

@@ -172,11 +172,11 @@ def test_chunks_of_messages_without_end(tmp_path: Path, padding: int, records_of
     empty = struct.pack("<BQHIQQ", 5, 22, 1, 0, T0, T0)
     foreign = struct.pack("<BQ", 0x80, padding) + bytes(padding)
     file.write_bytes(data[:end] + foreign * records_of_it + packed_records(empty, 1_000_000) * chunks + data[end:])
-    begin = time.monotonic()
+    begin = time.process_time()
     count, said = values(file)
     assert count == len(messages)
     assert "unpack to more than" in said
-    assert time.monotonic() - begin < 10.0
+    assert time.process_time() - begin < 10.0  # other programs may have the processors
 
 
 def test_a_long_recording_in_well_packed_chunks_is_read_to_its_end(tmp_path: Path) -> None:
@@ -293,6 +293,29 @@ def test_a_pipe_is_no_bag(tmp_path: Path) -> None:
     os.mkfifo(folder / "run.mcap")
     with pytest.raises(BagError, match="holds no"):
         Bag(folder)
+
+
+@pytest.mark.parametrize("begin", [b"\x89MCAP0\r\n", b"SQLite format 3\0"])
+def test_a_file_that_is_nearly_all_hole_is_refused_at_once(tmp_path: Path, begin: bytes) -> None:
+    """Nothing on the disk, hours to read: 4 TB of zeros."""
+    file = tmp_path / "run.bag"
+    file.write_bytes(begin)
+    os.truncate(file, 4 << 40)
+    with pytest.raises(BagError, match="sparse file"):
+        Bag(file)
+
+
+def test_messages_with_more_joints_than_any_machine_are_malformed_and_cost_no_time(tmp_path: Path) -> None:
+    """Twenty of a million names each took 37 s of processor time."""
+    many = make.joint_state(T0, ["j"] * 1_000_000, [])
+    messages = [("/" + LEFT.topic, make.JOINT_STATE, T0 + i, many) for i in range(5)]
+    messages.append(("/" + LEFT.topic, make.JOINT_STATE, T0 + 9, make.joint_state(T0 + 9, [LEFT.joint], [0.1])))
+    folder = make.write(tmp_path / "run", messages)
+    begin = time.process_time()
+    recording = read_recording(folder, CHANNELS)
+    assert time.process_time() - begin < 2.0
+    assert recording.angle["left"].value.tolist() == [0.1]
+    assert recording.rejected == {"/" + LEFT.topic: {"malformed": 5}}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from chain_support import swing, vehicle
 
 from lugre_steering.chain.step import run_side, torque_side
 from lugre_steering.effects import laws
-from lugre_steering.estimator import Estimator
+from lugre_steering.estimator import Estimator, doubts
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import EffectEntry, LawEntry, Vehicle
 from lugre_steering.vehicle.model import build_model
@@ -162,3 +162,7 @@ def test_the_estimator_counts_steps_outside_the_range_and_runs_a_block_like_sing
     outside = int(np.sum(np.abs(together["theta"]) > 0.05 + 1e-6))
     assert outside > 500
     assert block.law_left_steps == {"laws[0]": outside}
+    told = np.array(["outside the range of a law" in doubts(row) for row in together])
+    assert np.array_equal(told, (np.abs(together["theta"]) > 0.05).any(axis=1))
+    begin = int(np.argmax(told))
+    assert not together["feed_forward"][begin + 1 : begin + 40][told[begin + 1 : begin + 40]][25:].any()
