@@ -15,7 +15,7 @@ from lugre_steering.bag.find import Skipped
 from lugre_steering.bag.load import distinct
 from lugre_steering.bag.reader import must_exist
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
-from lugre_steering.diagnosis.result import SCHEMA, Diagnosis, picture_names
+from lugre_steering.diagnosis.result import AUGMENTED, FORMED, SCHEMA, Diagnosis, picture_names
 from lugre_steering.effects.registry import leaving_out, made
 from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, is_ours, not_ours, output_folder
@@ -47,7 +47,7 @@ def run(
 ) -> Diagnosis:
     """Diagnose bags, and windows that the live node has written; returns the result.
 
-    Written are DIR/diagnosis.json, augmented.yaml and, if wanted, report.html and pictures. ``skipped``: what has been left out
+    Written are DIR/diagnosis.json, augmented.yaml, formed.yaml (see ``FrictionForm``) and, if wanted, report.html and pictures. ``skipped``: what has been left out
     before; of several bags, those of other machines are left out too. Both are told among the findings about the data. ``without``:
     names that are not considered, to see what takes their place. The report of an earlier diagnosis in DIR is taken away: its
     pictures would not belong to this result.
@@ -56,7 +56,7 @@ def run(
     _check_given(bags, windows, material)
     with output_folder(out):
         pictures = [file.name for pattern in PICTURES for file in out.glob(pattern)] if report else []
-        old = earlier_result(out, "diagnosis.json", SCHEMA, ("augmented.yaml", "report.html", *pictures), vehicle_file)
+        old = earlier_result(out, "diagnosis.json", SCHEMA, (AUGMENTED, FORMED, "report.html", *pictures), vehicle_file)
         seen = [(str(file), read_window(file, vehicle.channels).recording) for file in windows]
         recordings, others = read_of_machine(bags, vehicle.channels, progress) if bags else ([], ())
         left = {one.bag for one in others}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from lugre_steering import units
 from lugre_steering.errors import DataError
-from lugre_steering.files import earlier_result, write_record
+from lugre_steering.files import earlier_result, is_ours, write_record
 from lugre_steering.gate import Facts, Gate, quality_facts
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, BagFinding, unused_name
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SCHEMA: Final = "lugre_steering/diagnosis/1"
+AUGMENTED, FORMED = "augmented.yaml", "formed.yaml"
+"""Vehicle files of a result: with what was found; and, where nothing was, with the form of the friction as laws."""
 
 Verdict = Literal["consistent", "missing_physics", "unlisted_physics", "insufficient_data"]
 Stage = Literal["motion", "contact", "thermal", "parallel_torque", "measurement"]
@@ -94,6 +96,23 @@ class Augmented(Errors):
     def save(self, path: str | Path, notes: Sequence[str] = ()) -> None:
         """Write the vehicle file (augmented.yaml of the command) with ``notes`` as comments."""
         save(self.vehicle, path, notes)
+
+
+@dataclass(frozen=True)
+class FrictionForm:
+    """The form of this machine's friction as laws, where they hold on held-out data: in which vehicle ``file``, and how it does there;
+    ``improvement`` over the same without them, with its 95 % interval."""
+
+    file: str
+    heldout_rmse_Nm: float | None
+    improvement: float | None
+    improvement_ci95: Interval | None
+    causal_rmse_Nm: float | None
+    """On all valid samples, without looking ahead and with bristles relaxed at the start, as the live node must."""
+    laws: tuple[str, ...]
+    """What each law changes, and along what."""
+    vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
+    """The vehicle file of it."""
 
 
 @dataclass(frozen=True)
@@ -200,6 +219,8 @@ class Diagnosis(Result):
     next_experiment: Experiment | None
     laws: tuple[Mapping[str, Any], ...] = field(default=(), metadata=ADDED)
     """Found where no entry of the catalogue explains what is left; ``augmented.yaml`` runs them."""
+    friction_form: FrictionForm | None = field(default=None, metadata=ADDED)
+    """Laws that augmented.yaml has beside the effects, or formed.yaml where nothing is named; None where friction has the form of the model's, or no law of it holds."""
     headline: str = field(default="", metadata=ADDED)
     """How the statement begins: what, where, how much of the torque, what to do."""
     provenance: Provenance | None = field(default=None, metadata=ADDED)
@@ -222,15 +243,21 @@ class Diagnosis(Result):
         return replace(told, laws=finished.laws)  # whose coordinates are keys, as in the vehicle file
 
     def save(self, out: str | Path) -> None:
-        """Write diagnosis.json and augmented.yaml into a folder; replaces only an earlier diagnosis there."""
+        """Write diagnosis.json, augmented.yaml and, if there is a form of the friction, formed.yaml into a folder; replaces only an
+        earlier diagnosis there."""
         folder = folder_for(out)
-        earlier_result(folder, "diagnosis.json", SCHEMA, ("augmented.yaml",))
+        earlier_result(folder, "diagnosis.json", SCHEMA, (AUGMENTED, FORMED))
         self.write(folder)
 
     def write(self, folder: Path) -> None:
-        """The two files into a folder where they may stand."""
+        """The files into a folder where they may stand; that of an earlier diagnosis without a successor goes."""
+        notes = self.provenance.lines() if self.provenance is not None else ()
         write_record(self.json, folder / "diagnosis.json")
-        self.augmented.save(folder / "augmented.yaml", self.provenance.lines() if self.provenance is not None else ())
+        self.augmented.save(folder / AUGMENTED, notes)
+        if self.friction_form is not None and self.friction_form.file == FORMED:
+            save(self.friction_form.vehicle, folder / FORMED, notes)
+        elif is_ours(folder / FORMED):
+            (folder / FORMED).unlink()
 
     def to_frame(self) -> DataFrame:
         """One row per fitted parameter of every named effect, as a pandas table."""

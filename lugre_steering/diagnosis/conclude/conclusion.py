@@ -20,7 +20,16 @@ from lugre_steering.diagnosis.conclude.stands import Stands, standing
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
-from lugre_steering.diagnosis.result import SCHEMA, Augmented, BagTrace, Diagnosis, Errors, Limit, NamedEffect
+from lugre_steering.diagnosis.result import (
+    SCHEMA,
+    Augmented,
+    BagTrace,
+    Diagnosis,
+    Errors,
+    FrictionForm,
+    Limit,
+    NamedEffect,
+)
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit, fit
@@ -38,8 +47,9 @@ def conclude(
     effects = named_effects(model.done, model.whole, model.bent, material) if stands.named else []
     vehicle = _written(model, stands, effects)
     causal = causal_rmse(vehicle, recordings, done.problem.runs)
+    form = _form(done, stands, vehicle, causal, recordings)
     progress("next experiment")
-    return _told(done, stands, model, effects, vehicle, causal, findings)
+    return _told(done, stands, model, effects, vehicle, causal, form, findings)
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,8 @@ def _modelled(done: Finished, stands: Stands) -> _Modelled:
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
+    if stands.named and (form := stands.form) is not None:
+        return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, [], "", stands.left)
     if (lawful := stands.lawful) is None:
         return _Modelled(done, final, whole, bent, [], "", stands.left)
     beside, laws = replace(done, problem=lawful.problem), described(lawful, stands.nearest)
@@ -72,12 +84,28 @@ def _modelled(done: Finished, stands: Stands) -> _Modelled:
 def _written(model: _Modelled, stands: Stands, effects: Sequence[NamedEffect]) -> Vehicle:
     """The vehicle file with what stands."""
     vehicle = augmented_vehicle(model.done, model.whole, effects, stands.after)
-    return vehicle if stands.lawful is None else vehicle.replace(laws=(*vehicle.laws, *entries(stands.lawful)))
+    laws = stands.form.laws if stands.named and stands.form is not None else entries(stands.lawful) if stands.lawful is not None else ()
+    return vehicle.replace(laws=(*vehicle.laws, *laws))
+
+
+def _form(done: Finished, stands: Stands, vehicle: Vehicle, causal: float, recordings: Sequence[Recording]) -> FrictionForm | None:
+    """What the form of the friction as laws is worth: in the vehicle file of what is named, or in one of its own where nothing is, as
+    augmented.yaml is the recalibrated baseline then."""
+    if (found := stands.form) is None:
+        return None
+    if not stands.named:
+        vehicle = augmented_vehicle(replace(done, problem=found.problem), found.whole, (), found.better.after)
+        vehicle = vehicle.replace(laws=(*vehicle.laws, *found.laws))
+        causal = causal_rmse(vehicle, recordings, done.problem.runs)
+    laws = tuple(dict.fromkeys(entry.title or "" for entry in found.laws))
+    return FrictionForm(
+        AUGMENTED if stands.named else FORMED, found.better.after, found.better.gain, found.better.interval, causal, laws, vehicle
+    )
 
 
 def _told(
     done: Finished, stands: Stands, model: _Modelled, effects: Sequence[NamedEffect], vehicle: Vehicle, causal: float,
-    findings: Sequence[BagFinding],
+    form: FrictionForm | None, findings: Sequence[BagFinding],
 ) -> Diagnosis:
     """The result, in numbers and words."""
     problem, found, judged = done.problem, done.found, stands.judged
@@ -85,7 +113,7 @@ def _told(
     ended = [effect.id for effect in effects if effect.id not in kept]
     advice = next_experiment(done, stands.verdict, model.whole, stands.lawful)
     headline, statistics = statement(
-        done, stands.verdict, effects, judged, causal, model.left, ended, model.law, stands.nearest, advice
+        done, stands.verdict, effects, judged, causal, form, model.left, ended, model.law, stands.nearest, advice
     )
     return Diagnosis(
         schema=SCHEMA,
@@ -109,6 +137,7 @@ def _told(
         data_quality=tuple(findings),
         next_experiment=advice,
         laws=tuple(model.laws),
+        friction_form=form,
         traces=_shown(done, stands, model),
         evidence=evidence(done.compared, effects),
         coordinate_of={effect.id: CATALOGUE[effect.id].coordinate for effect in effects},
@@ -118,7 +147,8 @@ def _told(
 
 def _shown(done: Finished, stands: Stands, model: _Modelled) -> tuple[BagTrace, ...]:
     """Curves for the pictures; the error by cluster where the held-out third was judged as it was fitted."""
-    judged = None if stands.judged.rotated else done.found.final if stands.named and not model.laws else model.final
+    alone = stands.named and not model.laws and stands.form is None
+    judged = None if stands.judged.rotated else done.found.final if alone else model.final
     return traces(model.done, model.whole, model.final, judged)
 
 

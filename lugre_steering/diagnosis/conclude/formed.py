@@ -33,35 +33,43 @@ Effects = tuple[tuple[Candidate, Values], ...]
 
 
 class Formed(NamedTuple):
-    """Names that stand and the form of the friction law in one model: ``whole`` fitted to all data, its ``laws`` as a file has them,
-    and held-out errors, ``judged`` against the names alone."""
+    """Names that stand and the form of the friction law in one model, ``fitted`` to the samples that may fit and ``whole`` to all; its
+    ``laws`` as a file has them; held-out errors ``judged`` against the baseline, and what the form brings (``better``) against the
+    names alone."""
 
     problem: Problem
+    fitted: Fit
     whole: Fit
     laws: tuple[LawEntry, ...]
     judged: verify.Judged
+    better: verify.Judged
 
 
 def formed(done: Finished, named: bool, seed: int) -> Formed | None:
     """The form of the friction law beside what is named; None where it is none, or does not hold on held-out data."""
     if not done.needs_form or done.beside_form is None or any(item.in_place for item in done.found.found):
         return None
-    there = done.compared
-    linear, plain = (there.found.final, done.found.final) if named else (there.found.baseline, done.found.baseline)
+    there, found = done.compared, done.found
+    linear, plain = (there.found.final, found.final) if named else (there.found.baseline, found.baseline)
     names: Effects = linear.effects if named else ()
-    shapes = freedoms(there.problem, done.found.baseline)
+    shapes = freedoms(there.problem, found.baseline)
     sought = _with_places(there.problem, len(shapes), names).doubted(there.problem.doubt, there.problem.typical)
     laws = _laws(sought, shapes, linear.x[sought.first_bend :])
     start = linear.x[: sought.first_bend]
     inside = fit(sought, there.fitted, [*names, *laws], start, linearisations=LINEARISATIONS, tolerance=TRIAL_TOLERANCE)
     problem = _with_places(done.problem, len(shapes), names)
-    held = [(replace(candidate, free=()), values) for candidate, values in inside.effects]
-    fitted = fit(problem, done.fitted, held, inside.x)
-    judged = verify.verify(problem, done.weight, plain, fitted, done.roles, seed)
-    if not judged.interval[0] > 0.0:
+
+    def around(weight: Array, x: Array) -> Fit:
+        """The baseline recalibrated around names and laws."""
+        held = [(replace(candidate, free=()), values) for candidate, values in inside.effects]
+        return replace(fit(problem, weight, held, x), effects=inside.effects)
+
+    fitted = around(done.fitted, inside.x)
+    judged, better = (verify.judged_once(problem, known, fitted, done.roles, seed) for known in (found.baseline, plain))
+    if not better.interval[0] > 0.0:
         return None
-    whole = fit(problem, done.weight, held, fitted.x)
-    return Formed(problem, whole, _written(problem, whole, shapes, len(names)), judged)
+    whole = around(done.weight, fitted.x)
+    return Formed(problem, fitted, whole, _written(problem, whole, shapes, len(names)), judged, better)
 
 
 def _with_places(problem: Problem, laws: int, names: Effects) -> Problem:

@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.conclude.formed import Formed, formed
 from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
@@ -24,17 +27,19 @@ CONTRADICTED = 0.02
 
 
 class _Tested(NamedTuple):
-    """Whether names stand, whether they are only a clock that is apart, and how they do on held-out data."""
+    """Whether names stand, whether they are only a clock that is apart, how they do on held-out data, and with them the form of the
+    friction law where without it they do harm."""
 
     named: bool
     clock: bool
     judged: verify.Judged
+    form: Formed | None
 
 
 @dataclass(frozen=True)
 class Stands:
     """What stands: names, laws beside or without them, or only a clock that is apart; ``judged`` on held-out data, ``left`` beside
-    the names alone."""
+    the names alone; ``form``: that of the friction law as laws, beside the names."""
 
     named: bool
     clock: bool
@@ -43,6 +48,7 @@ class Stands:
     left: LeftOver
     nearest: tuple[str, ...] = ()
     """Names in whose place laws stand."""
+    form: Formed | None = None
 
     @property
     def better(self) -> bool:
@@ -65,30 +71,35 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
     tested = _tested(done, seed)
     if not tested.named and done.found.found and (late := begun_late(done)) is not done:
         done, tested = late, _tested(late, seed)
-    return done, _beside_laws(done, tested, seed, progress)
+    stands = _beside_laws(done, tested, seed, progress)
+    if stands.lawful is not None:  # found without the form of the friction law, and standing alone
+        return done, stands
+    form = (tested.form if stands.named else None) or formed(done, stands.named, seed)
+    return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
 
 
 def _tested(done: Finished, seed: int) -> _Tested:
     """The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
     and an improvement that may be none is none: beside the freedoms with which names are compared, as without them the form of the
-    friction law may be most of the error. In a vehicle file, which cannot hold freedoms, a name must do no harm."""
+    friction law may be most of the error. In a vehicle file a name must do no harm, alone or with the form of the friction as laws."""
     problem, found, there = done.problem, done.found, done.compared
     judged = verify.verify(problem, done.weight, found.baseline, found.final, done.roles, seed, done.refitted)
-    beside = judged
-    beside_form = done.needs_form and not any(item.in_place for item in found.found)
-    if found.found and beside_form and judged.gain > -CONTRADICTED:
+    beside, form = judged, None
+    if found.found and done.needs_form and not any(item.in_place for item in found.found):
         beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
+        form = formed(done, True, seed) if judged.gain <= -CONTRADICTED and beside.interval[0] > 0.0 else None
     clock = _clocks_alone(done)
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
-    better = judged.gain > -CONTRADICTED and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
+    harmless = max(judged.gain, -np.inf if form is None else form.judged.gain) > -CONTRADICTED
+    better = harmless and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
     named = bool(found.found) and better and not clock and not stuck
-    return _Tested(named, clock, judged)
+    return _Tested(named, clock, judged, form)
 
 
 def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:
     """What remains of the names beside laws for what they leave over."""
-    found, (named, clock, judged) = done.found, tested
+    found, (named, clock, judged, _) = done.found, tested
     left = _left(done, named or clock)
     if not left.structured and not (named and done.needs_form):
         return Stands(named, clock, None, judged, left)

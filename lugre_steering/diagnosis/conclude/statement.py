@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.diagnosis.conclude import headline
 from lugre_steering.diagnosis.conclude.left_over import LeftOver
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.result import Experiment, NamedEffect, Verdict
+from lugre_steering.diagnosis.result import AUGMENTED, Experiment, FrictionForm, NamedEffect, Verdict
 from lugre_steering.diagnosis.verify import Judged
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.problem import STATIC, resized
@@ -46,16 +46,16 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
 
 
 def statement(
-    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver,
-    ended: Sequence[str], law: str, nearest: Sequence[str], advice: Experiment | None,
+    done: Finished, verdict: Verdict, effects: Sequence[NamedEffect], judged: Judged, causal: float, form: FrictionForm | None,
+    left: LeftOver, ended: Sequence[str], law: str, nearest: Sequence[str], advice: Experiment | None,
 ) -> tuple[str, str]:
     """Headline and statistics, for a reader who sees nothing else; ``judged``: on held-out data, ``causal``: error [N m] without
-    looking ahead, ``left``: what remains, ``ended``: effects that do not act in the last bag, ``law``: the one found for it, if any,
-    ``nearest``: names in whose place it stands, ``advice``: the next experiment."""
+    looking ahead, ``form``: of the friction as laws, ``left``: what remains, ``ended``: effects that do not act in the last bag,
+    ``law``: the one found for it, if any, ``nearest``: names in whose place it stands, ``advice``: the next experiment."""
     floor = f"Noise alone makes {done.torque(done.noise.floor)}."
     if verdict == "consistent":
         unseen = "From what size on an effect would have shown: detection_limits of diagnosis.json."
-        return headline.consistent(done, judged.before, left.entry.description), f"{floor} {unseen}"
+        return headline.consistent(done, judged.before, left.entry.description), " ".join([*_formed(done, form), floor, unseen])
     if verdict == "unlisted_physics":
         if law:
             rest = f"{left.text[:1].upper()}{left.text[1:]}."
@@ -63,7 +63,19 @@ def statement(
         return headline.unlisted(done, judged.before, left.text), f"{floor} Where it lives: unexplained in diagnosis.json."
     told = headline.missing(done, effects, law, advice, not ended)
     them = "it" if len(effects) == 1 and not law else "them"
-    return told, " ".join([_gain(done, judged, them), floor, *_remarks(done, effects, judged, causal, left, ended)])
+    them += " and the form of this friction" if form is not None else ""
+    remarks = _remarks(done, effects, judged, causal, left, ended)
+    return told, " ".join([_gain(done, judged, them), floor, *remarks, *_formed(done, form)])
+
+
+def _formed(done: Finished, form: FrictionForm | None) -> list[str]:
+    """What the form of the friction is worth, in a sentence."""
+    if form is None or form.heldout_rmse_Nm is None or form.improvement is None:
+        return []
+    less = f"{done.torque(form.heldout_rmse_Nm)} of the held-out data, {words.percent(form.improvement)} less"
+    if form.file == AUGMENTED:
+        return [f"The form of this friction is in augmented.yaml as laws; it leaves {less} than with the names alone."]
+    return [f"The file {form.file} is the same with the form of this friction as laws: it leaves {less}."]
 
 
 def _gain(done: Finished, judged: Judged, with_: str) -> str:

@@ -93,6 +93,11 @@ def next_steps(diagnosis: Diagnosis) -> str:
             'Keep the recalibrated baseline (<code>augmented.yaml</code>). What is below the <a href="#limits">detection '
             "limits</a> of these data may still be there."
         )
+    if form := result["friction_form"]:
+        steps.append(
+            f"Try <code>{form['file']}</code>, which has the form of this machine's friction as laws, on a recording that was not "
+            "diagnosed. One of them is the level along this ground: take it out where the machine stands on other ground."
+        )
     if result["unexplained"]["structured"]:
         steps.append('Look at <a href="#left">what is left</a>: part of the residual is structure, not noise.')
     if result["next_experiment"]:
