@@ -48,6 +48,7 @@ setup(
         "lz4>=4.0",
         "typer>=0.9",
         "rich>=13.0",
+        "threadpoolctl>=3.1",
     ],
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait as wait_for_end
 from typing import TypeVar
@@ -25,6 +26,7 @@ Progress = Callable[[str, int, "int | None"], None]
 T = TypeVar("T")
 R = TypeVar("R")
 
+_BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 ATTEMPTS = 2
 """A task whose worker died is given to one more: memory may have been short for another's sake."""
 
@@ -81,11 +83,24 @@ def _worker(jobs: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=begin, initargs=(threads,))
 
 
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Where NumPy came before us, as in a notebook: matrices of fits are so narrow that BLAS threads only wait for each other (four to
+    five times the processor time of a diagnosis). What the user has set stands."""
+    if any(name in os.environ for name in _BLAS):
+        yield
+        return
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
+
 def begin(threads: int) -> None:
     """What every worker does first: take ``threads`` for itself, and end with the process that started it."""
     # Said before NumPy is imported. What the user has set stands.
     os.environ.setdefault("LUGRE_STEERING_THREADS", str(threads))
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    for name in _BLAS:
         os.environ.setdefault(name, "1")
     if (parent := parent_process()) is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()

@@ -58,6 +58,22 @@ def test_every_public_name_is_there_without_ros_or_plotting() -> None:
     assert not names & {"matplotlib", "plotly", "rclpy", "pandas"}
 
 
+def test_fits_take_one_thread_of_blas_and_leave_the_rest_as_it_was() -> None:
+    """Each would wait for the other: a diagnosis took four to five times the processor time where NumPy had been imported before."""
+    code = (
+        "import numpy, scipy.linalg, threadpoolctl\n"
+        "def most(): return max(pool['num_threads'] for pool in threadpoolctl.threadpool_info() if pool['user_api'] == 'blas')\n"
+        "threadpoolctl.threadpool_limits(2, 'blas'); seen = set()\n"
+        f"run = ls.simulate('double-cycle', {str(VEHICLE)!r}, angle_rate_Hz=10.0).recording\n"
+        f"ls.calibrate(run, {str(VEHICLE)!r}, progress=lambda _: seen.add(most()))\n"
+        "assert 1 in seen and most() == 2, (seen, most())"
+    )
+    program = f"import lugre_steering as ls\n{code}"
+    plain = {name: value for name, value in environment().items() if not name.endswith("NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", program], env=plain, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
     assert [name for name in dir(ls) if not name.startswith("__")] == sorted(ls.__all__)
     with pytest.raises(AttributeError, match="no attribute 'replays'"):

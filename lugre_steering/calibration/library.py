@@ -12,6 +12,7 @@ from lugre_steering.bag.given import Given, files, given_recordings
 from lugre_steering.calibration.calibrate import calibrate_recordings, chosen
 from lugre_steering.calibration.result import Calibration
 from lugre_steering.effects.registry import made
+from lugre_steering.pool import one_blas_thread
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
@@ -34,7 +35,8 @@ def calibrate(
     model = vehicle_of(vehicle)
     recordings = given_recordings(data, model.channels, progress)
     wanted = chosen(model, free, fix, prior)
-    found = calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
+    with one_blas_thread():
+        found = calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
     options = {"free": free, "fix": fix, "prior": prior or {}, "priors": priors}
     return replace(found, provenance=made("calibrate", options, sheet, files(data)))

@@ -12,6 +12,7 @@ from lugre_steering.bag.given import Given, files, given_recordings
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import leaving_out, made
+from lugre_steering.pool import one_blas_thread
 from lugre_steering.result import folder_for
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
@@ -35,7 +36,7 @@ def diagnose(
     model = vehicle_of(vehicle)
     recordings = given_recordings(data, model.channels, progress)
     unsought = [without] if isinstance(without, str) else list(without)
-    with leaving_out(unsought):
+    with leaving_out(unsought), one_blas_thread():
         found = diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
     return replace(found, provenance=made("diagnose", {"seed": seed, "material": material, "without": unsought}, sheet, files(data)))
