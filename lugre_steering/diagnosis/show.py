@@ -21,7 +21,10 @@ EXIT_CODES = {"consistent": 0, "missing_physics": 3, "unlisted_physics": 4, "ins
 """Of ``diagnose --exit-code``; 1 and 2 are those of failures and bad input."""
 
 
-IN_TABLE = ("With it the held-out", "With them the held-out", "With it and the form", "With them and the form", "With the law the held-out", "Noise alone")
+IN_TABLE = (
+    "With it the held-out", "With them the held-out", "With it and the form", "With them and the form", "With the law the held-out",
+    "Noise alone",
+)  # fmt: skip
 """How sentences begin whose numbers stand in the table."""
 
 

@@ -50,7 +50,7 @@ def verify(
     ``weight`` (n,) is 1 / sigma where samples are valid. Selection has seen the other thirds, their numbers have not. ``refitted``: how
     the augmented model is fitted without a third, if its values are not just those that fit best.
     """
-    before, after = _held_errors(problem, roles, baseline, augmented)
+    before, after = (_held_errors(problem, roles, each) for each in (baseline, augmented))
     # Where the fitted data cannot tell when an effect began, the held-out data must not be judged by a guess.
     sure = ~onset.undetermined(problem, np.where(roles.fit, weight, 0.0), augmented)
     if np.unique(roles.cluster[roles.held & sure]).size < ENOUGH:
@@ -72,12 +72,13 @@ def verify(
 
 def judged_once(problem: Problem, baseline: Fit, augmented: Fit, roles: Split, seed: int) -> Judged:
     """Errors of two fits on the held-out third."""
-    return _judge(*_held_errors(problem, roles, baseline, augmented), roles.held, roles.cluster, seed)
+    before, after = (_held_errors(problem, roles, each) for each in (baseline, augmented))
+    return _judge(before, after, roles.held, roles.cluster, seed)
 
 
-def _held_errors(problem: Problem, roles: Split, *fits: Fit) -> list[Array]:
-    """Squared errors (n,) of fits on the samples held out, none elsewhere."""
-    return [np.where(roles.held, problem.measured - known.prediction, 0.0) ** 2 for known in fits]
+def _held_errors(problem: Problem, roles: Split, result: Fit) -> Array:
+    """Squared errors (n,) of a fit on the samples held out, none elsewhere."""
+    return np.where(roles.held, problem.measured - result.prediction, 0.0) ** 2
 
 
 def _judge(before: Array, after: Array, held: Mask, clusters: IntArray, seed: int) -> Judged:

@@ -21,6 +21,8 @@ from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import (
+    AUGMENTED,
+    FORMED,
     SCHEMA,
     Augmented,
     BagTrace,
