@@ -47,10 +47,10 @@ def run(
 ) -> Diagnosis:
     """Diagnose bags, and windows that the live node has written; returns the result.
 
-    Written are DIR/diagnosis.json, augmented.yaml, formed.yaml (see ``FrictionForm``) and, if wanted, report.html and pictures. ``skipped``: what has been left out
-    before; of several bags, those of other machines are left out too. Both are told among the findings about the data. ``without``:
-    names that are not considered, to see what takes their place. The report of an earlier diagnosis in DIR is taken away: its
-    pictures would not belong to this result.
+    Written are DIR/diagnosis.json, augmented.yaml, formed.yaml (see ``FrictionForm``) and, if wanted, report.html and pictures.
+    ``skipped``: what has been left out before; of several bags, those of other machines are left out too. Both are told among the
+    findings about the data. ``without``: names that are not considered, to see what takes their place. The report of an earlier
+    diagnosis in DIR is taken away: its pictures would not belong to this result.
     """
     vehicle = load(vehicle_file)
     _check_given(bags, windows, material)

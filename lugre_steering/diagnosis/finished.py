@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from lugre_steering import units
+from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.loudness import loudness
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.registry import CATALOGUE
@@ -38,6 +39,8 @@ class Finished:
     """The same beside the freedoms of the friction law and of what is named."""
     form: tuple[str, ...] = ()
     """What each of these freedoms is, in words, empty for those of a name; of a problem that has them."""
+    freedoms: tuple[Freedom, ...] = ()
+    """The laws whose shapes are the first of them."""
     around: bool = False
     """Whether names have the values that they have beside the freedoms, and the baseline is recalibrated around them: where the form of
     the friction law is more than noise, other values would make up for it."""

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from lugre_steering.chain.lag import lagged
+from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.refine import given_law
 from lugre_steering.effects import laws
@@ -40,19 +41,16 @@ SMALL = 0.2
 """Share of a freedom by which its effect on the torque is found: small enough to be linear."""
 
 
-class Freedom(NamedTuple):
-    """Shapes f (k, KNOTS) that a channel may have along a coordinate, at their largest; ``words``: what that is of the friction."""
+class Bent(NamedTuple):
+    """A problem with these freedoms; what each of its bends is, in ``words``; and the laws whose shapes are the first of them."""
 
-    words: str
-    channel: str
-    coordinate: str
-    low: float
-    high: float
-    shapes: Array
+    problem: Problem
+    words: tuple[str, ...]
+    freedoms: tuple[Freedom, ...]
 
 
-def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
-    """The problem with these freedoms, as the chain shows them at a fit; and what each is, in words."""
+def bent(problem: Problem, fitted: Fit) -> Bent:
+    """The problem with these freedoms, as the chain shows them at a fit."""
     lawful = Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=1)
     place, x = len(problem.vehicle.laws), fitted.x[: problem.nuisances]
     bags = range(len(problem.runs))
@@ -62,18 +60,18 @@ def bent(problem: Problem, fitted: Fit) -> tuple[Problem, tuple[str, ...]]:
         law = given_law(Cell(freedom.channel, Axis(freedom.coordinate), freedom.low, freedom.high), place, SMALL * f)
         return np.asarray((np.concatenate([lawful.predict(bag, x, [law]) for bag in bags]) - base) / SMALL)
 
-    shapes = [(freedom, f) for freedom in freedoms(problem, fitted) for f in freedom.shapes]
+    freedoms = _freedoms(problem, fitted)
+    shapes = [(freedom, f) for freedom in freedoms for f in freedom.shapes]
     columns = in_threads(lambda shape: column(*shape), shapes)
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
     words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
     freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
-    return freer.bent([still_apart(problem, base)]), words
+    return Bent(freer.bent([still_apart(problem, base)]), words, tuple(freedoms))
 
 
-def freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
-    """Those of the friction law, whose sizes come first among the bends of ``bent``; of the same problem and fit the same."""
+def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
     own = {name: float(problem.model.parameters[0][0][name]) for name in ("stribeck_speed", "static_torque", "coulomb_torque", "sigma_0")}
     own |= problem.fields(fitted.x)
     presliding = own["coulomb_torque"] / own["sigma_0"]

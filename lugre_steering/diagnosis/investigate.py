@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.form import bent
+from lugre_steering.diagnosis.form import Bent, bent
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
@@ -50,11 +50,11 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
     # What else joints and axes may do is found by name: their sheets know little of their friction anyhow.
     alone = is_rig(problem.vehicle)
     thin, kept = _coarser(problem, baseline, ALONE * SAMPLES if alone else SAMPLES)
-    freer, words = (thin, ()) if alone else bent(thin, baseline)
+    freer, words, freedoms = Bent(thin, (), ()) if alone else bent(thin, baseline)
     fewer = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
     used = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
     there, found = search(freer, fewer, used, _unbent(freer, np.where(used.fit, 1.0 / fewer.sigma, 0.0), baseline), progress)
-    beside = Finished(there, fewer, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))))
+    beside = Finished(there, fewer, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))), freedoms=freedoms)
     done = Finished(problem, noise, roles, replace(found, baseline=baseline), beside_form=beside)
     done = _with_final(done, found.final)
     if not there.bends.shape[1] or not found.found or any(item.in_place for item in found.found) or not done.needs_form:

@@ -220,7 +220,8 @@ class Diagnosis(Result):
     laws: tuple[Mapping[str, Any], ...] = field(default=(), metadata=ADDED)
     """Found where no entry of the catalogue explains what is left; ``augmented.yaml`` runs them."""
     friction_form: FrictionForm | None = field(default=None, metadata=ADDED)
-    """Laws that augmented.yaml has beside the effects, or formed.yaml where nothing is named; None where friction has the form of the model's, or no law of it holds."""
+    """Laws that augmented.yaml has beside the effects, or formed.yaml where nothing is named; None where friction has the form of the
+    model's, or no law of it holds."""
     headline: str = field(default="", metadata=ADDED)
     """How the statement begins: what, where, how much of the torque, what to do."""
     provenance: Provenance | None = field(default=None, metadata=ADDED)

@@ -52,7 +52,7 @@ def left_beside_freedoms(known: Problem, torque: Array) -> float:
     """Share of what a recalibration leaves that stays beside the freedoms too."""
     problem = with_torque(known, torque)
     plain = fit(problem, weight(problem))
-    freer, words = bent(problem, plain)
+    freer, words, _ = bent(problem, plain)
     assert len(words) == freer.bends.shape[1]
     beside = fit(freer, weight(problem), start=np.concatenate([plain.x, np.zeros(len(words))]))
     return cost(freer, beside, weight(problem)) / cost(problem, plain, weight(problem))

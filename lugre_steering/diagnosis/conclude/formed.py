@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.form import Freedom, freedoms
+from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, Traces, trace
 from lugre_steering.diagnosis.laws.refine import law_of, sized_law
 from lugre_steering.fitting.fit import Fit, fit
@@ -47,12 +47,12 @@ class Formed(NamedTuple):
 
 def formed(done: Finished, named: bool, seed: int) -> Formed | None:
     """The form of the friction law beside what is named; None where it is none, or does not hold on held-out data."""
-    if not done.needs_form or done.beside_form is None or any(item.in_place for item in done.found.found):
-        return None
     there, found = done.compared, done.found
+    if not done.needs_form or not there.freedoms or any(item.in_place for item in found.found):
+        return None
     linear, plain = (there.found.final, found.final) if named else (there.found.baseline, found.baseline)
     names: Effects = linear.effects if named else ()
-    shapes = freedoms(there.problem, found.baseline)
+    shapes = there.freedoms
     sought = _with_places(there.problem, len(shapes), names).doubted(there.problem.doubt, there.problem.typical)
     laws = _laws(sought, shapes, linear.x[sought.first_bend :])
     start = linear.x[: sought.first_bend]
