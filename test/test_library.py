@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from typer.testing import CliRunner
 import lugre_steering as ls
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
+from lugre_steering.diagnosis.result import FrictionForm
 from lugre_steering.schemas import FILES, schema_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -297,6 +299,21 @@ def test_a_result_never_replaces_files_of_others(diagnosis: ls.Diagnosis, calibr
         with pytest.raises(ls.DataError, match=name):
             result.save(tmp_path)
         assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+
+
+def test_the_form_of_the_friction_has_a_file_where_nothing_is_named(diagnosis: ls.Diagnosis, tmp_path: Path) -> None:
+    form = FrictionForm("formed.yaml", 50.0, 0.4, (0.3, 0.5), 60.0, ("form of the friction: its presliding",), diagnosis.vehicle)
+    (tmp_path / "formed.yaml").write_text("mine", encoding="utf-8")
+    with pytest.raises(ls.DataError, match=r"formed\.yaml"):
+        replace(diagnosis, friction_form=form).save(tmp_path)
+    (tmp_path / "formed.yaml").unlink()
+    replace(diagnosis, friction_form=form).save(tmp_path)
+    assert ls.load_vehicle(tmp_path / "formed.yaml").effects == diagnosis.vehicle.effects
+    told = json.loads((tmp_path / "diagnosis.json").read_text())["friction_form"]
+    assert told["file"] == "formed.yaml"
+    assert "vehicle" not in told
+    replace(diagnosis, friction_form=replace(form, file="augmented.yaml")).save(tmp_path)  # the next one has it there
+    assert not (tmp_path / "formed.yaml").exists()
 
 
 # ------------------------------------------------------------------ schemas

@@ -4,11 +4,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_problem import small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
+from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
+from lugre_steering.diagnosis.conclude.formed import formed
 from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
@@ -19,6 +23,7 @@ from lugre_steering.fitting.split import CYCLE
 from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Manoeuvre, Sweep
+from lugre_steering.vehicle import Vehicle
 
 NOTHING = small_problem(33.0)
 RECORD = NOTHING.model.parameters[0][0]
@@ -83,6 +88,31 @@ def test_no_name_is_given_to_friction_of_another_form() -> None:
     per_sample = [form_energy(there.problem, baseline, used) / np.count_nonzero(used) for used in (there.fitted, there.held)]
     assert per_sample[1] == pytest.approx(per_sample[0])
     assert per_sample[0] > 1.0
+
+
+def error_elsewhere(vehicle: Vehicle) -> float:
+    """RMSE [N m] of a vehicle file on strokes that were not recorded, of tracks whose friction has the other form; without noise."""
+    strokes = small_problem(33.0, Manoeuvre("strokes", "", tuple(Sweep(angle, 5.0, 1.0) for angle in (9.0, -3.0, 14.0, -10.0, 12.0, 0.0))))
+    other = np.concatenate([friction(run, 1.4, 0.02, 0.02) - friction(run, 1.0, 0.0, 0.0) for run in strokes.runs])
+    known = Problem(vehicle, strokes.runs)
+    error = strokes.predict_all(strokes.start()) + other - known.predict_all(known.start())
+    return float(np.sqrt(np.mean(error[known.valid] ** 2)))
+
+
+def test_the_form_of_the_friction_is_written_as_laws_that_foretell_another_manoeuvre() -> None:
+    done = investigate(with_torque(NOTHING, RUBBED), 1)
+    form = formed(done, False, 1)
+    assert form is not None
+    assert form.better.interval[0] > 0.0
+    assert {law.coordinate for law in form.laws} >= {"abs_rate", "angle", "opposing_torque", "since_reversal"}
+    plain = augmented_vehicle(done, done.found.baseline, (), 0.0)
+    there = replace(done, problem=form.problem)
+    written = augmented_vehicle(there, form.whole, (), 0.0).replace(laws=form.laws)
+    assert error_elsewhere(written) < 0.5 * error_elsewhere(plain)
+
+
+def test_friction_of_the_model_has_no_form_of_its_own() -> None:
+    assert formed(investigate(with_torque(NOTHING, KNOWN), 1), False, 1) is None
 
 
 def test_a_stop_beside_it_is_named_alone_and_fitted_as_a_vehicle_file_can_hold_it() -> None:
