@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -41,6 +42,8 @@ class LawEntry:
     """95 % intervals of ``values``."""
     heldout_gain: float | None = None
     """Share of the missing energy that it foretold on held-out data."""
+    small: bool = False
+    """Whether f is small by what it is, so that leaving the range is no news."""
 
 
 def law_fields(entry: LawEntry) -> dict[str, float | Array]:
@@ -48,7 +51,8 @@ def law_fields(entry: LawEntry) -> dict[str, float | Array]:
     low, high = entry.range
     span = laws.reach(entry.form, low, high)
     f = laws.sampled(entry.form, entry.values, entry.knots, *span)
-    return laws.record(entry.channel, entry.coordinate, entry.memory, entry.memory_size, span, f, seen=(low, high))
+    seen = (-math.inf, math.inf) if entry.small else (low, high)
+    return laws.record(entry.channel, entry.coordinate, entry.memory, entry.memory_size, span, f, seen=seen)
 
 
 STAGE_OF: Mapping[str, str] = {

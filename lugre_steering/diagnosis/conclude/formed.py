@@ -102,7 +102,7 @@ def _written(problem: Problem, whole: Fit, shapes: Sequence[Freedom], names: int
         places = np.linspace(low, high, KNOTS)
         knots = tuple(float(f"{value:.5g}") for value in np.interp(places, np.linspace(freedom.low, freedom.high, f.size), f))
         said = f"form of the friction: {freedom.words}"
-        found.append(LawEntry(freedom.channel, freedom.coordinate, law.form, (low, high), knots=knots, title=said))
+        found.append(LawEntry(freedom.channel, freedom.coordinate, law.form, (low, high), knots=knots, title=said, small=True))
     return tuple(found)
 
 

@@ -19,6 +19,7 @@ from lugre_steering.diagnosis.laws.find import FoundLaws, find
 from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names, room_for_laws
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
+from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import is_rig
 from lugre_steering.fitting.sheet import LEVELS, at_bounds
 
@@ -121,9 +122,11 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
 
 
 def _left(done: Finished, named: bool) -> LeftOver:
-    """What is left beside the freedoms of the friction law and of the names."""
-    there = done.compared.found
-    return left_over(done.compared, there.final if named else there.baseline, done.needs_form)
+    """What is left beside the freedoms of the friction law and of the names, all fitted to all data: what they may be wrong by where they
+    were not fitted, as after many losses, is no structure."""
+    there = done.compared
+    known = there.found.final if named else there.found.baseline
+    return left_over(there, fit(there.problem, there.weight, known.effects, known), done.needs_form)
 
 
 def _clocks_alone(done: Finished) -> bool:
