@@ -14,6 +14,7 @@ from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.formed import formed
 from lugre_steering.diagnosis.conclude.left_over import left_over
+from lugre_steering.diagnosis.conclude.stands import standing
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
@@ -113,6 +114,21 @@ def test_the_form_of_the_friction_is_written_as_laws_that_foretell_another_manoe
 
 def test_friction_of_the_model_has_no_form_of_its_own() -> None:
     assert formed(investigate(with_torque(NOTHING, KNOWN), 1), False, 1) is None
+
+
+def test_freedoms_that_err_where_they_were_not_fitted_are_no_structure() -> None:
+    """Of most of a recording lost, held-out samples lie where no fitted ones do."""
+    whole, rng, runs = with_torque(NOTHING, KNOWN + 2.0 * (RUBBED - KNOWN)), np.random.default_rng(4), []
+    for run in whole.runs:
+        second = round(1.0 / (run.time[1] - run.time[0]))
+        kept = np.repeat(rng.random(run.time.size // second + 1) < 0.15, second)[: run.time.size]
+        kept[:second] = True
+        runs.append(replace(run, valid=run.valid & kept))
+    done = investigate(Problem(whole.vehicle, runs), 1)
+    there = done.compared
+    assert left_over(there, there.found.baseline, done.needs_form).structured
+    _, stands = standing(done, 1, lambda _: None)
+    assert stands.verdict == "consistent"
 
 
 def test_a_stop_beside_it_is_named_alone_and_fitted_as_a_vehicle_file_can_hold_it() -> None:
