@@ -107,6 +107,9 @@ def test_tables_are_what_they_say(done: Path, runs: Path) -> None:
     assert scores["run_0"]["rmse_Nm"] > 0.0
     assert scores["run_0"]["duration_s"] == pytest.approx(5.0, abs=0.1)
     assert scores["robot"]["quarantine"] is not None
+    hashes = {row["bag"]: row["bag_sha256"] for row in scores.values()}
+    for name in ("findings", "effects", "estimates"):
+        assert all(row["bag_sha256"] == hashes[row["bag"]] for row in table(done, name))
     single = CliRunner().invoke(app, ["replay", str(runs / "run_3"), "--vehicle", str(VEHICLE), "--out", str(done.parent / "replay")])
     assert single.exit_code == 0
     known = json.loads((done.parent / "replay" / "summary.json").read_text())["overall"]

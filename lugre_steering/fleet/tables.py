@@ -33,16 +33,17 @@ SCORES: Columns = {
     "verdict": "text", "quarantine": "text", "seconds": "number",
 }  # fmt: skip
 FINDINGS: Columns = {
-    "vehicle": "text", "bag": "text", "finding": "text", "topic": "text", "begin_s": "number", "end_s": "number", "statement": "text",
+    "vehicle": "text", "bag": "text", "bag_sha256": "text", "finding": "text", "topic": "text", "begin_s": "number", "end_s": "number",
+    "statement": "text",
 }  # fmt: skip
 EFFECTS: Columns = {
-    "vehicle": "text", "bag": "text", "recorded": "text", "effect": "text", "parameter": "text", "unit": "text", "value": "number",
-    "low": "number", "high": "number", "p_value": "number", "energy_share": "number", "masked_share": "number",
+    "vehicle": "text", "bag": "text", "bag_sha256": "text", "recorded": "text", "effect": "text", "parameter": "text", "unit": "text",
+    "value": "number", "low": "number", "high": "number", "p_value": "number", "energy_share": "number", "masked_share": "number",
     "largest_Nm": "number", "largest_share": "number",
 }  # fmt: skip
 ESTIMATES: Columns = {
-    "vehicle": "text", "bag": "text", "recorded": "text", "effect": "text", "shape": "whole", "parameter": "text", "unit": "text",
-    "value": "number", "sd": "number", "sign": "whole", "each_Nm": "number", "each_share": "number",
+    "vehicle": "text", "bag": "text", "bag_sha256": "text", "recorded": "text", "effect": "text", "shape": "whole", "parameter": "text",
+    "unit": "text", "value": "number", "sd": "number", "sign": "whole", "each_Nm": "number", "each_share": "number",
 }  # fmt: skip
 KINDS: Mapping[str, Columns] = {
     "scores": SCORES, "findings": FINDINGS, "effects": EFFECTS, "estimates": ESTIMATES, "claims": _columns(Claim),
@@ -71,7 +72,7 @@ def rows(records: Sequence[Record], claims: Sequence[Claim], changes: Sequence[D
 
 def write_tables(tables: Mapping[str, Sequence[Mapping[str, Any]]], out: Path, made: Provenance) -> None:
     """Each as NAME.parquet, whole or not at all; an empty one has its columns too. Its metadata tells how it was ``made``, but for the
-    bags, which fleet.json names."""
+    bags, whose hashes stand in the rows."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -84,7 +85,7 @@ def write_tables(tables: Mapping[str, Sequence[Mapping[str, Any]]], out: Path, m
 
 
 def _who(record: Record) -> dict[str, Any]:
-    return {"vehicle": record["member"], "bag": record["bag"], "recorded": record["recorded"]}
+    return {"vehicle": record["member"], "bag": record["bag"], "bag_sha256": record.get("bag_sha256"), "recorded": record["recorded"]}
 
 
 def _score(record: Record) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 """The form of the friction law as laws of a vehicle file, where it is more than noise and holds on held-out data.
 
 Names are compared beside linear freedoms of the law (``diagnosis.form``). Here the same shapes run in the chain, with sizes fitted
-there beside what stands. Those of the first sweep alone are left out: no other recording begins like that.
+there beside what stands.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from lugre_steering.vehicle import LawEntry
 
 LINEARISATIONS, KNOTS = 4, 257
 """Of the fit in the chain, which begins where the linear freedoms end; knots of a written law, near enough for the presliding."""
-FIRST_SWEEP = ("slip", "rubber_temperature")
+OF_THIS_RECORDING = ("slip", "rubber_temperature")
+"""Coordinates of freedoms that are not written: no other recording begins with this first sweep, nor is as warm."""
 
 Effects = tuple[tuple[Candidate, Values], ...]
 
@@ -81,7 +82,7 @@ def _laws(problem: Problem, shapes: Sequence[Freedom], sizes: Array) -> list[tup
     """The freedoms that are kept as laws of free sizes; ``sizes``: of all freedoms, one after the other."""
     kept: list[tuple[Candidate, dict[str, float]]] = []
     for freedom, own in zip(shapes, np.split(sizes, np.cumsum([len(freedom.shapes) for freedom in shapes])), strict=False):
-        if freedom.coordinate not in FIRST_SWEEP:
+        if freedom.coordinate not in OF_THIS_RECORDING:
             cell = Cell(freedom.channel, Axis(freedom.coordinate), freedom.low, freedom.high)
             kept.append(sized_law(cell, len(problem.vehicle.laws) + len(kept), freedom.shapes, own, problem.typical))
     return kept
@@ -89,7 +90,7 @@ def _laws(problem: Problem, shapes: Sequence[Freedom], sizes: Array) -> list[tup
 
 def _written(problem: Problem, whole: Fit, shapes: Sequence[Freedom], names: int) -> tuple[LawEntry, ...]:
     """The laws that come after the ``names`` of a fit, over the range of their coordinates that the recordings show."""
-    kept = [freedom for freedom in shapes if freedom.coordinate not in FIRST_SWEEP]
+    kept = [freedom for freedom in shapes if freedom.coordinate not in OF_THIS_RECORDING]
     axes = list(dict.fromkeys(Axis(freedom.coordinate) for freedom in kept))
     traced = trace(problem, whole, len(problem.vehicle.laws) + len(kept), axes)
     found = []

@@ -60,7 +60,8 @@ def statement(
         if law:
             rest = f"{left.text[:1].upper()}{left.text[1:]}."
             return headline.lawful(law, nearest), f"{_gain(done, judged, 'the law')} {floor} {rest}"
-        return headline.unlisted(done, judged.before, left.text), f"{floor} Where it lives: unexplained in diagnosis.json."
+        lives = "Where it lives: unexplained in diagnosis.json."
+        return headline.unlisted(done, judged.before, left.text), " ".join([*_formed(done, form), floor, lives])
     told = headline.missing(done, effects, law, advice, not ended)
     them = "it" if len(effects) == 1 and not law else "them"
     them += " and the form of this friction" if form is not None else ""
