@@ -24,12 +24,15 @@ from lugre_steering.fitting.split import CLUSTER_S
 from lugre_steering.recording import Array, Finding, Kind, Recording
 from lugre_steering.vehicle import Vehicle
 
-LONGEST_S = 0.035
-"""Devices that stamp on receipt are 0 to 30 ms apart; more is told by name (time_delay) or as wiring (clock_skew)."""
+LONGEST_S = 0.045
+"""Devices are up to 30 ms apart, and stamps on receipt 10 ms late and more with jitter; beyond, it is told by name (time_delay) or as
+wiring (clock_skew)."""
 SHORTEST_S, SURE = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
 ALIKE_S = 1e-3
 """Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
+BY_CHANCE = 0.1
+"""Share of what clocks may be apart within which they must be known to agree: else agreement comes by chance too often to prove anything."""
 WORTH_SAYING_S = 2e-3
 APART_S = 0.015
 """How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form."""
@@ -106,8 +109,8 @@ def _alike(late: Array, deviation: Array) -> bool:
     """Whether every one of several recordings shows the same delay: a property of the machine, which has a name."""
     if late.size < 2 or not late.all():
         return False
-    apart = np.abs(late - late.mean())
-    return bool(np.all(apart <= np.maximum(ALIKE_S, SURE * deviation)))
+    apart, reach = np.abs(late - late.mean()), np.maximum(ALIKE_S, SURE * deviation)
+    return bool(reach.max() < BY_CHANCE * LONGEST_S and np.all(apart <= reach))
 
 
 def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:
