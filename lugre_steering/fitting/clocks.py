@@ -30,9 +30,9 @@ wiring (clock_skew)."""
 SHORTEST_S, SURE = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
 ALIKE_S = 1e-3
-"""Offsets of several recordings this close, or as close as they are known, are one delay of the machine; clocks start anew each time."""
-BY_CHANCE = 0.1
-"""Share of what clocks may be apart within which they must be known to agree: else agreement comes by chance too often to prove anything."""
+"""How alike offsets of several recordings are that are one delay of the machine; clocks start anew each time."""
+ODDS = 3.0
+"""Of one delay against clocks that happen to agree, from which it is one."""
 WORTH_SAYING_S = 2e-3
 APART_S = 0.015
 """How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form."""
@@ -109,8 +109,12 @@ def _alike(late: Array, deviation: Array) -> bool:
     """Whether every one of several recordings shows the same delay: a property of the machine, which has a name."""
     if late.size < 2 or not late.all():
         return False
-    apart, reach = np.abs(late - late.mean()), np.maximum(ALIKE_S, SURE * deviation)
-    return bool(reach.max() < BY_CHANCE * LONGEST_S and np.all(apart <= reach))
+    spread = np.hypot(deviation, ALIKE_S)
+    weight = spread**-2
+    apart = float(np.sum(weight * (late - np.average(late, weights=weight)) ** 2))
+    # Likelihood of one delay that lies anywhere, over that of as many clocks that each do.
+    one = np.sqrt(2.0 * np.pi / weight.sum()) / np.prod(np.sqrt(2.0 * np.pi) * spread) * np.exp(-0.5 * apart)
+    return bool(one * (2.0 * LONGEST_S) ** (late.size - 1) > ODDS)
 
 
 def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:

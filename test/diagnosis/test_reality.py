@@ -25,6 +25,7 @@ from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Search
+from lugre_steering.fitting import clocks
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
@@ -111,9 +112,9 @@ def shifted(*late_s: float) -> list[Recording]:
 def test_offsets_between_clocks_are_measured_and_taken_out() -> None:
     late_s = (0.02, -0.012)
     apart = shifted(*late_s)
-    clocks = synchronised(apart, VEHICLE)
-    problem, findings = clocks.problem, clocks.findings
-    np.testing.assert_allclose(clocks.late, late_s, atol=1e-3)
+    told = synchronised(apart, VEHICLE)
+    problem, findings = told.problem, told.findings
+    np.testing.assert_allclose(told.late, late_s, atol=1e-3)
     assert len(findings) == len(apart)
     for recording, run, late in zip(apart, problem.runs, late_s, strict=True):
         said = float(findings[recording.name].statement.split("stamped ")[1].split(" ms")[0])
@@ -124,10 +125,22 @@ def test_offsets_between_clocks_are_measured_and_taken_out() -> None:
 
 
 def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
-    clocks = synchronised(shifted(0.02, 0.02), VEHICLE)
-    problem = clocks.problem
-    assert clocks.findings == {}
+    told = synchronised(shifted(0.02, 0.02), VEHICLE)
+    problem = told.problem
+    assert told.findings == {}
     np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
+
+
+@pytest.mark.parametrize(
+    ("late_s", "deviation_s", "alike"),
+    [
+        ((0.02, 0.021), 2e-4, True), ((0.02, 0.021), 2e-3, True), ((0.02, 0.021), 2e-2, False), ((0.034, 0.023), 2e-3, False),
+        ((0.02, 0.0), 2e-4, False),
+    ],
+)  # fmt: skip
+def test_agreement_that_comes_by_chance_is_no_delay_of_the_machine(late_s: tuple[float, float], deviation_s: float, alike: bool) -> None:
+    """Clocks lie anywhere within some tens of milliseconds: known no better than that, two of them always agree."""
+    assert clocks._alike(np.array(late_s), np.full(2, deviation_s)) == alike
 
 
 def searched(used: list[Recording], named: Effects = ()) -> Finished:
