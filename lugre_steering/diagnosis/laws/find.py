@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
-from lugre_steering.diagnosis.laws.refine import Law, free_law, simplified, with_law
+from lugre_steering.diagnosis.laws.refine import Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
 from lugre_steering.fitting.fit import Fit, fit
@@ -39,9 +39,7 @@ class Tried:
 
     @property
     def law(self) -> Law:
-        effect = self.fit.effects[-1][0].effect
-        assert isinstance(effect, Law)
-        return effect
+        return law_of(self.fit.effects[-1][0].effect)
 
     @property
     def values(self) -> int:

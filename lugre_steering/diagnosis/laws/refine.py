@@ -213,8 +213,7 @@ def with_law(problem: Problem, weight: Array, before: Fit, law: tuple[Candidate,
 def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: int) -> Fit:
     """The fit whose last law, of free pieces, is replaced by the simplest closed form that keeps its gain; or as it is."""
     candidate, values = free.effects[-1]
-    law = candidate.effect
-    assert isinstance(law, Law)
+    law = law_of(candidate.effect)
     cell, names = law.at(values), [f"piece_{i}" for i in range(law.cell.pieces)]
     first = problem.nuisances + sum(len(known.free) for known, _ in before.effects)
     part = slice(first, first + len(names))
