@@ -23,7 +23,7 @@ EXIT_CODES = {"consistent": 0, "missing_physics": 3, "unlisted_physics": 4, "ins
 
 IN_TABLE = (
     "With it the held-out", "With them the held-out", "With it and the form", "With them and the form", "With the law the held-out",
-    "Noise alone",
+    "With the law and the form", "Noise alone",
 )  # fmt: skip
 """How sentences begin whose numbers stand in the table."""
 

@@ -217,6 +217,11 @@ class Problem:
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
     @property
+    def last_place(self) -> int:
+        """The last of the places for laws."""
+        return len(self.vehicle.laws) + self._places[0] - 1
+
+    @property
     def sensor_weight(self) -> Array:
         """One over ``sigma`` (n,) [1/(N m)] where samples are valid, 0 elsewhere: before a fit has shown the noise."""
         return np.asarray(self.valid / self.sigma)

@@ -17,11 +17,11 @@ from typer.testing import CliRunner
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.laws.cells import Axis, Cell
-from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find
+from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
+from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
 from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names
-from lugre_steering.diagnosis.laws.screen import Screened
+from lugre_steering.diagnosis.laws.screen import Screen, Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.effects.law_entry import LawEntry
@@ -105,6 +105,48 @@ def test_a_torque_that_remembers_the_rate_is_found_with_its_time_constant() -> N
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
     assert entry.memory_size == pytest.approx(1.5, rel=0.2)
     assert found.foretold == found.ceiling  # nothing of any shape foretells more
+
+
+def test_a_loss_that_remembers_where_it_came_from_is_found() -> None:
+    """A loss along an angle through a play of 0.1 rad, which nothing but the loss shows."""
+
+    def played(angle: Array) -> Array:
+        kept = [angle[0]]
+        for now in angle:
+            kept.append(min(max(kept[-1], now - 0.1), now + 0.1))
+        return np.array(kept[1:])
+
+    _, found = searched(by_run(lambda run: sum(2e4 * omega * played(theta) for theta, omega in zip(run.theta, run.omega, strict=True))))
+    assert found is not None
+    entry = entries(found)[0]
+    assert (entry.channel, entry.coordinate, entry.memory) == ("viscous_loss", "angle", "play")
+    assert entry.memory_size == pytest.approx(0.1, rel=0.2)
+
+
+def test_of_laws_that_tie_the_one_that_can_happen_again_is_preferred() -> None:
+    """Along the angle or along the way since the start, which no other recording repeats; unless the way explains clearly more."""
+    room = Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1)
+    plain = fit(room, weight(room))
+
+    def tried(coordinate: str, cost: float) -> Tried:
+        cell = Cell("inertia", Axis(coordinate), 0.0, 1.0)
+        law = free_law(room, cell, 0, np.zeros(cell.pieces))
+        return Tried(Screened(cell, 0.0, np.zeros(1)), replace(plain, effects=(law,), cost=cost))
+
+    again, once, far_better = tried("angle", 120.0), tried("slip", 100.0), tried("slip", 50.0)
+    assert preferred([once, again], 1000.0) == [again, once]
+    assert preferred([again, far_better], 1000.0) == [far_better, again]
+
+
+def test_a_second_law_is_sought_beside_the_first_as_it_was_fitted() -> None:
+    """Pieces of the first that only the samples show that are left out must not run away."""
+    nothing = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()))
+    problem = Problem(nothing.vehicle, nothing.runs, more_laws=2)
+    used = np.where(split(problem).fit, weight(problem), 0.0)
+    short = Cell("inertia", Axis("time"), 0.0, float(problem.runs[0].time[-1]), pieces=36)
+    first = with_law(problem, used, fitted(problem), free_law(problem, short, 0, np.zeros(short.pieces)))
+    screen = Screen(problem, first, used, split(problem), white(problem).draws, trace(problem, first, 1, [Axis("angle")]), 1)
+    assert screen.left[0] < 1.2 * first.cost
 
 
 def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling() -> None:

@@ -73,9 +73,9 @@ def _modelled(done: Finished, stands: Stands) -> _Modelled:
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
-    if stands.named and (form := stands.form) is not None:
+    if (lawful := stands.lawful) is None and stands.named and (form := stands.form) is not None:
         return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, [], "", stands.left)
-    if (lawful := stands.lawful) is None:
+    if lawful is None:
         return _Modelled(done, final, whole, bent, [], "", stands.left)
     beside, laws = replace(done, problem=lawful.problem), described(lawful, stands.nearest)
     law = sentence(laws, done.torque)
@@ -86,8 +86,9 @@ def _modelled(done: Finished, stands: Stands) -> _Modelled:
 def _written(model: _Modelled, stands: Stands, effects: Sequence[NamedEffect]) -> Vehicle:
     """The vehicle file with what stands."""
     vehicle = augmented_vehicle(model.done, model.whole, effects, stands.after)
-    laws = stands.form.laws if stands.named and stands.form is not None else entries(stands.lawful) if stands.lawful is not None else ()
-    return vehicle.replace(laws=(*vehicle.laws, *laws))
+    found = entries(stands.lawful) if stands.lawful is not None else ()
+    form = stands.form.laws if stands.better and stands.form is not None else ()
+    return vehicle.replace(laws=(*vehicle.laws, *found, *form))
 
 
 def _form(done: Finished, stands: Stands, vehicle: Vehicle, causal: float, recordings: Sequence[Recording]) -> FrictionForm | None:
@@ -95,13 +96,13 @@ def _form(done: Finished, stands: Stands, vehicle: Vehicle, causal: float, recor
     augmented.yaml is the recalibrated baseline then."""
     if (found := stands.form) is None:
         return None
-    if not stands.named:
+    if not stands.better:
         vehicle = augmented_vehicle(replace(done, problem=found.problem), found.whole, (), found.better.after)
         vehicle = vehicle.replace(laws=(*vehicle.laws, *found.laws))
         causal = causal_rmse(vehicle, recordings, done.problem.runs)
     laws = tuple(dict.fromkeys(entry.title or "" for entry in found.laws))
     return FrictionForm(
-        AUGMENTED if stands.named else FORMED, found.better.after, found.better.gain, found.better.interval, causal, laws, vehicle
+        AUGMENTED if stands.better else FORMED, found.better.after, found.better.gain, found.better.interval, causal, laws, vehicle
     )
 
 

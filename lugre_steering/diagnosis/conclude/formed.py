@@ -18,7 +18,10 @@ from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, Traces, trace
+from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
 from lugre_steering.diagnosis.laws.refine import law_of, sized_law
+from lugre_steering.diagnosis.laws.rival import beside_form
+from lugre_steering.diagnosis.loudness import loudness
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE
@@ -52,21 +55,42 @@ def formed(done: Finished, named: bool, seed: int) -> Formed | None:
     if not done.needs_form or not there.freedoms or any(item.in_place for item in found.found):
         return None
     linear, plain = (there.found.final, found.final) if named else (there.found.baseline, found.baseline)
-    names: Effects = linear.effects if named else ()
-    shapes = there.freedoms
-    sought = _with_places(there.problem, len(shapes), names).doubted(there.problem.doubt, there.problem.typical)
-    laws = _laws(sought, shapes, linear.x[sought.first_bend :])
-    start = linear.x[: sought.first_bend]
-    inside = fit(sought, there.fitted, [*names, *laws], start, linearisations=LINEARISATIONS, tolerance=TRIAL_TOLERANCE)
-    problem = _with_places(done.problem, len(shapes), names)
+    return _formed(done, linear, there.problem.first_bend, linear.effects if named else (), (), plain, seed)
+
+
+def formed_beside(done: Finished, found: FoundLaws, seed: int) -> tuple[FoundLaws, Formed] | None:
+    """Laws and the form of the friction law in one model, where laws alone leave more than noise; None as for ``formed``."""
+    if not done.compared.freedoms or not loudness(found.problem, done.noise, found.fitted).loud:
+        return None
+    bent, _, linear = beside_form(done, found)
+    names, laws = linear.effects[: found.names], linear.effects[found.names :]
+    form = _formed(done, linear, bent.first_bend, names, laws, found.fitted, seed)
+    if form is None:
+        return None
+    return replace(found, problem=form.problem, fitted=form.fitted, fit=form.whole, judged=form.judged), form
+
+
+def _formed(
+    done: Finished, linear: Fit, first_bend: int, names: Effects, laws: Effects, plain: Fit, seed: int
+) -> Formed | None:
+    """The freedoms of a ``linear`` fit, whose sizes begin at ``first_bend``, in the chain between names and found laws; ``plain``: the
+    same without them."""
+    there, shapes = done.compared, done.compared.freedoms
+    before = MOST_LAWS if laws else 0
+    sought = _with_places(there.problem, before + len(shapes), names).doubted(there.problem.doubt, there.problem.typical)
+    form = _laws(sought, shapes, linear.x[first_bend:], before)
+    start = linear.x[:first_bend]
+    inside = fit(sought, there.fitted, [*names, *form, *laws], start, linearisations=LINEARISATIONS, tolerance=TRIAL_TOLERANCE)
+    problem, free = _with_places(done.problem, before + len(shapes), names), len(names) + len(form)
 
     def around(weight: Array, x: Array) -> Fit:
-        """The baseline recalibrated around names and laws."""
-        held = [(replace(candidate, free=()), values) for candidate, values in inside.effects]
-        return replace(fit(problem, weight, held, x), effects=inside.effects)
+        """The baseline and found laws fitted around names and form, which keep their values."""
+        held = [(replace(candidate, free=()), values) for candidate, values in inside.effects[:free]]
+        fitted = fit(problem, weight, [*held, *inside.effects[free:]], x)
+        return fitted if laws else replace(fitted, effects=inside.effects)
 
     fitted = around(done.fitted, inside.x)
-    judged, better = (verify.judged_once(problem, known, fitted, done.roles, seed) for known in (found.baseline, plain))
+    judged, better = (verify.judged_once(problem, known, fitted, done.roles, seed) for known in (done.found.baseline, plain))
     if not better.interval[0] > 0.0:
         return None
     whole = around(done.weight, fitted.x)
@@ -78,13 +102,14 @@ def _with_places(problem: Problem, laws: int, names: Effects) -> Problem:
     return Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=laws + 1, beside_names=bool(names))
 
 
-def _laws(problem: Problem, shapes: Sequence[Freedom], sizes: Array) -> list[tuple[Candidate, dict[str, float]]]:
-    """The freedoms that are kept as laws of free sizes; ``sizes``: of all freedoms, one after the other."""
+def _laws(problem: Problem, shapes: Sequence[Freedom], sizes: Array, first: int) -> list[tuple[Candidate, dict[str, float]]]:
+    """The freedoms that are kept as laws of free sizes, from the place ``first`` on; ``sizes``: of all freedoms, one after the other."""
     kept: list[tuple[Candidate, dict[str, float]]] = []
     for freedom, own in zip(shapes, np.split(sizes, np.cumsum([len(freedom.shapes) for freedom in shapes])), strict=False):
         if freedom.coordinate not in OF_THIS_RECORDING:
             cell = Cell(freedom.channel, Axis(freedom.coordinate), freedom.low, freedom.high)
-            kept.append(sized_law(cell, len(problem.vehicle.laws) + len(kept), freedom.shapes, own, problem.typical))
+            place = len(problem.vehicle.laws) + first + len(kept)
+            kept.append(sized_law(cell, place, freedom.shapes, own, problem.typical))
     return kept
 
 
@@ -92,9 +117,9 @@ def _written(problem: Problem, whole: Fit, shapes: Sequence[Freedom], names: int
     """The laws that come after the ``names`` of a fit, over the range of their coordinates that the recordings show."""
     kept = [freedom for freedom in shapes if freedom.coordinate not in OF_THIS_RECORDING]
     axes = list(dict.fromkeys(Axis(freedom.coordinate) for freedom in kept))
-    traced = trace(problem, whole, len(problem.vehicle.laws) + len(kept), axes)
+    traced = trace(problem, whole, problem.last_place, axes)
     found = []
-    for freedom, (candidate, values) in zip(kept, whole.effects[names:], strict=True):
+    for freedom, (candidate, values) in zip(kept, whole.effects[names : names + len(kept)], strict=True):
         low, high = _seen(traced, Axis(freedom.coordinate))
         if not low < high:
             continue

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lugre_steering.diagnosis import verify
-from lugre_steering.diagnosis.conclude.formed import Formed, formed
+from lugre_steering.diagnosis.conclude.formed import Formed, formed, formed_beside
 from lugre_steering.diagnosis.conclude.late import begun_late
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
@@ -73,8 +73,9 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
     if not tested.named and done.found.found and (late := begun_late(done)) is not done:
         done, tested = late, _tested(late, seed)
     stands = _beside_laws(done, tested, seed, progress)
-    if stands.lawful is not None:  # found without the form of the friction law, and standing alone
-        return done, stands
+    if stands.lawful is not None:
+        both = formed_beside(done, stands.lawful, seed)
+        return done, stands if both is None else replace(stands, lawful=both[0], judged=both[0].judged, form=both[1])
     form = (tested.form if stands.named else None) or formed(done, stands.named, seed)
     return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
 

@@ -59,14 +59,19 @@ def statement(
     if verdict == "unlisted_physics":
         if law:
             rest = f"{left.text[:1].upper()}{left.text[1:]}."
-            return headline.lawful(law, nearest), f"{_gain(done, judged, 'the law')} {floor} {rest}"
+            with_ = "the law" + _and_form(form)
+            return headline.lawful(law, nearest), " ".join([_gain(done, judged, with_), floor, rest, *_formed(done, form)])
         lives = "Where it lives: unexplained in diagnosis.json."
         return headline.unlisted(done, judged.before, left.text), " ".join([*_formed(done, form), floor, lives])
     told = headline.missing(done, effects, law, advice, not ended)
     them = "it" if len(effects) == 1 and not law else "them"
-    them += " and the form of this friction" if form is not None else ""
+    them += _and_form(form)
     remarks = _remarks(done, effects, judged, causal, left, ended)
     return told, " ".join([_gain(done, judged, them), floor, *remarks, *_formed(done, form)])
+
+
+def _and_form(form: FrictionForm | None) -> str:
+    return " and the form of this friction" if form is not None else ""
 
 
 def _formed(done: Finished, form: FrictionForm | None) -> list[str]:
@@ -75,7 +80,7 @@ def _formed(done: Finished, form: FrictionForm | None) -> list[str]:
         return []
     less = f"{done.torque(form.heldout_rmse_Nm)} of the held-out data, {words.percent(form.improvement)} less"
     if form.file == AUGMENTED:
-        return [f"The form of this friction is in augmented.yaml as laws; it leaves {less} than with the names alone."]
+        return [f"The form of this friction is in augmented.yaml as laws; it leaves {less} than without it."]
     return [f"The file {form.file} is the same with the form of this friction as laws: it leaves {less}."]
 
 

@@ -36,8 +36,6 @@ TRACER, WIDE = 1e-6, 1e9
 """Size of the law that carries a coordinate out of the chain, and a range that holds any."""
 FORM = "opposing_torque"
 """What the stiffness of another friction law depends on, which its freedoms have; no law of its own is sought there."""
-REMEMBERING = ("friction_level", "conservative_torque", "gain")
-"""Channels whose laws may remember."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ class Traces:
             often = (float(first), float(last)) if last - first > SEEN * (high - low) else (low, high)
             signs = axis.memory == "relay" or axis == Axis("direction")
             pieces = 1 if axis.coordinate == "none" else HATS if signs else PIECES
-            for channel in self.signals if axis.memory == "none" else REMEMBERING:
+            for channel in self.signals:
                 yield Cell(channel, axis, low, high, pieces, often=often)
                 if axis == Axis("angle") and channel in TOOTHED:
                     yield Cell(channel, axis, low, high, FINE, often=often)

@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
-from lugre_steering.diagnosis.laws.refine import Law, free_law, law_of, simplified, with_law
+from lugre_steering.diagnosis.laws.refine import PER_VALUE, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
 from lugre_steering.fitting.fit import Fit, fit
@@ -20,14 +20,14 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 MOST_LAWS = 2
-SHORTLIST, CLOSE, SIMPLIFIED = 5, 0.75, 2
+SHORTLIST, CLOSE, SIMPLIFIED = 8, 0.75, 2
 """Cells refitted in the chain, share of the best gain that brings them there, and how many of them are put into closed forms."""
 SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
-PER_VALUE = 0.01
-"""Share of the gain that one more value of a law must bring to be preferred."""
 TIED = 0.03
 """Share of the gain within which two laws cannot be told apart."""
+ONCE = ("time", "slip", "work", "air_temperature")
+"""Coordinates that only go on: what lies along them happened once, so that of two laws that tie the other one is likelier to hold again."""
 
 
 @dataclass(frozen=True)
@@ -95,12 +95,14 @@ def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None]
         if screened[0].gain < least:
             break
         tried = _tried(sought, weight, current, screen, screened, place, progress)
-        best, gain = tried[0], current.cost - tried[0].fit.cost
-        if gain < least or _unseen(there, best.fit) >= _unseen(there, current):
+        known = _unseen(there, current)
+        holding = (each for each in tried if current.cost - each.fit.cost >= least and _unseen(there, each.fit) < known)
+        if (best := next(holding, None)) is None:
             break
+        gain = current.cost - best.fit.cost
         if not index:
             ceiling = screen.black_box(seed)
-            ties = tuple(other for other in tried[1:] if other.fit.cost < best.fit.cost + TIED * gain)
+            ties = tuple(each for each in tried if each is not best and each.fit.cost < best.fit.cost + TIED * gain)
         gains.append(gain)
         foretold += best.screened.gain
         current = best.fit
@@ -129,7 +131,7 @@ def _tried(
     problem: Problem, weight: Array, current: Fit, screen: Screen, screened: Sequence[Screened], place: int,
     progress: Callable[[str], None],
 ) -> list[Tried]:
-    """The leading cells fitted in the chain, the best of them simplified; best first, a value more must pay."""
+    """The leading cells fitted in the chain, the best of them simplified; best first."""
     tried = []
     for one in shortlist(screened):
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
@@ -141,17 +143,26 @@ def _tried(
     tried = [
         replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)
     ]
-    gain = current.cost - min(each.fit.cost for each in tried)
-    return sorted(tried, key=lambda each: each.fit.cost + PER_VALUE * gain * each.values)
+    return preferred(tried, current.cost)
+
+
+def preferred(tried: Sequence[Tried], before: float) -> list[Tried]:
+    """Best first: what is left of the energy ``before``; a value more must pay, and so must what happens only once."""
+    gain = before - min(each.fit.cost for each in tried)
+
+    def price(each: Tried) -> float:
+        return PER_VALUE * each.values + TIED * (cell_of(each).axis.coordinate in ONCE)
+
+    return sorted(tried, key=lambda each: each.fit.cost + gain * price(each))
 
 
 def shortlist(screened: Sequence[Screened]) -> list[Screened]:
-    """The best cell of each channel and coordinate, as long as they come close to the best of all."""
-    chosen: dict[tuple[str, str], Screened] = {}
+    """The best cell of each channel, coordinate and kind of memory, as long as they come close to the best of all."""
+    chosen: dict[tuple[str, str, str], Screened] = {}
     for one in screened:
         if one.gain < CLOSE * screened[0].gain:
             break
-        chosen.setdefault((one.cell.channel, one.cell.axis.coordinate), one)
+        chosen.setdefault((one.cell.channel, one.cell.axis.coordinate, one.cell.axis.memory), one)
     return list(chosen.values())[:SHORTLIST]
 
 

@@ -20,6 +20,8 @@ from lugre_steering.recording import Array
 
 KEPT = 0.95
 """Share of the free gain that a closed form must keep."""
+PER_VALUE = 0.01
+"""Share of the gain that one more value of a law must bring to be preferred."""
 PULL = 0.03
 """How strongly fits pull the free pieces to zero, for those that the data do not show."""
 TRIED_FORMS = 3
@@ -211,7 +213,7 @@ def with_law(problem: Problem, weight: Array, before: Fit, law: tuple[Candidate,
 
 
 def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: int) -> Fit:
-    """The fit whose last law, of free pieces, is replaced by the simplest closed form that keeps its gain; or as it is."""
+    """The fit whose last law, of free pieces, is replaced by the closed form that keeps most of its gain for its values; or as it is."""
     candidate, values = free.effects[-1]
     law = law_of(candidate.effect)
     cell, names = law.at(values), [f"piece_{i}" for i in range(law.cell.pieces)]
@@ -220,7 +222,7 @@ def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: i
     gain = before.cost - free.cost
     trials = closed_forms(cell, np.array([values[name] for name in names]), free.covariance[part, part])
     promising = [trial for trial in trials if trial[0] < (1.0 - KEPT) * gain * 2.0]
-    for _, form, fixed, start in sorted(promising, key=lambda trial: (len(trial[3]), trial[0]))[:TRIED_FORMS]:
+    for _, form, fixed, start in sorted(promising, key=lambda trial: trial[0] + PER_VALUE * gain * len(trial[3]))[:TRIED_FORMS]:
         law_here = closed_law(problem, cell, place, form, fixed, start)
         closed = with_law(problem, weight, dataclasses.replace(before, x=free.x), law_here)
         if before.cost - closed.cost >= KEPT * gain:

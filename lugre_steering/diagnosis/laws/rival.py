@@ -59,7 +59,7 @@ def _more_evident(done: Finished, laws: FoundLaws) -> bool:
     """By the doubt of the model that leaves least in doubt; a name wins a draw."""
     there, weight = done.compared, done.compared.fitted
     named = there.problem, there.found.final
-    law = settled(*_beside_form(done, laws))
+    law = settled(*beside_form(done, laws))
     least = min(named[0].doubt, law[0].doubt)
     energies = []
     for problem, result in (named, law, (there.problem, there.found.baseline)):
@@ -68,7 +68,7 @@ def _more_evident(done: Finished, laws: FoundLaws) -> bool:
     return energies[1] < energies[0] - MARGIN * (energies[2] - energies[0])
 
 
-def _beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
+def beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
     """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
     there, of_names = done.compared.problem, done.compared.form.count("")
     columns = there.bends[:, : there.bends.shape[1] - of_names]

@@ -28,7 +28,7 @@ FOLDS, FOLD_CLUSTERS = 5, 2
 SMOOTHING = (1e-4, 1e-2, 1.0)
 """Weights of the second differences of a free f, as shares of its own energy."""
 RIDGE = 1e-6
-FREE = 1e3
+FREE = 30.0
 """Length of the columns of what is named, in noise standard deviations: so long that priors of one leave it free."""
 PERMUTED = 16
 FEATURES, REACHES, SIZES, TOLD = 300, (0.5, 1.0, 2.0), (0.3, 3.0), 0.01

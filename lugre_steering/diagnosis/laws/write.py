@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.laws.cells import Traces, trace
-from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, Tried, cell_of
+from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law, law_of
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.effects import laws
@@ -124,8 +124,7 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
     made = []
     effects = found.fit.effects[found.names :]
     cells = [law_of(candidate.effect).at(values) for candidate, values in effects]
-    last = len(found.problem.vehicle.laws) + MOST_LAWS - 1  # a place that is free, or that of the last law itself
-    traces = trace(found.problem, found.fit, last, [cell.axis for cell in cells])
+    traces = trace(found.problem, found.fit, found.problem.last_place, [cell.axis for cell in cells])
     for index, (entry, (candidate, values)) in enumerate(zip(entries(found), effects, strict=True)):
         law = law_of(candidate.effect)
         largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, found.names + index)), 99.0))
