@@ -13,6 +13,16 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LUGRE_STEERING_THREADS", "1")
 
 
+LONGEST = (
+    "test_engine_names.py", "test_rigs.py", "test_engine.py", "test_own_physics.py", "test_laws_found.py", "test_replay.py", "test_docs.py",
+)  # fmt: skip
+"""Files that take half a minute and more: begun last, one would keep its process busy when all others have finished."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
+
+
 @pytest.fixture(scope="module", autouse=True)
 def catalogue_of_the_package() -> Iterator[None]:
     """Physics that a file of tests adds is gone after it."""

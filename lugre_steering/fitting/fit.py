@@ -296,9 +296,10 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
     step = _solved(normal, -gradient)
     at_low, at_high = np.zeros(step.size, bool), np.zeros(step.size, bool)
     fewest, patience = step.size + 1, PATIENCE
+    sizes, least = np.abs(normal), np.abs(gradient)
     for _ in range(MOST_SETS * step.size):
         slope = normal @ step + gradient
-        certain = ROUNDING * (np.abs(normal) @ np.abs(step) + np.abs(gradient))
+        certain = ROUNDING * (sizes @ np.abs(step) + least)
         free = ~(at_low | at_high)
         below, above = free & (step < low), free & (step > high)
         leaving = (at_low & (slope < -certain)) | (at_high & (slope > certain))
@@ -313,7 +314,7 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
         step = np.where(at_low, low, np.where(at_high, high, 0.0))
         free = ~(at_low | at_high)
         if free.any():
-            step[free] = _solved(normal[np.ix_(free, free)], -(gradient + normal @ step)[free])
+            step[free] = _solved(normal[free][:, free], -(gradient + normal @ step)[free])
     return np.asarray(np.clip(step, low, high))
 
 

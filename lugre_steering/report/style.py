@@ -110,6 +110,7 @@ def figure(
         for text in fig.findobj(Text):
             text.set_text(words(text.get_text()))
         fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))
+        fig.set_layout_engine(None)  # it is laid out: with an engine left in place, all would be drawn once more before it is saved
         fig.text(0.015, (below - 0.05) / height, "\n".join(lines), fontsize=_CAPTION_SIZE, va="top", color="#333333")
         with replacing(file) as stream:
             origin = "\n".join((made or provenance("figure", {})).lines())

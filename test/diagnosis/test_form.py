@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.formed import formed
 from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.conclude.stands import standing
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
@@ -54,6 +56,12 @@ STOP = np.concatenate([
 ])  # fmt: skip
 
 
+@cache
+def rubbed() -> Finished:
+    """What an investigation of such friction alone comes to."""
+    return investigate(with_torque(NOTHING, RUBBED), 1)
+
+
 def left_beside_freedoms(known: Problem, torque: Array) -> float:
     """Share of what a recalibration leaves that stays beside the freedoms too."""
     problem = with_torque(known, torque)
@@ -77,7 +85,7 @@ def test_presliding_that_yields_by_another_power_is_explained_in_part_strokes_to
 
 
 def test_no_name_is_given_to_friction_of_another_form() -> None:
-    done = investigate(with_torque(NOTHING, RUBBED), 1)
+    done = rubbed()
     assert done.needs_form  # it is seen
     assert not done.found.found
     assert done.beside_form is not None
@@ -101,7 +109,7 @@ def error_elsewhere(vehicle: Vehicle) -> float:
 
 
 def test_the_form_of_the_friction_is_written_as_laws_that_foretell_another_manoeuvre() -> None:
-    done = investigate(with_torque(NOTHING, RUBBED), 1)
+    done = rubbed()
     form = formed(done, False, 1)
     assert form is not None
     assert form.better.interval[0] > 0.0

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from remembering import remembered
 from scipy.signal import lfilter
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from typer.testing import CliRunner
@@ -39,6 +40,7 @@ from lugre_steering.vehicle import save
 NOTHING = small_problem()
 
 
+@remembered
 def searched(hidden: Array | float) -> tuple[Problem, FoundLaws | None]:
     problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + hidden)
     return problem, in_what_is_left(problem, fitted(problem))

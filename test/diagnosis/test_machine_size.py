@@ -51,7 +51,8 @@ def measured() -> dict[str, Signal]:
     true = AXIS.replace(effects=hidden)
     ends = np.degrees([0.15, -0.15])
     sweeps = tuple(Sweep(ends[i % 2], rate, 1.0) for i, rate in enumerate((2.0, 3.0, 5.0, 1.5, 4.0, 2.5, 3.5, 2.0)))
-    run = simulate(true, motion_of(Manoeuvre("axis", "", (Hold(4.0), *sweeps, Hold(4.0))), true), sensing_of(true))
+    slower = dataclasses.replace(sensing_of(true), angle_rate_Hz=40.0, pressure_rate_Hz=40.0)  # quicker to diagnose
+    run = simulate(true, motion_of(Manoeuvre("axis", "", (Hold(4.0), *sweeps, Hold(4.0))), true), slower)
     return {channel.name: signal for channel, signal in run.signals.items()}
 
 
