@@ -16,7 +16,7 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
 from lugre_steering.calibration import calibrate_recordings, coverage
 from lugre_steering.calibration.calibrate import chosen
-from lugre_steering.calibration.estimate import _larger
+from lugre_steering.calibration.estimate import _larger, estimate
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import prepare
 from lugre_steering.errors import DataError
@@ -122,6 +122,21 @@ def test_what_a_short_run_cannot_tell_is_said():
     tied = next(c for c in done.result["undetermined"] if "temperature_sensitivity" in c["parts"])
     assert tied["parts"]["heat_capacity"] == pytest.approx(1.0, abs=0.2)
     assert "ratio with heat capacity" in tied["statement"]
+
+
+def test_friction_of_another_form_does_not_turn_into_weather():
+    """Torque that varies with the angle by 3 %, which no value explains: rubber of 15 degC does not become 1 degC."""
+    truth = off_sheet(level=1.2)
+    runs = [prepare(recording, SHEET) for recording in coverage.record(truth, coverage.QUICK, 5)]
+    bent = [replace(run, measured=run.measured * (1.0 + 0.03 * np.sin(8.0 * run.theta[0]))) for run in runs]
+    problem = Problem(SHEET, bent)
+    found = estimate(problem)
+    for bag in range(len(runs)):
+        assert problem.temperatures(bag, found.x) == pytest.approx((15.0, 15.0), abs=4.0)
+    sure = np.sqrt(np.diag(found.covariance))[: len(problem.calibrations)]
+    assert np.all(sure < 1.1 * problem.scales()[: len(problem.calibrations)])  # never less than the sheet knows
+    level = [c.name for c in problem.calibrations].index("friction_level")
+    assert abs(found.x[level] - math.log(1.2)) < 2.0 * sure[level]
 
 
 def test_a_value_beyond_its_range_is_flagged_at_the_bound():

@@ -5,15 +5,18 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lugre_steering.bench import closed_loop
 from lugre_steering.bench.closed_loop import NONE, PERIOD_S, drive, reference
 from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
 from lugre_steering.proof.field.friction import Inside, standing, turn_step, turn_track
 from lugre_steering.proof.field.hydraulics import gains
 from lugre_steering.proof.field.simulator import Setting, draw_setting
+from lugre_steering.vehicle.actuation import total_gains
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +56,22 @@ def test_a_closed_valve_holds_and_an_open_one_turns_the_track(setting: Setting) 
 
 
 def test_without_feed_forward_the_loop_is_stable_but_off(setting: Setting) -> None:
-    run = drive(NONE, setting, 8.0, None, 0.0)
-    time_s, wanted, _ = reference(setting.machine.limit, 8.0)
+    run = drive(NONE, setting, 8.0)
+    time_s, wanted, _ = reference(setting.machine, 8.0)
     assert run.time.size == time_s.size
     assert 0.05 < run.rms_deg < 2.0
     assert np.degrees(np.ptp(wanted)) > 10.0
+    assert np.abs(wanted[0] - wanted[1]).max() > np.radians(0.5)  # as the steering geometry makes the tracks differ
     assert run.energy_kJ > 0.0
+
+
+def test_the_plant_is_recorded_as_its_sensors_show_it(setting: Setting, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pressures times the gains of the sheet are what both sides' cylinders carried, but for the noise of the sensors."""
+    monkeypatch.setattr(closed_loop, "RECORD_S", 6.0)
+    sheet = closed_loop.sheet_of(setting, tmp_path)
+    recording, run = closed_loop.recorded(setting, sheet, -1.0), drive(NONE, setting, 6.0, way=-1.0)
+    assert sheet.hydraulics is not None
+    shown = total_gains(sheet, run.angles) * np.array([recording.pressure[line].value for line in sheet.hydraulics.lines])
+    noise = sheet.sensors.pressure_noise_Pa * np.sqrt((total_gains(sheet, run.angles) ** 2).sum(axis=0))
+    assert np.std((shown.sum(axis=0) - run.loads.sum(axis=0)) / noise) == pytest.approx(1.0, abs=0.1)
+    assert not np.any([effect.id == "end_stop" for effect in sheet.effects])

@@ -186,6 +186,25 @@ def test_faults_are_flagged_within_a_fifth_of_a_second(name: str, reason: str) -
     assert BEGIN_S <= t[told][0] <= BEGIN_S + 0.2
 
 
+def test_a_side_that_drifts_away_slowly_is_told_once_the_steering_geometry_forbids_it() -> None:
+    """No jump, no standstill, no noise: left strays by 0.1 rad/s from 6 s on."""
+
+    def strays(side: int, t: float, angle: float) -> float:
+        return angle + 0.1 * max(0.0, t - BEGIN_S) * (1 - side)
+
+    _, rows = drive(strays, 12.0)
+    t, axle = seconds_of(rows), VEHICLE.axle
+    assert axle is not None
+    sound = 0.3 * np.sin(0.7 * t)
+    left, right = sound + 0.1 * np.maximum(0.0, t - BEGIN_S), 0.95 * sound
+    ratio = axle.kingpin_distance_m / axle.wheelbase_m
+    tied = np.arctan2(np.tan(left), 1.0 + ratio * np.tan(left))
+    apart = (right < np.minimum(left, tied) - 0.2) | (right > np.maximum(left, tied) + 0.2)
+    told = np.array(["left and right angle contradict" in doubts(row) for row in rows])
+    assert t[told][0] == pytest.approx(t[apart][0], abs=0.03)
+    assert np.abs(rows["feed_forward"][t > t[apart][0] + 0.25][0]).max() == 0.0
+
+
 def push_both(rate_Hz: int, reading: Fault, seconds: float = 9.0, lost: float = 0.0) -> tuple[Estimator, Records]:
     """The estimator and its torques, of both sides at a rate, with a share of the messages lost."""
     rng, estimator, rows = np.random.default_rng(1), Estimator(VEHICLE), []

@@ -5,9 +5,9 @@
 The node runs in simulated time and in step with the plant: each period (5 ms) the plant sends its angles, the node answers with
 its feed-forward, and the controller acts upon it in the next period. So the figures do not depend on how busy the computer is. The
 plan is published as steering/command; the node looks one period and the valve's delay ahead. Compared: no feed-forward; a friction of
-constant size against the planned motion; the original LuGre model (no heating) and the improved one, both calibrated on a recording of
-the same plant; the improved one with the physics that the recording hides (a rubber stop) in its vehicle file; and a wrong model
-(twice the friction), without and with the limit of value that the node keeps.
+constant size against the planned motion; the original LuGre model (no heating) and the improved one, both calibrated on recordings of
+this plant without feed-forward, whose sheet does not know its rubber stop; the vehicle file that a diagnosis of the same recordings
+writes; nine tenths of what these say; and a wrong model (twice the friction), without and with the limit of value that the node keeps.
 """
 
 from __future__ import annotations
@@ -26,18 +26,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
 from lugre_steering.bench.neighbour import SECOND, NodeProcess
 from lugre_steering.calibration.library import calibrate
-from lugre_steering.proof.field.hidden import IN_SERVICE
+from lugre_steering.diagnosis.library import diagnose
 from lugre_steering.proof.field.hydraulics import gains
+from lugre_steering.proof.field.machine import Machine, track_angles
 from lugre_steering.proof.field.motion import strokes
-from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
+from lugre_steering.proof.field.rubber import table
+from lugre_steering.proof.field.simulator import Setting, draw_setting
 from lugre_steering.provenance import Provenance, provenance
-from lugre_steering.recording import NODE, Array
-from lugre_steering.simulate.plant import with_effects
+from lugre_steering.recording import NODE, Array, Recording
 from lugre_steering.vehicle import Vehicle, load, save
+from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.model import baseline_parameters
 
 PERIOD_S = 0.005
@@ -45,9 +48,8 @@ AHEAD_S = 0.02
 PLAN_S, PLAN_EVERY = 0.5, 20
 ANSWER_S = 2.0
 T0_NS = 1_000 * SECOND
+RECORD_S = 60.0
 NONE, STATIC = "none", "constant friction"
-STOP = IN_SERVICE["an end stop"]
-"""The catalogue's name of what the loop hides."""
 
 
 @dataclass(frozen=True)
@@ -64,16 +66,27 @@ class Run:
     wanted: Array
     error_deg: Array
     torque: Array
+    angles: Array
+    loads: Array
 
 
-def reference(limit: float, seconds: float) -> tuple[Array, Array, Array]:
-    """Times (n,) [s], wanted angle and rate of both sides: wide strokes into the stop, small reversals, holds."""
+@dataclass(frozen=True)
+class Fed:
+    """What is fed forward: a vehicle file, further arguments of the node, and the share of it that the controller takes."""
+
+    vehicle: Vehicle
+    arguments: tuple[str, ...] = ()
+    share: float = 1.0
+
+
+def reference(machine: Machine, seconds: float, way: float = 1.0) -> tuple[Array, Array, Array]:
+    """Times (n,) [s], wanted angles and rates (2, n): wide strokes into the stop, small reversals, holds; ``way`` -1: mirrored."""
     share = np.array([0.5, -0.5, 0.95, -0.95, 0.6, 0.4, 0.55, -0.3, 0.9, 0.0])
-    mean = strokes(limit * share, np.radians([6.0, 9.0, 12.0, 12.0, 9.0, 4.0, 4.0, 12.0, 9.0, 9.0]), np.full(share.size, 0.6))
+    mean = strokes(way * machine.limit * share, np.radians([6.0, 9.0, 12.0, 12.0, 9.0, 4.0, 4.0, 12.0, 9.0, 9.0]), np.full(share.size, 0.6))
     fine = 2e-3 * np.arange(mean.size)
     time_s = np.arange(0.0, min(seconds, fine[-1]), PERIOD_S)
-    wanted = np.interp(time_s, fine, mean)
-    return time_s, wanted, np.gradient(wanted, PERIOD_S)
+    wanted = track_angles(machine, np.interp(time_s, fine, mean))
+    return time_s, wanted, np.gradient(wanted, PERIOD_S, axis=1)
 
 
 class Controller:
@@ -131,40 +144,44 @@ class Controller:
         return self._heard[1] if self._heard[0] >= stamp_ns else None
 
     def plan(self, stamp_ns: int, angles: Array) -> None:
-        """Publish the angles (n,) wanted from now on, one period apart, for both joints."""
+        """Publish the angles (2, n) wanted from now on, one period apart."""
         from builtin_interfaces.msg import Duration, Time
         from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
         message = JointTrajectory(joint_names=[self._topics.left_joint, self._topics.right_joint])
         message.header.stamp = Time(sec=stamp_ns // SECOND, nanosec=stamp_ns % SECOND)
-        for i, angle in enumerate(angles.tolist()):
+        for i, both in enumerate(angles.T.tolist()):
             ahead_ns = round(i * PERIOD_S * SECOND)
-            message.points.append(JointTrajectoryPoint(positions=[angle, angle], time_from_start=Duration(nanosec=ahead_ns)))
+            message.points.append(JointTrajectoryPoint(positions=both, time_from_start=Duration(nanosec=ahead_ns)))
         self._plan.publish(message)
 
 
-def drive(name: str, setting: Setting, seconds: float, controller: Controller | None, constant_Nm: float) -> Run:
+def drive(
+    name: str, setting: Setting, seconds: float, controller: Controller | None = None, *, constant_Nm: float = 0.0, share: float = 1.0,
+    way: float = 1.0,
+) -> Run:
     """The whole manoeuvre; without a controller nothing is fed forward but a constant friction against the planned motion."""
-    time_s, wanted, rate = reference(setting.machine.limit, seconds)
+    time_s, wanted, rate = reference(setting.machine, seconds, way)
     drive_ = setting.drives[0]
     ground = setting.ground._replace(rubber_degC=drive_.rubber_degC, air_degC=drive_.air_degC)
     par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
     sides = [Side(par, ground, setting.ratios, cells) for cells in setting.cells]
     rng = np.random.default_rng(1)
-    angles, torques, commands, late = np.zeros((2, time_s.size)), np.zeros(time_s.size), np.zeros((2, time_s.size)), 0
+    angles, loads, commands = np.zeros((3, 2, time_s.size))
+    torques, late = np.zeros(time_s.size), 0
     fed = [0.0, 0.0]
     for i in range(time_s.size):
         stamp_ns = T0_NS + round(time_s[i] * SECOND)
         if controller is None:
-            fed = [constant_Nm * float(np.tanh(rate[i] / np.radians(0.3)))] * 2
+            fed = (constant_Nm * np.tanh(rate[:, i] / np.radians(0.3))).tolist()
         for j, side in enumerate(sides):
-            commands[j, i] = side.command(wanted[i], rate[i], fed[j], PERIOD_S)
+            commands[j, i] = side.command(wanted[j, i], rate[j, i], share * fed[j], PERIOD_S)
             side.advance(commands[j, i], PERIOD_S)
-            angles[j, i] = side.angle
-        torques[i] = fed[0]
+            angles[j, i], loads[j, i] = side.angle, side.load
+        torques[i] = share * fed[0]
         if controller is not None:
             if i % PLAN_EVERY == 0:
-                controller.plan(stamp_ns, wanted[i : i + round(PLAN_S / PERIOD_S)])
+                controller.plan(stamp_ns, wanted[:, i : i + round(PLAN_S / PERIOD_S)])
             seen = [side.angle + np.radians(0.01) * float(rng.standard_normal()) for side in sides]
             answer = controller.ask(stamp_ns, seen)
             late += answer is None
@@ -173,53 +190,69 @@ def drive(name: str, setting: Setting, seconds: float, controller: Controller | 
     energy = sum(float(side.state[5]) for side in sides) * 1e-3
     turns = int((np.diff(np.sign(commands), axis=1) != 0).sum())
     return Run(
-        name, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()), energy, turns, late, time_s, wanted, error[0], torques
-    )
+        name, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()), energy, turns, late, time_s, wanted[0], error[0], torques,
+        angles, loads,
+    )  # fmt: skip
 
 
-def models(setting: Setting, folder: Path) -> Mapping[str, tuple[Vehicle, tuple[str, ...]]]:
-    """Vehicle files to compare and the node's arguments, calibrated on a recording of the same machine."""
-    bags = simulate(setting, []).write(folder / "bags", folder / "unseen")
-    sheet = load(folder / "bags" / "vehicle.yaml")
-    improved = calibrate(bags, sheet).calibrated
-    drive_ = setting.drives[0]
-    assert improved.initial is not None
-    improved = improved.replace(
-        initial=dataclasses.replace(improved.initial, rubber_temperature_degC=drive_.rubber_degC, air_temperature_degC=drive_.air_degC)
-    )
-    par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
-    found = with_effects(improved, [f"{STOP}:engage_angle={par.stop_angle:.6g},stiffness={par.stop_stiffness:.6g}"])
+def sheet_of(setting: Setting, folder: Path) -> Vehicle:
+    """The vehicle file that came with the machine: it knows of no stop."""
+    (folder / "vehicle.yaml").write_text(yaml.safe_dump(setting.sheet, sort_keys=False), encoding="utf-8")
+    (folder / "rubber.csv").write_text(table(setting.machine.rubber), encoding="utf-8")
+    return load(folder / "vehicle.yaml")
+
+
+def recorded(setting: Setting, sheet: Vehicle, way: float) -> Recording:
+    """The plant without feed-forward, as its sensors show it."""
+    assert sheet.hydraulics is not None
+    run_, rng, sensors = drive(NONE, setting, RECORD_S, way=way), np.random.default_rng(2), sheet.sensors
+    pressures = line_pressures(run_.loads.sum(axis=0), total_gains(sheet, run_.angles))
+    pressures = pressures + sensors.pressure_noise_Pa * rng.standard_normal(pressures.shape)
+    angles = run_.angles + np.radians(sensors.angle_noise_deg) * rng.standard_normal(run_.angles.shape)
+    named = dict(zip(sheet.sides, angles, strict=True)), dict(zip(sheet.hydraulics.lines, pressures, strict=True))
+    return Recording.from_arrays(run_.time, angle=named[0], pressure=named[1], name="there" if way > 0.0 else "mirrored")
+
+
+def models(setting: Setting, folder: Path) -> Mapping[str, Fed]:
+    """What to compare, calibrated on and found in recordings of the plant."""
+    sheet = sheet_of(setting, folder)
+    recordings = [recorded(setting, sheet, way) for way in (1.0, -1.0)]
+    improved, diagnosis = calibrate(recordings, sheet).calibrated, diagnose(recordings, sheet)
+    print(diagnosis.statement, file=sys.stderr, flush=True)
+    found = diagnosis.augmented.vehicle
     axle = improved.axle
     assert axle is not None
     wrong = improved.replace(axle=dataclasses.replace(axle, load_N=2.0 * axle.load_N))
-    limit = 1.1 * float(baseline_parameters(improved)["static_torque"])
+    limit = 1.1 * float(baseline_parameters(found)["static_torque"])
     return {
-        "original LuGre": (improved.replace(rubber=None), ()),
-        "improved": (improved, ()),
-        "with the effect": (found, ()),
-        "wrong model": (wrong, ()),
-        "wrong model, limited": (wrong, ("-p", f"feed_forward_limit_Nm:={limit:.1f}")),
+        "original LuGre": Fed(improved.replace(rubber=None)),
+        "improved": Fed(improved),
+        "improved, nine tenths": Fed(improved, share=0.9),
+        "as diagnosed": Fed(found),
+        "as diagnosed, nine tenths": Fed(found, share=0.9),
+        "wrong model": Fed(wrong),
+        "wrong model, limited": Fed(wrong, ("-p", f"feed_forward_limit_Nm:={limit:.1f}")),
     }
 
 
 def campaign(seed: int, seconds: float) -> list[Run]:
     """All runs."""
     setting = draw_setting(seed, "clean", "white")
-    runs = [drive(NONE, setting, seconds, None, 0.0)]
+    runs = [drive(NONE, setting, seconds)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         compared = models(setting, folder)
-        parameters = baseline_parameters(compared["improved"][0])
-        runs.append(drive(STATIC, setting, seconds, None, float(parameters["coulomb_torque"])))
-        for label, (vehicle, arguments) in compared.items():
+        constant_Nm = float(baseline_parameters(compared["improved"].vehicle)["coulomb_torque"])
+        runs.append(drive(STATIC, setting, seconds, constant_Nm=constant_Nm))
+        for label, fed in compared.items():
             file = folder / f"{label.replace(' ', '_').replace(',', '')}.yaml"
-            save(vehicle, file)
+            save(fed.vehicle, file)
             common = ("-p", "use_sim_time:=true", "-p", f"feed_forward_horizon_s:={AHEAD_S}", "-p", "recovery_ramp_s:=0.2")
-            node = NodeProcess(file, folder / "node.log", *common, *arguments)
-            controller = Controller(vehicle)
+            node = NodeProcess(file, folder / "node.log", *common, *fed.arguments)
+            controller = Controller(fed.vehicle)
             try:
                 controller.join()
-                runs.append(drive(label, setting, seconds, controller, 0.0))
+                runs.append(drive(label, setting, seconds, controller, share=fed.share))
             finally:
                 controller.close()
                 node.stop(signal.SIGTERM)
@@ -227,12 +260,12 @@ def campaign(seed: int, seconds: float) -> list[Run]:
 
 
 def draw(runs: list[Run], file: Path, made: Provenance) -> None:
-    """The picture: wanted angle, torque fed forward, tracking error."""
+    """The picture: wanted angle, torque fed forward, tracking error; of as many runs as there are colours, the wrong models last."""
     from lugre_steering.report.style import SERIES, figure
 
     with figure(3, 1, "Closed loop with the live node: what feed-forward is worth", file, made=made) as axes:
         axes[0, 0].plot(runs[0].time, np.degrees(runs[0].wanted), color="black")
-        for run_, colour in zip(runs, SERIES, strict=True):
+        for run_, colour in zip(runs, SERIES, strict=False):
             axes[1, 0].plot(run_.time, 1e-3 * run_.torque, color=colour, linewidth=1.0)
             axes[2, 0].plot(run_.time, run_.error_deg, color=colour, linewidth=1.0)
             axes[0, 0].plot([], [], color=colour, label=f"{run_.feed_forward}: {run_.rms_deg:.2f} deg")
@@ -253,16 +286,20 @@ def run(argv: list[str]) -> None:
     options = parser.parse_args(argv)
     os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
     runs = campaign(options.seed, options.seconds)
+    _tell(runs, options.json)
     if options.out is not None:
         made = provenance("bench closed_loop", {"seed": options.seed, "seconds": options.seconds})
         draw(runs, options.out, made)
-    if options.json:
+
+
+def _tell(runs: list[Run], as_json: bool) -> None:
+    if as_json:
         shown = ("feed_forward", "rms_deg", "peak_deg", "energy_kJ", "reversals", "late")
         json.dump([{key: asdict(run_)[key] for key in shown} for run_ in runs], sys.stdout, indent=2)
         print()
         return
-    print(f"{'feed-forward':22} {'rms deg':>8} {'peak deg':>9} {'energy kJ':>10} {'reversals':>10} {'no answer':>10}")
+    print(f"{'feed-forward':26} {'rms deg':>8} {'peak deg':>9} {'energy kJ':>10} {'reversals':>10} {'no answer':>10}")
     for run_ in runs:
         print(
-            f"{run_.feed_forward:22} {run_.rms_deg:8.3f} {run_.peak_deg:9.3f} {run_.energy_kJ:10.0f} {run_.reversals:10d} {run_.late:10d}"
+            f"{run_.feed_forward:26} {run_.rms_deg:8.3f} {run_.peak_deg:9.3f} {run_.energy_kJ:10.0f} {run_.reversals:10d} {run_.late:10d}"
         )

@@ -97,6 +97,11 @@ class Side:
     def angle(self) -> float:
         return float(self.state[0])
 
+    @property
+    def load(self) -> float:
+        """Torque [N m] of the cylinders, as their pressures show it."""
+        return float(self.state[2]) * self.par.displacement
+
     def command(self, wanted: float, rate: float, torque: float, period_s: float) -> float:
         """Valve command (-1 ... 1) for a wanted angle [rad] and rate [rad/s], with a torque [N m] fed forward."""
         par = self.par

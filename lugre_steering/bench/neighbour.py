@@ -136,7 +136,11 @@ class Neighbour:
         self._types = {Kind.ANGLE: JointState, Kind.PRESSURE: FluidPressure, Kind.AIR_TEMPERATURE: Temperature}
         self.publishers: list[Any] = []
         self.restart = True
-        self.command = self.node.create_publisher(JointTrajectory, "steering/command", 10)
+        # Of a participant of its own, as a planner is: a flood out of the sensors' own shared memory would crowd out what they send.
+        self._planning = rclpy.Context()
+        rclpy.init(context=self._planning, args=[])
+        self._planner = rclpy.create_node("planner", context=self._planning)
+        self.command = self._planner.create_publisher(JointTrajectory, "steering/command", 10)
 
         def listen(kind: type, topic: str, keep: Callable[[Any], None]) -> None:
             self.node.create_subscription(kind, topic, keep, QoSProfile(depth=1000))
@@ -186,6 +190,7 @@ class Neighbour:
         for thread in self._threads:
             thread.join(5.0)
         self._context.try_shutdown()
+        self._planning.try_shutdown()
 
     def send(self, sample: Sample) -> None:
         """Publish one sample; what a sensor's message carries of it is kept in ``sent``."""

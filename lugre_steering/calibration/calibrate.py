@@ -160,6 +160,7 @@ def calibrate_recordings(
     wrong = wrong_sheet(problem)
     progress("fitting")
     fitted = estimate(problem, terms_of(problem), priors=priors)
+    problem = problem.doubted(fitted.doubt, problem.typical)
     found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]
     further = [*cut.items(), *clocks.findings.items(), *weather_findings(problem, fitted.fit).items()]
     found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])

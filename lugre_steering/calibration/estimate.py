@@ -11,7 +11,6 @@ The error of the chain's finite time step is taken out, and a quarter of it kept
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +18,7 @@ from scipy import stats
 from scipy.signal import correlate
 
 from lugre_steering.data.dataset import Run, motion
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import ROBUST, Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.problem import Effects, Problem
@@ -32,6 +32,8 @@ BLOCK_S = 2.0
 MEMORIES = 4.0
 """Block length in correlation times of the residual."""
 FEWEST_BLOCKS = 12
+MEDIAN = 0.6745
+"""Of the size of normal errors, in their standard deviation."""
 STEP_REMAINDER = 0.25
 """Share of the time step's error that may be left after it was taken out."""
 
@@ -41,9 +43,11 @@ class Estimate:
     """A fit and its statistics; parameters in the order of ``Problem`` (calibration values, then initial bristles and weather), then
     those of effects fitted beside them.
 
-    ``weight`` (n,) [1/(N m)] zero where not used, ``noise_floor`` [N m], ``residual`` (n,) [N m], ``draws`` (draws,
-    n) and ``step_error`` (n,) [N m] what noise and the finite time step may put into it, ``cluster`` (n,) the block of
-    each sample, ``prior`` (p,) the information of the priors, ``covariance`` (p, p), ``quantile`` of a 95 % interval.
+    ``weight`` (n,) [1/(N m)] by the noise, or the errors where they are larger, zero where not used;
+    ``noise_floor`` [N m], ``residual`` (n,) [N m], ``draws`` (draws, n) and ``step_error`` (n,) [N m] what noise
+    and the finite time step may put into it, ``cluster`` (n,) the block of each sample, ``prior`` (p,) the weight
+    of the priors, ``doubt`` how often it counts their information, ``covariance`` (p, p), ``quantile`` of a 95 %
+    interval.
     """
 
     fit: Fit
@@ -56,6 +60,7 @@ class Estimate:
     prior: Array
     covariance: Array
     quantile: float
+    doubt: float
 
     @property
     def x(self) -> Array:
@@ -89,11 +94,14 @@ def estimate(
     noise = noise_model(problem, first.x, first.effects, repeated_motion(problem, draws, seed), seed=seed)
     weight = problem.valid / noise.sigma
     step = step_error(problem, first.x, first.effects)
-    refined = copy.copy(problem)
+    # Where the law is not that of the recording, its errors are larger than noise and last: they say less about sheet and weather.
+    error = np.abs(problem.measured - first.prediction)[problem.valid] * weight[problem.valid]
+    weight = weight / max(1.0, float(np.median(error)) / MEDIAN)
+    refined = problem.doubted(doubt(problem, first, weight), problem.typical)
     refined.measured = problem.measured - step  # the same as adding the error to every prediction
     final = fit(refined, weight, first.effects, first.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
     information = final.pull**2  # as the prior rows of the fit have it
-    if problem.vehicle.rubber is not None and not weather_findings(problem, final):
+    if problem.vehicle.rubber is not None and not weather_findings(refined, final):
         # Values hold beside the temperatures of the file, against which nothing speaks; intervals know that these are not exact.
         known = refined.with_known_weather()
         final = fit(known, weight, final.effects, final.x, linearisations=LINEARISATIONS, robust=True, priors=priors)
@@ -102,11 +110,11 @@ def estimate(
     blocks = np.unique(cluster[weight > 0.0]).size
     result = Estimate(
         final, weight, noise.floor, residual, noise.draws, step, cluster, information,
-        np.empty(0), float(stats.t.ppf(0.975, max(blocks - information.size, 3))),
+        np.empty(0), float(stats.t.ppf(0.975, max(blocks - information.size, 3))), refined.doubt,
     )  # fmt: skip
     curvature, score = result.information(physical_jacobian(result))
     bread = np.linalg.pinv(curvature + np.diag(information), hermitian=True)
-    return replace(result, covariance=bread @ (score + np.diag(information)) @ bread)
+    return replace(result, covariance=bread @ (score + refined.doubt * np.diag(information)) @ bread)
 
 
 def physical_jacobian(result: Estimate) -> Array:

@@ -64,11 +64,11 @@ REPEATING, REPEATS_MEMORY = 0.1, 50.0
 DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
-    "outside the range of a law",
+    "outside the range of a law", "left and right angle contradict",
 )  # fmt: skip
-JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW = (1 << bit for bit in range(len(DOUBTS)))
+JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART = (1 << bit for bit in range(len(DOUBTS)))
 
-INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN
+INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART
 """What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
@@ -399,9 +399,25 @@ def weigh_residual(c, stamp_ns, measured, residual):
 
 
 @inner
+def _apart(core):
+    """Whether the sides are farther from each other than steering geometry and tolerance allow, however slowly they came there.
+
+    A linkage is something between parallel and Ackermann's.
+    """
+    c = core.config[0]
+    if math.isnan(c.side_ratio) or core.motion[0].started == 0.0 or core.motion[1].started == 0.0:
+        return False
+    first, second = core.motion[0].theta, core.motion[1].theta
+    tangent = math.tan(first)
+    tied = math.atan2(tangent, 1.0 + c.side_ratio * tangent)
+    return not min(first, tied) - c.side_tolerance <= second <= max(first, tied) + c.side_tolerance
+
+
+@inner
 def standing_doubts(core, stamp_ns):
-    """Doubts about the whole vehicle: a residual beyond the bound of the calibration, or as large as the torque; the plan."""
-    c, found = core.config[0], 0
+    """Doubts about the whole vehicle: sides that contradict, a residual beyond the bound of the calibration, or as large as the
+    torque; the plan."""
+    c, found = core.config[0], APART if _apart(core) else 0
     if c.residual_ns != 0 and stamp_ns - c.residual_ns < RESIDUAL_MEMORY_S * 1e9:
         level = math.sqrt(c.residual_square)
         smaller = math.sqrt(min(c.measured_square, c.estimate_square))

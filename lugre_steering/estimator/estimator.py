@@ -72,6 +72,7 @@ class Options:
     withdrawal_ramp_s: float = quantity(0.0, 60.0, default=0.2)
     recovery_ramp_s: float = quantity(0.0, 60.0, default=1.0)
     plan_tolerance_rad: float = quantity(0.0, 4.0, default=0.2)
+    side_tolerance_rad: float = quantity(0.0, 4.0, default=0.2)
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -320,7 +321,15 @@ def _set_options(config: Records, parameters: Records, options: Options) -> None
     config["limit"] = options.feed_forward_limit_Nm or LIMIT_STATIC * parameters["static_torque"].max()
     config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * parameters["sigma_0"].max()
     config["withdrawal_ramp"], config["recovery_ramp"] = options.withdrawal_ramp_s, options.recovery_ramp_s
-    config["plan_tolerance"] = options.plan_tolerance_rad
+    config["plan_tolerance"], config["side_tolerance"] = options.plan_tolerance_rad, options.side_tolerance_rad
+
+
+def _side_ratio(vehicle: Vehicle) -> float:
+    """Of Ackermann's geometry from the first side to the second (see ``other_track``); NaN where there is none."""
+    if vehicle.axle is None or len(vehicle.sides) < 2:
+        return math.nan
+    ratio = vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
+    return ratio if vehicle.sides[0] == "left" else -ratio
 
 
 def _config(vehicle: Vehicle, model: Model) -> Records:
@@ -338,6 +347,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["step_door"], config["arm_door"], config["line_door"] = doors(model.composition)
     config["friction"] = sum(float(p["static_torque"][0]) for p in model.parameters)
     config["weight"] = 1.0
+    config["side_ratio"] = _side_ratio(vehicle)
     known = known_range(vehicle)
     config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
     return config

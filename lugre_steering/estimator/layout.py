@@ -85,6 +85,8 @@ CONFIG = np.dtype(
         ("withdrawal_ramp", np.float64),  # [s]
         ("recovery_ramp", np.float64),  # [s]
         ("plan_tolerance", np.float64),  # [rad]
+        ("side_tolerance", np.float64),  # [rad]
+        ("side_ratio", np.float64),  # of the steering geometry, from the first side to the second; NaN: nothing ties them together
         ("plan_rate", np.float64),  # fastest plan [rad/s]
         ("message", np.int64),  # number of the message being processed, from 0
     ]

@@ -88,6 +88,7 @@ _MEANINGS = {
     "withdrawal_ramp_s": "the feed-forward goes to zero over this time when anything speaks against it [s]",
     "recovery_ramp_s": "and comes back over this time, as commands do after silence [s]",
     "plan_tolerance_rad": "a steering/command farther than this from the present angle is not used [rad]",
+    "side_tolerance_rad": "left and right angle contradict if they are farther than this from parallel and from the axle's geometry [rad]",
     "feed_forward_horizon_s": "the feed-forward is the torque needed this far ahead, along steering/command if it comes [s]",
 }
 OPTION_TABLE = tuple(

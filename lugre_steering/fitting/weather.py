@@ -25,7 +25,7 @@ def weather_findings(problem: Problem, result: Fit) -> dict[str, Finding]:
     for bag, run in enumerate(problem.runs):
         rubber, air = problem.temperatures(bag, result.x)
         at = [first + bag, first + count + bag]
-        spread = float(np.sqrt(max(result.covariance[np.ix_(at, at)].sum(), 0.0)))
+        spread = float(np.sqrt(max(problem.doubt * result.covariance[np.ix_(at, at)].sum(), 0.0)))
         off = rubber - initial.rubber_temperature_degC
         if abs(off) > max(MATTERS_K, SURE * spread):
             source = f"air {air:.0f} degC" + (" as recorded" if run.first_air is not None else ", by the fit")

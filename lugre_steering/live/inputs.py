@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
+from rclpy.event_handler import QoSMessageLostInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -58,8 +59,15 @@ class Inputs:
         overrides = QoSOverridingOptions.with_default_policies()
 
         def subscribe(message: type, topic: str, handle: Callable[..., None], raw: bool = False) -> Any:
-            qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
-            return node.create_subscription(message, topic, guarded(handle), qos, qos_overriding_options=overrides, raw=raw)
+            qos, name = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT), node.resolve_topic_name(topic)
+
+            def lost(info: QoSMessageLostInfo) -> None:
+                health.unused[f"{name} lost on the way"] += info.total_count_change
+
+            return node.create_subscription(
+                message, topic, guarded(handle), qos, qos_overriding_options=overrides, raw=raw,
+                event_callbacks=SubscriptionEventCallbacks(message_lost=guarded(lost)),
+            )  # fmt: skip
 
         self._subscriptions = []
         joints: dict[str, list[tuple[int, str]]] = {}

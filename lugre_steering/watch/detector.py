@@ -34,7 +34,7 @@ WIDE, WIDE_SIGMA = 0.95, 1.96
 """Quantile of the deviations that tells their scatter, and what it is of a normal one: days of two kinds have two humps."""
 LEAST_SCATTER = (0.1, 0.01, 0.1)
 """A tenth more or less error, or a hundredth of the friction, is never unusual."""
-THRESHOLD = 30.0
+THRESHOLD = 40.0
 """Of the cumulative sum, for one false alarm in about 1000 h; see ``bench watch``."""
 
 RING = KEPT + LAG

@@ -32,6 +32,12 @@ def test_a_fault_is_told_limited_and_recovered(campaign: faults.Campaign, name: 
     assert score.passed, score
 
 
+def test_plans_too_long_for_the_middleware_are_told_as_lost(campaign: faults.Campaign) -> None:
+    name = "a flood of huge plans"
+    score = campaign.judge(name, *faults.events_of(campaign)[name])
+    assert score.passed, score
+
+
 def test_a_node_that_is_killed_comes_back(campaign: faults.Campaign) -> None:
     assert faults.parameters_set_wrongly(campaign)
     last_command_is_zero, _ready_s = faults.killed(campaign, 15)
