@@ -59,6 +59,8 @@ class Run:
     """The worst angle sensor as one sample of this clock shows it [rad]."""
     rounding: Array = field(default_factory=lambda: np.zeros(0))
     """Step of each pressure sensor [Pa] (lines,) that its noise does not dither; 0 elsewhere, empty if none has one."""
+    on_receipt: bool = False
+    """Whether stamps were late by chance: given on receipt, they do not know when the devices measured."""
 
     @property
     def torque_per_line(self) -> Array:

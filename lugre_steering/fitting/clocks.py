@@ -31,6 +31,8 @@ SHORTEST_S, SURE = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
 ALIKE_S = 1e-3
 """How alike offsets of several recordings are that are one delay of the machine; clocks start anew each time."""
+ON_RECEIPT_S = 5e-4
+"""Scatter of stamps that are given on receipt; clocks that sample scatter by some tenths of a millisecond."""
 ODDS = 3.0
 """Of one delay against clocks that happen to agree, from which it is one."""
 WORTH_SAYING_S = 2e-3
@@ -69,8 +71,14 @@ def synchronised(
     effects: Effects = (),
 ) -> Synchronised:
     """Recordings prepared with one clock; ``effects``: what is known to act beside, as physics left out can pass for an offset."""
-    recordings = [with_even_stamps(recording) for recording in recordings]
-    problem = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], calibrations)
+    stamped, recordings = recordings, [with_even_stamps(recording) for recording in recordings]
+    received = [_on_receipt(*both) for both in zip(stamped, recordings, strict=True)]
+
+    def prepared(shifts: Array) -> Problem:
+        runs = [prepare(earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, shifts, strict=True)]
+        return Problem(vehicle, [replace(run, on_receipt=late) for run, late in zip(runs, received, strict=True)], calibrations)
+
+    problem = prepared(np.zeros(len(recordings)))
     as_stamped = Synchronised(problem, np.zeros(len(recordings)), {})
     if is_rig(vehicle):  # its inertia, which the sheet lacks, would pass for an offset
         return as_stamped
@@ -86,16 +94,15 @@ def synchronised(
         if np.abs(step).max() < SHORTEST_S:
             break
         late, deviation = late + step, np.array([offset.deviation_s for offset in offsets])
-        if np.abs(late).max() > LONGEST_S:
+        if np.any(np.abs(late) - SURE * deviation > LONGEST_S):
             return as_stamped
-        problem = Problem(vehicle, [
-            prepare(earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, late, strict=True)
-        ], calibrations)  # fmt: skip
+        problem = prepared(late)
         baseline = _baseline(problem, effects, baseline)
-    if not late.any() or _alike(late, deviation) or _slow_sensor(as_stamped.problem, start, baseline, late):
+    machine = _alike(late, deviation) and not any(received)
+    if not late.any() or machine or _slow_sensor(as_stamped.problem, start, baseline, late):
         return as_stamped
     return Synchronised(problem, late, {
-        recording.name: _finding(vehicle, float(shift), float(spread))
+        recording.name: clock_finding(vehicle, float(shift), float(spread))
         for recording, shift, spread in zip(recordings, late, deviation, strict=True) if abs(shift) > WORTH_SAYING_S
     })  # fmt: skip
 
@@ -115,6 +122,13 @@ def _alike(late: Array, deviation: Array) -> bool:
     # Likelihood of one delay that lies anywhere, over that of as many clocks that each do.
     one = np.sqrt(2.0 * np.pi / weight.sum()) / np.prod(np.sqrt(2.0 * np.pi) * spread) * np.exp(-0.5 * apart)
     return bool(one * (2.0 * LONGEST_S) ** (late.size - 1) > ODDS)
+
+
+def _on_receipt(stamped: Recording, even: Recording) -> bool:
+    """Whether stamps of a recording were late by chance, as no clock samples by itself."""
+    channels = [(stamped.angle, even.angle), (stamped.pressure, even.pressure)]
+    late = [own[name].time_s - signal.time_s for own, evened in channels for name, signal in evened.items()]
+    return any(float(np.std(each)) > ON_RECEIPT_S for each in late)
 
 
 def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:
@@ -170,7 +184,8 @@ def earlier(recording: Recording, shift: float) -> Recording:
     )  # fmt: skip
 
 
-def _finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
+def clock_finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
+    """That the torque of a recording is stamped ``late`` [s] against its angles, give or take ``deviation``."""
     topics = ", ".join(dict.fromkeys(c.topic for c in vehicle.channels if c.kind in (Kind.PRESSURE, Kind.TORQUE)))
     return Finding(
         "clock_offset", topics,

@@ -21,7 +21,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
-from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names
+from lugre_steering.diagnosis.laws.rival import beside_form, in_place, keeps_names, leaves_names
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
@@ -209,6 +209,8 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     assert leaves_names(named(problem, viscous), beside)
     assert not keeps_names(named(problem, viscous), beside, alone)  # which nothing less would keep: the law alone is one part
     assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
+    _, _, again = beside_form(named(problem, viscous), beside)  # of which there is none here
+    assert again.cost == pytest.approx(beside.fitted.cost, rel=0.02)
 
 
 def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> None:
@@ -216,9 +218,11 @@ def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> Non
     problem, alone = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
     assert alone is not None
     line = fitted(problem, (Candidate(CATALOGUE["pressure_offset"], line="main_a", free=("offset",)), {"offset": 2e4}))
-    beside = in_what_is_left(problem, line)
-    assert beside is not None
-    assert beside.fit.effects[0][0].line == "main_a"
+    room = Problem(problem.vehicle, problem.runs, more_laws=2, beside_names=True)
+    used = np.where(split(problem).fit, weight(problem), 0.0)
+    both = fit(room, used, [*line.effects, *alone.fit.effects], line.x, linearisations=20)
+    beside = replace(alone, problem=room, fitted=both, fit=both)
+    assert beside.names == 1
     assert not leaves_names(named(problem, line), beside)
     assert not keeps_names(named(problem, line), beside, alone)
 

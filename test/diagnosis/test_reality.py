@@ -131,6 +131,20 @@ def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
     np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
 
 
+def test_a_delay_between_devices_that_stamp_on_receipt_is_told_of_their_clocks() -> None:
+    """Stamps that come late by chance do not know when the devices measured, so that all recordings may show the same delay."""
+    rng = np.random.default_rng(5)
+
+    def received(signals: dict[str, Signal]) -> dict[str, Signal]:
+        late = {name: np.maximum.accumulate(s.time_s + rng.exponential(1.5e-3, s.time_s.size)) for name, s in signals.items()}
+        return {name: Signal(late[name], s.value) for name, s in signals.items()}
+
+    told = synchronised([replace(r, angle=received(r.angle), pressure=received(r.pressure)) for r in shifted(0.02, 0.02)], VEHICLE)
+    np.testing.assert_allclose(told.late, (0.02, 0.02), atol=1.5e-3)
+    assert len(told.findings) == 2
+    assert all(run.on_receipt for run in told.problem.runs)
+
+
 @pytest.mark.parametrize(
     ("late_s", "deviation_s", "alike"),
     [

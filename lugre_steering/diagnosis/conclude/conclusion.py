@@ -34,6 +34,7 @@ from lugre_steering.diagnosis.result import (
 )
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import onset
+from lugre_steering.fitting.clocks import clock_finding
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
@@ -50,6 +51,9 @@ def conclude(
     vehicle = _written(model, stands, effects)
     causal = causal_rmse(vehicle, recordings, done.problem.runs)
     form = _form(done, stands, vehicle, causal, recordings)
+    if stands.clock is not None and not stands.better:
+        apart = clock_finding(done.problem.vehicle, *stands.clock)
+        findings = [*findings, *(apart.in_bag(run.name) for run in done.problem.runs)]
     progress("next experiment")
     return _told(done, stands, model, effects, vehicle, causal, form, findings)
 

@@ -27,12 +27,19 @@ CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 
 
+class Apart(NamedTuple):
+    """How late [s] the torque is stamped against the angles, and the standard deviation of that."""
+
+    late_s: float
+    deviation_s: float
+
+
 class _Tested(NamedTuple):
-    """Whether names stand, whether they are only a clock that is apart, how they do on held-out data, and with them the form of the
-    friction law where without it they do harm."""
+    """Whether names stand, the clock that is apart if they are no more than that, how they do on held-out data, and with them the form of
+    the friction law where without it they do harm."""
 
     named: bool
-    clock: bool
+    clock: Apart | None
     judged: verify.Judged
     form: Formed | None
 
@@ -43,7 +50,7 @@ class Stands:
     the names alone; ``form``: that of the friction law as laws, beside the names."""
 
     named: bool
-    clock: bool
+    clock: Apart | None
     lawful: FoundLaws | None
     judged: verify.Judged
     left: LeftOver
@@ -90,19 +97,19 @@ def _tested(done: Finished, seed: int) -> _Tested:
     if found.found and done.needs_form and not any(item.in_place for item in found.found):
         beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
         form = formed(done, True, seed) if judged.gain <= -CONTRADICTED and beside.interval[0] > 0.0 else None
-    clock = _clocks_alone(done)
+    clock = _clock(done)
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     harmless = max(judged.gain, -np.inf if form is None else form.judged.gain) > -CONTRADICTED
     better = harmless and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
-    named = bool(found.found) and better and not clock and not stuck
+    named = bool(found.found) and better and clock is None and not stuck
     return _Tested(named, clock, judged, form)
 
 
 def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:
     """What remains of the names beside laws for what they leave over."""
     found, (named, clock, judged, _) = done.found, tested
-    left = _left(done, named or clock)
+    left = _left(done, named or clock is not None)
     if not left.structured and not (named and done.needs_form):
         return Stands(named, clock, None, judged, left)
     rivals = not named or room_for_laws(done)
@@ -130,12 +137,18 @@ def _left(done: Finished, named: bool) -> LeftOver:
     return left_over(there, fit(there.problem, there.weight, known.effects, known), done.needs_form)
 
 
-def _clocks_alone(done: Finished) -> bool:
-    """Whether all that was found is what two clocks may be apart in one recording; what all of several show is the machine's, unless it is
-    no more than clocks may still be apart beside a law of another form."""
-    final, several = done.found.final, len(done.problem.runs) > 1
-    for candidate, values in final.effects:
-        longest = LONGEST_S if not several or candidate.bags is not None else APART_S if done.needs_form else 0.0
-        if "delay" not in candidate.effect.hooks or abs(candidate.effect.law("delay", values)) >= longest:
-            return False
-    return bool(final.effects)
+def _clock(done: Finished) -> Apart | None:
+    """The clock that is apart, where all that was found is what clocks may be: in one recording, or in several that are stamped on receipt.
+    What all of several show is else the machine's, unless it is no more than clocks may still be apart beside a law of another form."""
+    found, longest, received = done.compared.found, LONGEST_S, any(run.on_receipt for run in done.problem.runs)
+    if len(found.found) != 1 or not found.final.effects:
+        return None
+    best, candidate = found.found[0], found.final.effects[-1][0]
+    if len(done.problem.runs) > 1 and candidate.bags is None and not received:
+        longest = APART_S if done.needs_form else 0.0
+    alike = {candidate.effect.id, *(best.rivals if received else ())}
+    for trial in (trial for trial in best.trials if trial.candidate.effect.id in alike):
+        (own, values), spread = trial.fit.effects[-1], trial.fit.covariance[-1, -1]
+        if "delay" in own.effect.hooks and abs(late := float(own.effect.law("delay", values))) < longest:
+            return Apart(late, float(np.sqrt(max(done.compared.problem.doubt * spread, 0.0))))
+    return None

@@ -20,7 +20,7 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 MOST_LAWS = 2
-SHORTLIST, CLOSE, SIMPLIFIED = 8, 0.75, 2
+SHORTLIST, CLOSE, SIMPLIFIED = 8, 0.75, 3
 """Cells refitted in the chain, share of the best gain that brings them there, and how many of them are put into closed forms."""
 SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
@@ -43,7 +43,8 @@ class Tried:
 
     @property
     def values(self) -> int:
-        return len(self.fit.effects[-1][0].free)
+        """How many numbers the law has, with the width of a play or relay, which is chosen and not fitted."""
+        return len(self.fit.effects[-1][0].free) + (self.law.cell.axis.memory in ("play", "relay"))
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,8 @@ def beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
     """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
     there, of_names = done.compared.problem, done.compared.form.count("")
     columns = there.bends[:, : there.bends.shape[1] - of_names]
-    problem = Problem(there.vehicle, there.runs, there.calibrations, more_laws=MOST_LAWS, bends=columns)
+    names = laws.names > 0
+    problem = Problem(there.vehicle, there.runs, there.calibrations, more_laws=MOST_LAWS, beside_names=names, bends=columns)
     problem.shapes = there.shapes - of_names
     problem = problem.doubted(there.doubt, there.typical)
     x = np.append(laws.fitted.x[: problem.first_bend], np.zeros(columns.shape[1]))

@@ -31,6 +31,8 @@ RIDGE = 1e-6
 FREE = 30.0
 """Length of the columns of what is named, in noise standard deviations: so long that priors of one leave it free."""
 PERMUTED = 16
+STATE = ("angle", "rate", "torque")
+"""Coordinates in which a black box sees fine waves, that it cannot among many."""
 FEATURES, REACHES, SIZES, TOLD = 300, (0.5, 1.0, 2.0), (0.3, 3.0), 0.01
 """Of the black box: random features; how far they reach, in the spread of its coordinates, and their size, in root mean squares of the
 errors, of which the best count; and the share of their variance from which combinations of coordinates are told apart."""
@@ -116,15 +118,21 @@ class Screen:
         return np.asarray(np.linalg.solve(gram + _penalty(gram, m, SMOOTHING[0]), right)[m:, 0])
 
     def black_box(self, seed: int) -> float:
-        """Energy that any smooth function of all coordinates together foretells of blocks left out, whatever it means.
+        """Energy that any smooth function of all coordinates together, or of the few of STATE, foretells of blocks left out, whatever it
+        means.
 
         Ridge regression on random Fourier features, which draws near a Gaussian process (Rahimi and Recht, NIPS 2007).
         """
-        places = [np.concatenate(bags, axis=1) for bags in self.traces.axes.values()]
+        state = [bags for axis, bags in self.traces.axes.items() if axis.memory == "none" and axis.coordinate in STATE]
+        return max(self._smooth(along, seed) for along in (list(self.traces.axes.values()), state) if along)
+
+    def _smooth(self, along: Sequence[list[Array]], seed: int) -> float:
+        """The same of some axes, each by bag (sides, n)."""
+        places = [np.concatenate(bags, axis=1) for bags in along]
         rows = np.array([self.rows.plain_mean(place) for axis in places for place in (axis.mean(axis=0), np.ptp(axis, axis=0))]).T
         moved = rows[:, rows.std(axis=0) > 1e-9 * np.abs(rows).max(axis=0)]
-        along, extent, _ = np.linalg.svd(stats.zscore(moved), full_matrices=False)
-        apart = along[:, extent**2 > TOLD * float(np.sum(extent**2))] * np.sqrt(len(rows))
+        turned, extent, _ = np.linalg.svd(stats.zscore(moved), full_matrices=False)
+        apart = turned[:, extent**2 > TOLD * float(np.sum(extent**2))] * np.sqrt(len(rows))
         own, nothing = self.errors[:, :1], np.zeros((len(rows), 0))
         unit = self.rows.mean(np.ones((self.rows.take.size, 1)))
         amplitude = float(np.sqrt(np.mean(own**2) / np.mean(unit**2)))

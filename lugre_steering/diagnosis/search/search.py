@@ -42,7 +42,7 @@ MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
 """Most names, most rivals told of one, and how many of the best fingerprints are tried in place of what every joint has."""
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
-REST = 0.1
+REST = 0.05
 """Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
 END = 0.01
 """Share of its range within which a value stands at the end of it."""
