@@ -94,7 +94,7 @@ def synchronised(
         if np.abs(step).max() < SHORTEST_S:
             break
         late, deviation = late + step, np.array([offset.deviation_s for offset in offsets])
-        if np.any(np.abs(late) - SURE * deviation > LONGEST_S):
+        if np.abs(late).max() > LONGEST_S:
             return as_stamped
         problem = prepared(late)
         baseline = _baseline(problem, effects, baseline)
