@@ -23,6 +23,8 @@ from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import is_rig
 from lugre_steering.fitting.sheet import LEVELS, at_bounds
 
+SURELY = 2.0
+"""Standard deviations by which a delay must be longer than those of clocks, where stamps are given on receipt."""
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
 
@@ -148,7 +150,11 @@ def _clock(done: Finished) -> Apart | None:
         longest = APART_S if done.needs_form else 0.0
     alike = {candidate.effect.id, *(best.rivals if received else ())}
     for trial in (trial for trial in best.trials if trial.candidate.effect.id in alike):
-        (own, values), spread = trial.fit.effects[-1], trial.fit.covariance[-1, -1]
-        if "delay" in own.effect.hooks and abs(late := float(own.effect.law("delay", values))) < longest:
-            return Apart(late, float(np.sqrt(max(done.compared.problem.doubt * spread, 0.0))))
+        own, values = trial.fit.effects[-1]
+        if "delay" not in own.effect.hooks:
+            continue
+        late, spread = float(own.effect.law("delay", values)), float(trial.fit.covariance[-1, -1])
+        apart = Apart(late, float(np.sqrt(max(done.compared.problem.doubt * spread, 0.0))))
+        if abs(late) - SURELY * apart.deviation_s * received < longest:
+            return apart
     return None
