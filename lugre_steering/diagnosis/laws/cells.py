@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from lugre_steering.chain.step import Records, run_side, torque_side
 from lugre_steering.effects import laws
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
@@ -36,6 +37,8 @@ TRACER, WIDE = 1e-6, 1e9
 """Size of the law that carries a coordinate out of the chain, and a range that holds any."""
 FORM = "opposing_torque"
 """What the stiffness of another friction law depends on, which its freedoms have; no law of its own is sought there."""
+REMEMBERING = ("friction_level", "conservative_torque", "gain")
+"""Channels whose laws may remember beside names, whose work a remembered loss or inertia would take over; where none stands all may."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ class Traces:
 
     signals: dict[str, list[Array]]
     axes: dict[Axis, list[Array]]
+    remembering: Collection[str]
+    """Channels whose laws may remember."""
 
     def cells(self) -> Iterator[Cell]:
         """Every cell that the recordings can show."""
@@ -99,7 +104,7 @@ class Traces:
             often = (float(first), float(last)) if last - first > SEEN * (high - low) else (low, high)
             signs = axis.memory == "relay" or axis == Axis("direction")
             pieces = 1 if axis.coordinate == "none" else HATS if signs else PIECES
-            for channel in self.signals:
+            for channel in self.signals if axis.memory == "none" else self.remembering:
                 yield Cell(channel, axis, low, high, pieces, often=often)
                 if axis == Axis("angle") and channel in TOOTHED:
                     yield Cell(channel, axis, low, high, FINE, often=often)
@@ -177,4 +182,5 @@ def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Tr
     return Traces(
         dict(zip(laws.CHANNELS, in_threads(signal, list(laws.CHANNELS)), strict=True)),
         dict(zip(axes, in_threads(along, axes), strict=True)),
+        REMEMBERING if any(candidate.effect.id in CATALOGUE for candidate, _ in fitted.effects) else tuple(laws.CHANNELS),
     )
