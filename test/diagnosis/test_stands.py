@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude.stands import _tested
+from lugre_steering.diagnosis.conclude.stands import _clock, _tested
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Found, Search
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import split
+from lugre_steering.fitting.trial import Trial
 
 NOTHING = small_problem(33.0)
 SLOPE = effect("slope_bias", torque=60.0)
@@ -40,3 +44,28 @@ def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(there:
     done = finished(problem, **({"beside_form": beside} if freed else {}))
     assert done.needs_form
     assert _tested(done, 1).named == named
+
+
+@pytest.mark.parametrize(("received", "late_s", "apart"), [(True, 0.02, True), (False, 0.02, False), (True, 0.2, False)])
+def test_what_clocks_may_be_apart_is_no_delay_of_the_machine_where_stamps_are_given_on_receipt(
+    received: bool, late_s: float, apart: bool
+) -> None:
+    """Also where a slow sensor led and a delay ties with it; not where all recordings with sound stamps show it, nor ever so long a one."""
+    torque = np.split(NOTHING.predict_all(NOTHING.start()), NOTHING.edges[1:-1])
+    late = [np.interp(run.time - late_s, run.time, part) for run, part in zip(NOTHING.runs, torque, strict=True)]
+    recorded = with_torque(NOTHING, np.concatenate(late))
+    problem = Problem(recorded.vehicle, [replace(run, on_receipt=received) for run in recorded.runs])
+    roles, noise = split(problem), Noise(np.full(problem.valid.size, SIGMA), np.zeros((1, problem.valid.size)), 0.0)
+    fitted = np.where(roles.fit, weight(problem), 0.0)
+
+    def trial(name: str, **values: float) -> Trial:
+        found = fit(problem, fitted, [effect(name, **values)])
+        return Trial(Score(found.effects[0][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.zeros(1)), found, found.cost)
+
+    slow, delay = trial("pressure_lag", tau=late_s), trial("time_delay", delay=late_s)
+    names = (Found(slow.score, ("time_delay",), (slow, delay), 100.0),)
+    told = _clock(Finished(problem, noise, roles, Search(fit(problem, fitted), slow.fit, names, (), (), None)))
+    assert (told is not None) == apart
+    if told is not None:
+        assert told.late_s == pytest.approx(late_s, abs=5e-3)
+        assert 0.0 < told.deviation_s < late_s
