@@ -51,9 +51,10 @@ def conclude(
     vehicle = _written(model, stands, effects)
     causal = causal_rmse(vehicle, recordings, done.problem.runs)
     form = _form(done, stands, vehicle, causal, recordings)
-    if stands.clock is not None and not stands.better:
-        apart = clock_finding(done.problem.vehicle, *stands.clock)
-        findings = [*findings, *(apart.in_bag(run.name) for run in done.problem.runs)]
+    if (clock := stands.clock) is not None and not stands.better:
+        apart = clock_finding(done.problem.vehicle, clock.late_s, clock.deviation_s)
+        late = [run.name for bag, run in enumerate(done.problem.runs) if clock.bags is None or bag in clock.bags]
+        findings = [*findings, *map(apart.in_bag, late)]
     progress("next experiment")
     return _told(done, stands, model, effects, vehicle, causal, form, findings)
 

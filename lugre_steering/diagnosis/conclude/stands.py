@@ -30,10 +30,11 @@ CONTRADICTED = 0.02
 
 
 class Apart(NamedTuple):
-    """How late [s] the torque is stamped against the angles, and the standard deviation of that."""
+    """How late [s] the torque is stamped against the angles, the standard deviation of that, and in which recordings, if not all."""
 
     late_s: float
     deviation_s: float
+    bags: tuple[int, ...] | None
 
 
 class _Tested(NamedTuple):
@@ -154,7 +155,7 @@ def _clock(done: Finished) -> Apart | None:
         if "delay" not in own.effect.hooks:
             continue
         late, spread = float(own.effect.law("delay", values)), float(trial.fit.covariance[-1, -1])
-        apart = Apart(late, float(np.sqrt(max(done.compared.problem.doubt * spread, 0.0))))
+        apart = Apart(late, float(np.sqrt(max(done.compared.problem.doubt * spread, 0.0))), candidate.bags)
         if abs(late) - SURELY * apart.deviation_s * received < longest:
             return apart
     return None
