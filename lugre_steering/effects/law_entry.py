@@ -49,7 +49,7 @@ class LawEntry:
 def law_fields(entry: LawEntry) -> dict[str, float | Array]:
     """What the parameter record holds of a law, see ``laws.record``."""
     low, high = entry.range
-    span = laws.reach(entry.form, low, high)
+    span = laws.reach(entry.form, entry.values, low, high)
     f = laws.sampled(entry.form, entry.values, entry.knots, *span)
     seen = (-math.inf, math.inf) if entry.small else (low, high)
     return laws.record(entry.channel, entry.coordinate, entry.memory, entry.memory_size, span, f, seen=seen)

@@ -217,10 +217,12 @@ def sampled(form: str, values: Mapping[str, float], knots: Sequence[float], low:
     return np.asarray(FORMS[form](places, **values), np.float64)
 
 
-def reach(form: str, low: float, high: float) -> tuple[float, float]:
-    """How far f goes on: for some forms half as far again to each side as it was seen."""
+def reach(form: str, values: Mapping[str, float], low: float, high: float) -> tuple[float, float]:
+    """How far f goes on: for some forms half as far again to each side as it was seen, the arms of a hinge no further than they were seen."""
     more = 0.5 * (high - low) if form in CONTINUED else 0.0
-    return low - more, high + more
+    at = values.get("at", np.inf) if form == "hinge" else np.inf
+    arms = (at - low, high - at) if low < at < high else (more, more)
+    return low - min(more, arms[0]), high + min(more, arms[1])
 
 
 def record(

@@ -75,6 +75,13 @@ def test_a_line_goes_on_for_half_its_range_and_is_then_held() -> None:
     assert with_law(entry) - with_law() == pytest.approx(1e3 * np.clip(THETA, -0.2, 0.2), abs=1e-6)
 
 
+def test_an_arm_of_a_hinge_goes_on_no_further_than_it_was_seen() -> None:
+    values = {"value": 0.0, "below": 1e3, "above": 3e3, "at": 0.08}
+    entry = LawEntry("conservative_torque", "angle", "hinge", (-0.1, 0.1), values)
+    expected = np.where(THETA < 0.08, 1e3 * (np.maximum(THETA, -0.2) - 0.08), 3e3 * (np.minimum(THETA, 0.12) - 0.08))
+    assert with_law(entry) - with_law() == pytest.approx(expected, abs=5.0)
+
+
 def test_a_lagged_rate_follows_its_differential_equation() -> None:
     entry = LawEntry("conservative_torque", "rate", "linear", (-1.0, 1.0), {"value": 0.0, "slope": 1e4}, memory="lag", memory_size=2.0)
     fine = np.arange(0.0, TIME[-1], 1e-3)

@@ -136,7 +136,7 @@ def _grid(cell: Cell, name: str) -> Array:
         return cell.low + span * np.linspace(0.05, 0.95, 13)
     if name == "exponent":
         return np.array([0.5, 1.5, 2.0, 3.0])
-    return span * (np.geomspace(0.02, 2.0, 24) if name == "period" else np.geomspace(0.02, 1.0, 7))
+    return span * (np.geomspace(0.02, 1.0, 20) if name == "period" else np.geomspace(0.02, 1.0, 7))  # a period that was seen whole
 
 
 def _bent(cell: Cell, names: Sequence[str]) -> Iterator[dict[str, float]]:
@@ -188,7 +188,8 @@ def closed_law(
             return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "place", 0.1 * span, cell.low, cell.high)
         if name == "period":  # a turn of a hundredth of a radian at the end of the range is a small step
             known = start["period"]
-            return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "period", 0.1 * known**2 / span, 0.7 * known, 1.4 * known)
+            most = min(1.4 * known, span)
+            return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "period", 0.1 * known**2 / span, 0.7 * known, most)
         if name in laws.POSITIVE:
             return Parameter(name, laws.COORDINATES[cell.axis.coordinate], "width", span, 2e-3 * span, 10.0 * span, (span,))
         if name == "exponent":
