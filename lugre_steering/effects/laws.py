@@ -218,7 +218,7 @@ def sampled(form: str, values: Mapping[str, float], knots: Sequence[float], low:
 
 
 def reach(form: str, values: Mapping[str, float], low: float, high: float) -> tuple[float, float]:
-    """How far f goes on: for some forms half as far again to each side as it was seen, the arms of a hinge no further than they were seen."""
+    """How far f goes on: for some forms half as far again to each side as it was seen, an arm of a hinge no further than it was."""
     more = 0.5 * (high - low) if form in CONTINUED else 0.0
     at = values.get("at", np.inf) if form == "hinge" else np.inf
     arms = (at - low, high - at) if low < at < high else (more, more)
