@@ -114,13 +114,13 @@ def file_of(folder: Path) -> Path:
     return file
 
 
-def thinned_bag(bag: Path, folder: Path) -> Path:
-    """A bag with one message of STRIDE of each topic."""
+def thinned_bag(bag: Path, folder: Path, seconds: float = np.inf) -> Path:
+    """A bag with one message of STRIDE of each topic, or its first seconds of them."""
     seen: Counter[str] = Counter()
     kept: list[Message] = []
     with Reader(bag) as reader:
         for connection, log_ns, raw in reader.messages():
-            if seen[connection.topic] % STRIDE == 0:
+            if seen[connection.topic] % STRIDE == 0 and log_ns < reader.start_time + seconds * 1e9:
                 kept.append((connection.topic, connection.msgtype, log_ns, bytes(raw)))
             seen[connection.topic] += 1
     return write(folder / bag.name, kept)

@@ -37,7 +37,8 @@ from lugre_steering.recording import Array
 from lugre_steering.simulate.command import load_vehicle
 from lugre_steering.vehicle import save
 
-NOTHING = small_problem()
+NOTHING = small_problem(40.0)
+"""At 40 Hz, quick enough for whole searches."""
 
 
 @remembered
@@ -142,7 +143,8 @@ def test_of_laws_that_tie_the_one_that_can_happen_again_is_preferred() -> None:
 
 def test_a_second_law_is_sought_beside_the_first_as_it_was_fitted() -> None:
     """Pieces of the first that only the samples show that are left out must not run away."""
-    nothing = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()))
+    often = small_problem()  # at 100 Hz there are samples enough for so many pieces
+    nothing = with_torque(often, often.predict_all(often.start()))
     problem = Problem(nothing.vehicle, nothing.runs, more_laws=2)
     used = np.where(split(problem).fit, weight(problem), 0.0)
     short = Cell("inertia", Axis("time"), 0.0, float(problem.runs[0].time[-1]), pieces=36)

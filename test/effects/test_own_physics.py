@@ -9,13 +9,18 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import Result
+from typer.testing import CliRunner
 
 from lugre_steering.chain.step import torque_side
+from lugre_steering.cli import app
 from lugre_steering.effects import registry
 from lugre_steering.effects.own import read_effects
 from lugre_steering.errors import EffectError
@@ -35,12 +40,50 @@ def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[s
     return subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment}, check=False)
 
 
+def run_here(*arguments: object) -> Result:
+    """The same in this process, which compiles foreign physics once for several commands; its catalogue is put back."""
+    with put_back():
+        return CliRunner().invoke(app, list(map(str, arguments)))
+
+
+SEVERAL = """
+import json, sys
+from typer.testing import CliRunner
+from lugre_steering.cli import app
+
+for arguments in json.loads(sys.argv[1]):
+    done = CliRunner().invoke(app, arguments)
+    print(json.dumps({"code": done.exit_code, "stdout": done.stdout, "stderr": done.stderr}))
+"""
+
+
+def run_in_turn(*commands: Sequence[object], **environment: str) -> list[dict[str, Any]]:
+    """Several command lines in one other process, which compiles once for all of them."""
+    command = [sys.executable, "-c", SEVERAL, json.dumps([list(map(str, arguments)) for arguments in commands])]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment}, check=True)
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+@contextmanager
+def put_back() -> Iterator[None]:
+    """The catalogue as it was before."""
+    known, origins, variable = dict(registry.CATALOGUE), dict(registry.ORIGINS), os.environ.get(registry.VARIABLE)
+    yield
+    for table, before in ((registry.CATALOGUE, known), (registry.ORIGINS, origins)):
+        table.clear()
+        table.update(before)  # type: ignore[arg-type]
+    if variable is None:
+        os.environ.pop(registry.VARIABLE, None)
+    else:
+        os.environ[registry.VARIABLE] = variable
+
+
 def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path) -> None:
     ripple = ("--effect", "chain_ripple:torque=1500,pitch=0.11", "--effects", RIPPLE)
-    made = run("simulate", "double-cycle", *ripple, "--rate", "20", "--out", tmp_path)
-    assert made.returncode == 0, made.stderr
+    made = run_here("simulate", "double-cycle", *ripple, "--rate", "20", "--out", tmp_path)
+    assert made.exit_code == 0, made.stderr
     bag = tmp_path / "synthetic_double_cycle"
-    done = run("diagnose", bag, "--vehicle", SHEET, "--effects", RIPPLE, "--out", tmp_path / "d", "--no-report", "--json")
+    done = run_here("diagnose", bag, "--vehicle", SHEET, "--effects", RIPPLE, "--out", tmp_path / "d", "--no-report", "--json")
     found = json.loads(done.stdout)
     assert found["verdict"] == "missing_physics"
     assert [effect["id"] for effect in found["effects"]] == ["chain_ripple"]
@@ -52,12 +95,12 @@ def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path)
     assert told.returncode == 2
     assert "chain_ripple.yaml, which is not here" in told.stderr
     assert len(told.stderr.splitlines()) == 1
-    ran = run("replay", bag, "--vehicle", augmented, "--effects", RIPPLE, "--out", tmp_path / "r", "--json")
+    ran = run_here("replay", bag, "--vehicle", augmented, "--effects", RIPPLE, "--out", tmp_path / "r", "--json")
     left = json.loads(ran.stdout)["overall"]["rmse_Nm"]
     assert left < 0.2 * found["baseline"]["rmse_Nm"]  # causal, and from the sheet's temperatures
     other = tmp_path / "chain_ripple.yaml"
     other.write_text(RIPPLE.read_text().replace("sin(6", "cos(6"))
-    assert "others under the same name" in run("vehicle", augmented, "--effects", other).stderr
+    assert "others under the same name" in run_here("vehicle", augmented, "--effects", other).stderr
 
 
 def test_a_law_of_yaml_is_its_formula() -> None:
@@ -69,16 +112,8 @@ def test_a_law_of_yaml_is_its_formula() -> None:
 
 @pytest.fixture
 def catalogue() -> Iterator[None]:
-    """The catalogue, put back as it was."""
-    known, origins, variable = dict(registry.CATALOGUE), dict(registry.ORIGINS), os.environ.get(registry.VARIABLE)
-    yield
-    for table, before in ((registry.CATALOGUE, known), (registry.ORIGINS, origins)):
-        table.clear()
-        table.update(before)  # type: ignore[arg-type]
-    if variable is None:
-        os.environ.pop(registry.VARIABLE, None)
-    else:
-        os.environ[registry.VARIABLE] = variable
+    with put_back():
+        yield
 
 
 @pytest.mark.usefixtures("catalogue")
@@ -205,13 +240,16 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
     install = [sys.executable, "-m", "pip", "install", "-q", "--no-build-isolation", "--no-deps", "--target", tmp_path / "site", source]
     subprocess.run(list(map(str, install)), check=True, capture_output=True)
     path = os.pathsep.join([str(tmp_path / "site"), *filter(None, [os.environ.get("PYTHONPATH", "")])])
-    told = run("effects", "centre_detent", "--check", "--json", PYTHONPATH=path)
-    assert json.loads(told.stdout) == {"id": "centre_detent", "broken": []}, told.stderr
-    hidden = ("--effect", "centre_detent:hold=4000,width=0.02")
-    assert run("simulate", "double-cycle", *hidden, "--rate", "20", "--out", tmp_path, PYTHONPATH=path).returncode == 0
     bag, augmented = tmp_path / "synthetic_double_cycle", tmp_path / "d" / "augmented.yaml"
-    done = run("diagnose", bag, "--vehicle", SHEET, "--out", tmp_path / "d", "--no-report", "--json", PYTHONPATH=path)
-    found = json.loads(done.stdout)
+    told, made, done = run_in_turn(
+        ("effects", "centre_detent", "--check", "--json"),
+        ("simulate", "double-cycle", "--effect", "centre_detent:hold=4000,width=0.02", "--rate", "20", "--out", tmp_path),
+        ("diagnose", bag, "--vehicle", SHEET, "--out", tmp_path / "d", "--no-report", "--json"),
+        PYTHONPATH=path,
+    )
+    assert json.loads(told["stdout"]) == {"id": "centre_detent", "broken": []}, told["stderr"]
+    assert made["code"] == 0, made["stderr"]
+    found = json.loads(done["stdout"])
     assert [effect["id"] for effect in found["effects"]] == ["centre_detent"]
     assert found["effects"][0]["parameters"]["hold"]["value"] == pytest.approx(4000.0, rel=0.02)
     lacking = run("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")
