@@ -15,12 +15,21 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 LONGEST = (
     "test_engine_names.py", "test_rigs.py", "test_engine.py", "test_own_physics.py", "test_laws_found.py", "test_replay.py", "test_docs.py",
+    "test_fleet.py", "test_scoreboard.py", "test_library.py", "test_reality.py", "test_form.py",
 )  # fmt: skip
-"""Files that take half a minute and more: begun last, one would keep its process busy when all others have finished."""
+"""Files that take twenty seconds and more: begun last, one would keep its process busy when all others have finished."""
+LIVE = "node"
+"""Folder of tests that wait more than they work: side by side they would leave processors idle, and one another too late."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
+    """The longest files first, live tests evenly between all others."""
+    files = list(dict.fromkeys(item.path for item in items))
+    live = [file for file in files if file.parent.name == LIVE]
+    others = [file for file in files if file.parent.name != LIVE]
+    others.sort(key=lambda file: LONGEST.index(file.name) if file.name in LONGEST else len(LONGEST))
+    place = {file: (number + 0.5) / len(group) for group in (live, others) for number, file in enumerate(group)}
+    items.sort(key=lambda item: place[item.path])
 
 
 @pytest.fixture(scope="module", autouse=True)

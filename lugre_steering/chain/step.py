@@ -91,12 +91,10 @@ def new_state(p: Records, tracks: int = 1) -> Records:
 
 def has_effects(p: Records) -> bool:
     """Whether any effect parameter of the records differs from neutral."""
-    return bool(p.view(np.float64).reshape(p.size, -1)[:, len(BASELINE_FIELDS) :].any())
-
-
-def copied(p: Records) -> Records:
-    """A copy of parameter records; NumPy's own goes field by field, which takes ten times as long."""
-    return p.view(np.float64).copy().view(p.dtype)
+    numbers = p.view(np.float64)
+    if p.size == 1:  # as in fits, which ask tens of thousands of times
+        return bool(np.count_nonzero(numbers[len(BASELINE_FIELDS) :]))
+    return bool(numbers.reshape(p.size, -1)[:, len(BASELINE_FIELDS) :].any())
 
 
 def _bare(p: Records) -> Records:
@@ -144,10 +142,12 @@ def torque_in_phases(
     if not any(acting):
         phases = [(start, _bare(p)) for start, p in phases]
     before = phases[0][1]
-    theta, omega, alpha = np.atleast_2d(theta, omega, alpha)
-    time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))  # one compiled form
+    if theta.ndim == 1:
+        theta, omega, alpha = np.atleast_2d(theta, omega, alpha)
+    time, theta, omega, alpha = map(np.ascontiguousarray, (time, theta, omega, alpha))  # one compiled form
     torques, states, scratch = np.empty(theta.shape), new_state(before, len(theta)), np.zeros(1, OUTPUT)
-    edges = [*np.searchsorted(time, [start for start, _ in phases]), time.size]
+    alone = len(phases) == 1 and phases[0][0] == -np.inf
+    edges = [0, time.size] if alone else [*np.searchsorted(time, [start for start, _ in phases]), time.size]
     for (_, p), effects, first, last in zip(phases, acting, edges, edges[1:], strict=False):
         if first == last:
             continue
@@ -155,4 +155,4 @@ def torque_in_phases(
             states["air_temperature"] += p["air_temperature"] - before["air_temperature"]
         before = p
         _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects)
-    return np.asarray(torques.sum(axis=0))
+    return np.asarray(np.add.reduce(torques))

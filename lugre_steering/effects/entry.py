@@ -8,6 +8,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -164,8 +165,14 @@ class Effect:
         compiled = self.hooks[hook]
         plain = getattr(compiled, "py_func", compiled)
         values = {"torque_unit": 1.0, "angle_unit": 1.0, **values}
-        arguments = [quantities.get(name, values.get(name, 0.0)) for name in inspect.signature(plain).parameters]
+        arguments = [quantities.get(name, values.get(name, 0.0)) for name in _arguments(plain)]
         try:
             return plain(*arguments)
         except (TypeError, ValueError):  # math.sin, or an if: written for one number at a time
             return np.vectorize(compiled, otypes=[np.float64])(*arguments)
+
+
+@lru_cache(maxsize=1024)
+def _arguments(plain: Callable[..., Any]) -> tuple[str, ...]:
+    """What a law asks for, by name; looked up once, as a fit asks for it tens of thousands of times."""
+    return tuple(inspect.signature(plain).parameters)

@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import copied, torque_in_phases
+from lugre_steering.chain.step import torque_in_phases
 from lugre_steering.data.dataset import Run
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
@@ -311,48 +311,67 @@ class Problem:
 
     def fields(self, x: Array) -> dict[str, float]:
         """Baseline parameter-record values for the calibration part of x."""
-        record = self.model.parameters[0][0]
-        values: dict[str, float] = {}
-        for calibration, change in zip(self.calibrations, x, strict=False):
+        sheet, values = self._sheet, dict[str, float]()
+        for calibration, change in zip(self.calibrations, x[: len(self.calibrations)].tolist(), strict=True):
             for field in calibration.fields:
-                old = values.get(field, float(record[field]))
+                old = values[field] if field in values else sheet[field]
                 if calibration.additive:
-                    values[field] = old + change * values.get("coulomb_torque", float(record["coulomb_torque"]))
+                    values[field] = old + change * values.get("coulomb_torque", sheet["coulomb_torque"])
                 else:
                     values[field] = old * float(np.exp(change))
         if "static_torque" in values:
-            coulomb = values.get("coulomb_torque", float(record["coulomb_torque"]))
+            coulomb = values.get("coulomb_torque", sheet["coulomb_torque"])
             values["static_torque"] = max(values["static_torque"], 0.3 * coulomb)
         return values
 
+    @cached_property
+    def _sheet(self) -> dict[str, float]:
+        """What the record of the vehicle file holds of the fields that calibrations change; read one by one it takes long."""
+        record = self.model.parameters[0][0]
+        return {field: float(record[field]) for field in {"coulomb_torque", *(f for c in self.calibrations for f in c.fields)}}
+
+    @cached_property
+    def _at(self) -> dict[str, int | slice]:
+        """Where each field stands among the numbers of a parameter record: faster than by name, and as a record has it."""
+        kind = self.model.parameters[0].dtype
+        assert kind.fields is not None
+        begin = {name: (offset // 8, field.itemsize // 8) for name, (field, offset, *_) in kind.fields.items()}
+        return {name: first if count == 1 else slice(first, first + count) for name, (first, count) in begin.items()}
+
+    @cached_property
+    def _gains(self) -> tuple[int, ...]:
+        return tuple(i for i, c in enumerate(self.calibrations) if c.name == GAIN.name)
+
     def gain(self, x: Array) -> float:
         """Factor on the sheet's pressure gain."""
-        return float(np.exp(sum(x[i] for i, c in enumerate(self.calibrations) if c.name == GAIN.name)))
+        return float(np.exp(sum(x[i] for i in self._gains))) if self._gains else 1.0
 
     def torque(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
     ) -> Array:
         """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion."""
         run = run or self.runs[bag]
-        record = copied(self.model.parameters[0])
+        record, places = self.model.parameters[0], self._at
+        numbers = record.view(np.float64).copy()
         for field, value in self.fields(x).items():
-            record[field] = value
-        record["initial_bristle"] = x[len(self.calibrations) + bag] * self.presliding
+            numbers[places[field]] = value
+        numbers[places["initial_bristle"]] = x[len(self.calibrations) + bag] * self.presliding
         warmer = 0.0
         if self.vehicle.rubber is not None:
-            record["rubber_temperature"], record["air_temperature"] = self.temperatures(bag, x)
+            numbers[places["rubber_temperature"]], numbers[places["air_temperature"]] = self.temperatures(bag, x)
             warmer = float(x[len(self.calibrations) + 2 * len(self.runs) + bag])
         phases = []
-        for start in sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)}):
-            acting = copied(record)
+        starts = sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)})
+        for start in starts:
+            acting = numbers.copy() if len(starts) > 1 else numbers
             for since, air in run.air:
                 if since <= start:
-                    acting["air_temperature"] = air + warmer
+                    acting[places["air_temperature"]] = air + warmer
             for candidate, values in effects:
                 if candidate.start(bag) <= start and not candidate.effect.per_line:
                     for field, number in candidate.effect.fields(values).items():
-                        acting[field] = number
-            phases.append((start, acting))
+                        acting[places[field]] = number
+            phases.append((start, acting.view(record.dtype)))
         return torque_in_phases(phases, self.model.rubber, run.time, run.theta, run.omega, run.alpha)
 
     def predict(
@@ -365,7 +384,7 @@ class Problem:
         run, own = run or self.runs[bag], slice(self.edges[bag], self.edges[bag + 1])
         here = [effect for effect in effects if effect[0].active_in(bag)]
         torque = self.torque(bag, x, here, run)
-        given = {candidate.label for candidate, _ in here}
+        given = {candidate.label for candidate, _ in here} if self.standing else set()
         for candidate, values in [*(effect for effect in self.standing if effect[0].label not in given), *here]:
             start = candidate.start(bag)
             if candidate.effect.hooks.keys() & SENSOR_HOOKS:
