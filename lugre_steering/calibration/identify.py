@@ -126,12 +126,11 @@ def _information(curvature: Array, score: Array, kept: int) -> Array:
 
 def _column(problem: Problem, result: Estimate, calibration: SheetValue) -> Array:
     """Change of the predicted torque per relative change of one sheet value (n,) [N m]."""
-    moved = copy.copy(problem)
     if calibration is SENSITIVITY:
+        moved, x = copy.copy(problem), result.x
         moved.model = replace(problem.model, rubber=problem.model.rubber ** (1.0 + STEP))
-        x = result.x
     else:
-        moved.calibrations = (*problem.calibrations, calibration)
+        moved = problem.calibrating(calibration)
         x = np.insert(result.x, len(problem.calibrations), STEP)
     return np.asarray((moved.predict_all(x, result.fit.effects) - result.fit.prediction) / STEP)
 

@@ -129,6 +129,12 @@ class Candidate:
     def label(self) -> str:
         return self.effect.id + (f"[{self.line}]" if self.line else "")
 
+    @property
+    def claim(self) -> tuple[str, ...]:
+        """Its label and the ends of the place at which it is tried: a place in the angle and one in time are different claims."""
+        ends = {name for pair in self.effect.places for name in pair}
+        return (self.label, *(name for name, _ in self.shapes if name in ends))
+
     def parameter(self, name: str) -> Parameter:
         return next(p for p in self.effect.parameters if p.name == name)
 
@@ -288,6 +294,14 @@ class Problem:
         doubted = copy(self)
         doubted.doubt, doubted.typical = doubt, typical
         return doubted
+
+    def calibrating(self, calibration: SheetValue) -> Problem:
+        """The same with one more value of the sheet that may be wrong."""
+        more = copy(self)
+        more.calibrations = (*self.calibrations, calibration)
+        for known in ("_sheet", "_gains"):  # of the calibrations before
+            more.__dict__.pop(known, None)
+        return more
 
     def with_known_weather(self) -> Problem:
         """The same where every bag is known to have begun as warm as the vehicle file says, to a hundredth of a degree."""

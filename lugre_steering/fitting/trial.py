@@ -97,8 +97,8 @@ class Round:
         """A trial of an effect in one bag only, or from a time on, against the same everywhere, which is the simpler claim."""
         if not _partial(trial.score):
             return trial
-        label = trial.score.candidate.label
-        whole = next((s for s in self.scores if s.candidate.label == label and not _partial(s)), None)
+        claim = trial.score.candidate.claim
+        whole = next((s for s in self.scores if s.candidate.claim == claim and not _partial(s)), None)
         if whole is None or whole.explained <= 0.0:
             return trial
         simpler = self.try_effect(whole)
@@ -121,7 +121,7 @@ class Round:
         tried = trial.score.candidate
         variants = [
             score for score in self.scores
-            if (c := score.candidate).label == tried.label and (c.bags, c.since) == (tried.bags, tried.since)
+            if (c := score.candidate).claim == tried.claim and (c.bags, c.since) == (tried.bags, tried.since)
             and c.shapes != tried.shapes and score.explained > VARIANT * trial.score.explained
         ]  # fmt: skip
         typical = replace(trial.score, coefficients=tuple(float(np.sign(c)) for c in trial.score.coefficients))

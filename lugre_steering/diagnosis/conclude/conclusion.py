@@ -15,6 +15,7 @@ from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
+from lugre_steering.diagnosis.conclude.late import beside_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.stands import Stands, standing
 from lugre_steering.diagnosis.conclude.statement import statement
@@ -33,7 +34,6 @@ from lugre_steering.diagnosis.result import (
     NamedEffect,
 )
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.fitting import onset
 from lugre_steering.fitting.clocks import clock_finding
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding, Recording
@@ -161,17 +161,11 @@ def _shown(done: Finished, stands: Stands, model: _Modelled) -> tuple[BagTrace, 
 
 
 def _whole(done: Finished, final: Fit) -> tuple[Fit, Fit]:
-    """All valid data fitted, for the values that are reported, and the same beside all freedoms; what began late is timed anew."""
+    """All valid data fitted, for the values that are reported, and the same beside all freedoms."""
     there = done.compared
     if not final.effects:
         return fit(done.problem, done.weight, (), final.x), there.found.baseline
-    bent = fit(there.problem, there.weight, there.found.final.effects, there.found.final)
-    for index, (candidate, values) in enumerate(bent.effects):
-        if candidate.since:
-            effects = [*bent.effects]
-            effects[index] = (replace(candidate, since=onset.timed(there.problem, there.weight, bent, index)), values)
-            again = fit(there.problem, there.weight, effects, bent)
-            bent = again if again.cost < bent.cost else bent
+    bent = beside_all(there)
     return done.in_file(done.weight, bent.effects, bent.x), bent
 
 

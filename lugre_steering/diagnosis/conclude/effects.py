@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.loudness import FORM_LEFT
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.compare import tied
+from lugre_steering.diagnosis.search.compare import NAME_TAKEN, tied
 from lugre_steering.diagnosis.search.search import Found
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate
@@ -58,17 +58,26 @@ def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedVa
     """Value, 95 % interval and unit of each free parameter, effect by effect.
 
     As sure as beside all freedoms; and a value that these shift is as unsure as that, or where it was found beside them, as the share of
-    their torque that they may have wrong, as they too are of another form than nature.
+    their torque that they may have wrong, as they too are of another form than nature. So is the law of a name itself: a value may
+    be off by what makes so much of its torque, but for inertia, viscous friction and the like of a single joint.
     """
     deviation = _deviation(done, bent)[done.compared.problem.nuisances :]
     position = 0
     found: list[dict[str, FittedValue]] = []
     share = float(np.sqrt(FORM_LEFT)) if done.around else 1.0
     without, beside = (done.freely, done.compared.found.final) if done.around else (whole, bent)
-    for (candidate, values), (_, freely), (_, shifted) in zip(whole.effects, without.effects, beside.effects, strict=False):
+    per_value = np.linalg.norm(bent.jacobian[:, done.compared.problem.nuisances :], axis=0)
+    those = zip(whole.effects, without.effects, beside.effects, done.found.found, strict=False)
+    for index, ((candidate, values), (_, freely), (_, shifted), item) in enumerate(those):
         parameters: dict[str, FittedValue] = {}
+        torque = locate.contribution(done.compared.problem, bent, index) * done.compared.weight
+        other_form = 0.0 if item.given else float(np.sqrt(NAME_TAKEN) * np.linalg.norm(torque))
         for key in candidate.free:
-            half = verify.NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
+            known = verify.NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
+            moved = other_form / max(per_value[position], 1e-300)
+            if key not in candidate.effect.amplitudes:  # at most as far as matters: some, like the end of a rest, hardly act
+                moved = min(moved, candidate.parameter(key).scale)
+            half = float(np.hypot(known, moved))
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
             )

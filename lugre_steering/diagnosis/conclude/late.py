@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Names that began within the recordings, which only the data held out show: what was fitted has no earlier occasion to see them."""
+"""Names that began within the recordings, and when: what was fitted may have no occasion near the instant, or none at all, to see it."""
 
 from __future__ import annotations
 
@@ -30,6 +30,30 @@ def begun_late(done: Finished) -> Finished:
             begun = late
     if all(candidate.since == own.since for (candidate, _), (own, _) in zip(begun.effects, done.found.final.effects, strict=True)):
         return done
+    return _with_instants(done, begun)
+
+
+def timed_by_all(done: Finished) -> Finished:
+    """The search with the instants of its late names as all data have them: what was fitted may have had no occasion near them."""
+    final = done.compared.found.final
+    if not any(candidate.since for candidate, _ in final.effects):
+        return done
+    return _with_instants(done, beside_all(done.compared))
+
+
+def beside_all(there: Finished) -> Fit:
+    """What was found fitted to all data; what began late is timed anew."""
+    fitted = fit(there.problem, there.weight, there.found.final.effects, there.found.final)
+    for index, (candidate, _) in enumerate(fitted.effects):
+        if candidate.since:
+            since = onset.timed(there.problem, there.weight, fitted, index)
+            again = fit(there.problem, there.weight, _since(fitted, index, since).effects, fitted)
+            fitted = again if again.cost < fitted.cost else fitted
+    return fitted
+
+
+def _with_instants(done: Finished, begun: Fit) -> Finished:
+    """The search with the instants of another fit."""
     there = done.compared
     compared = _at(there, begun)
     final = done.in_file(done.fitted, compared.effects, compared.x) if done.around else _at(done, begun)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.formed import Formed, formed, formed_beside
-from lugre_steering.diagnosis.conclude.late import begun_late
+from lugre_steering.diagnosis.conclude.late import begun_late, timed_by_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
@@ -86,7 +86,7 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
     if stands.lawful is not None:
         both = formed_beside(done, stands.lawful, seed)
         return done, stands if both is None else replace(stands, lawful=both[0], judged=both[0].judged, form=both[1])
-    form = (tested.form if stands.named else None) or formed(done, stands.named, seed)
+    form = (tested.form if stands.named else None) or formed(timed_by_all(done) if stands.named else done, stands.named, seed)
     return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
 
 
@@ -99,13 +99,13 @@ def _tested(done: Finished, seed: int) -> _Tested:
     beside, form = judged, None
     if found.found and done.needs_form and not any(item.in_place for item in found.found):
         beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
-        form = formed(done, True, seed) if judged.gain <= -CONTRADICTED and beside.interval[0] > 0.0 else None
+        form = formed(timed_by_all(done), True, seed) if judged.gain <= -CONTRADICTED and beside.interval[0] > 0.0 else None
     clock = _clock(done)
     # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     harmless = max(judged.gain, -np.inf if form is None else form.judged.gain) > -CONTRADICTED
-    better = harmless and beside.gain > -CONTRADICTED and beside.interval[0] > 0.0
-    named = bool(found.found) and better and clock is None and not stuck
+    surely = beside.interval[0] > 0.0 or (judged.interval[0] > 0.0 and beside.interval[1] > 0.0)
+    named = bool(found.found) and harmless and surely and clock is None and not stuck
     return _Tested(named, clock, judged, form)
 
 

@@ -67,10 +67,10 @@ def proposed(
 def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposal:
     """What leads in some rounds once more, with all parts of its laws, in one world."""
     current = fit(problem, weight, seen[0].current.effects, seen[0].current)
-    leading: dict[str, Trial] = {}
+    leading: dict[tuple[str, ...], Trial] = {}
     for own in seen:
         best = own.before - own.trials[0].cost if own.trials else 0.0
-        leading |= {trial.candidate.label: trial for trial in own.trials if own.before - trial.cost > LEADING * best}
+        leading |= {trial.candidate.claim: trial for trial in reversed(own.trials) if own.before - trial.cost > LEADING * best}
     trials, best = list[Trial](), current.cost
     for trial in sorted(leading.values(), key=lambda each: each.cost):
         again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE, worth=worth_of(current.cost, best))
@@ -86,10 +86,10 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
 
 
 def choose(scores: Sequence[Score]) -> list[Score]:
-    """Shortlist: the best variant of each effect that is significant across the catalogue."""
-    best: dict[str, Score] = {}
+    """Shortlist: the best variant of each effect, at places of either kind, that is significant across the catalogue."""
+    best: dict[tuple[str, ...], Score] = {}
     for score in sorted(scores, key=lambda score: -score.explained):
-        best.setdefault(score.candidate.effect.id, score)
+        best.setdefault((score.candidate.effect.id, *score.candidate.claim[1:]), score)
     if not best:
         return []
     adjusted = stats.false_discovery_control([score.p_value for score in best.values()], method="by")

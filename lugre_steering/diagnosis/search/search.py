@@ -46,6 +46,8 @@ REST = 0.05
 """Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
 END = 0.01
 """Share of its range within which a value stands at the end of it."""
+SURE_OF_SIZE = 2.0
+"""Standard deviations by which a name on a single joint must be more than nothing."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -112,6 +114,10 @@ def search(
     found, now, current = sure
     if len(found) > given and is_rig(problem.vehicle):
         found, current = _given_beside(now, noise, weight, split, current, found)
+        now, current = settled(now, weight, current)
+        if (sized := _of_sure_size(now, weight, current, found))[1] is not current:
+            found, current = _given_beside(now, noise, weight, split, *reversed(sized))
+            now, current = settled(now, weight, current)
         given = sum(item.given for item in found)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
@@ -185,6 +191,30 @@ def _given_beside(
         del given[index]
         current = leaner
     return [*(_told(item, _rivals(problem, noise, weight, split, current, item, i)) for i, item in enumerate(given)), *names], current
+
+
+def _of_sure_size(problem: Problem, weight: Array, current: Fit, found: Sequence[Found]) -> tuple[list[Found], Fit]:
+    """Without names whose size may be none: so little is known of the friction of a single joint that they make up for it."""
+    kept = list(found)
+    while True:
+        sizes = [_size_in_deviations(problem, current, i) if not item.given else np.inf for i, item in enumerate(kept)]
+        least = int(np.argmin(sizes))
+        if sizes[least] > SURE_OF_SIZE:
+            return kept, current
+        del kept[least]
+        current = fit(problem, weight, [own for i, own in enumerate(current.effects) if i != least], current)
+
+
+def _size_in_deviations(problem: Problem, current: Fit, index: int) -> float:
+    """The amplitude of an effect of a fit that is surest, in its standard deviations."""
+    first = problem.nuisances + sum(len(candidate.free) for candidate, _ in current.effects[:index])
+    candidate, values = current.effects[index]
+    variances = np.diag(current.covariance)[first:] * problem.doubt
+    sizes = [
+        abs(values[name]) / max(float(np.sqrt(variance)), 1e-300)
+        for name, variance in zip(candidate.free, variances, strict=False) if name in candidate.effect.amplitudes
+    ]  # fmt: skip
+    return max(sizes, default=np.inf)
 
 
 def _closest(
