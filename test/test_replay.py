@@ -466,7 +466,7 @@ def test_an_error_about_a_missing_topic_shows_the_damage_and_not_thousands_of_ot
     topics = [(f"/t{i}", make.TEMPERATURE) for i in range(100)]
     bag = make.write(tmp_path / "run", [], topics=topics)
     (bag / "metadata.yaml").write_text("[" * 30_000)
-    with pytest.raises(BagError, match="is missing; topics in the bag: .* and 80 others; damage: metadata.yaml is not readable"):
+    with pytest.raises(BagError, match=r"is missing; topics in the bag: .* and 80 others; damage: metadata.yaml is not"):
         replay([bag], VEHICLE, tmp_path / "out")
 
 
