@@ -462,6 +462,14 @@ def test_an_error_about_lost_angles_shows_the_damage(tmp_path: Path) -> None:
         replay([make.write(tmp_path / "run", messages)], VEHICLE, tmp_path / "out")
 
 
+def test_an_error_about_a_missing_topic_shows_the_damage_and_not_thousands_of_others(tmp_path: Path) -> None:
+    topics = [(f"/t{i}", make.TEMPERATURE) for i in range(100)]
+    bag = make.write(tmp_path / "run", [], topics=topics)
+    (bag / "metadata.yaml").write_text("[" * 30_000)
+    with pytest.raises(BagError, match=r"is missing; topics in the bag: .* and 80 others; damage: metadata.yaml is not"):
+        replay([bag], VEHICLE, tmp_path / "out")
+
+
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_torn_bag_is_replayed_as_far_as_it_goes(tmp_path: Path, storage: str) -> None:
     write_cycle(tmp_path / "run", 100.0, storage)  # type: ignore[arg-type]

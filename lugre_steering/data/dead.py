@@ -30,6 +30,8 @@ MOVES = 2.0
 """Presliding lengths that the tracks must turn before anything is expected of other channels."""
 ALIVE = 0.05
 """Share of its expected travel that a pressure must show, or one angle of the other's."""
+RESTS = 0.1
+"""Share of its own travel that a line moves at most where only its counterpart works."""
 ALL_NOISE = 0.5
 """Share of a channel's variance that may be white noise."""
 ROUGH = 0.05
@@ -201,7 +203,7 @@ def _zeros(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
 
 
 def _constant(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
-    """Circuits of which no line moves though the tracks turned against friction."""
+    """Lines that do not move though the tracks turned against friction, and no other line of their circuits does their work."""
     if vehicle.hydraulics is None:
         return
     model = build_model(vehicle)
@@ -219,10 +221,14 @@ def _constant(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Findin
         line for line, shown, nominal in zip(lines, run.pressure, expected, strict=True)
         if _travel(run, shown[run.valid]) < ALIVE * _travel(run, nominal[run.valid]) and _idle(run, shown)
     }  # fmt: skip
-    dead = [
-        line for line in lines
-        if line in still and all(still.issuperset({c.cap, c.rod} & set(lines)) for c in cylinders if line in (c.cap, c.rod))
-    ]  # fmt: skip
+    pressure, nominal = dict(zip(lines, run.pressure, strict=True)), dict(zip(lines, expected, strict=True))
+
+    def rests(other: str, line: str) -> bool:
+        needed = run.valid & (nominal[line] > 0.5 * nominal[line].max())
+        return other in still or _travel(run, pressure[other][needed]) < RESTS * _travel(run, pressure[other][run.valid])
+
+    circuits = [{c.cap, c.rod} & set(lines) for c in cylinders]
+    dead = [line for line in lines if line in still and all(rests(other, line) for c in circuits if line in c for other in c)]
     if dead:
         topic = ", ".join(topics[Kind.PRESSURE, line] for line in dead)
         statement = "stays constant but for noise while the tracks turn against friction; check sensors, plugs and valves"

@@ -20,7 +20,7 @@ from lugre_steering.data.dataset import Run, prepare
 from lugre_steering.data.nominal import GAIN, GOOD, nominal_torques, topics_of
 from lugre_steering.data.offsets import SKEW_RANGE_S, clock_skew, zero_drifts
 from lugre_steering.errors import DataError
-from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
+from lugre_steering.recording import Array, Finding, Kind, Mask, Recording, Signal
 from lugre_steering.units import words
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
@@ -31,6 +31,9 @@ BLOCKING = frozenset({
     "copied_sensor", "noisy_sensor", "angle_zero",
 })  # fmt: skip
 
+RELAXED, FORGOTTEN = 0.2, 3.0
+"""Share of the largest nominal torque up to which a recording begins with the relaxed bristles of the model, not in mid-sweep, and
+presliding lengths after which little is left of others."""
 UNTOLD = 0.3
 """Variation of the nominal torque over its level below which it has no shape to compare: part of one sweep."""
 MISTYPED = 13.0
@@ -122,8 +125,19 @@ def _telling(piece: Recording, vehicle: Vehicle) -> Run | None:
         return None
     if float(np.ptp(run.theta, axis=1).max()) < 40.0 * vehicle.sensors.angle_sigma or run.valid.sum() < 20:
         return None
-    total = nominal_torques(build_model(vehicle), run).sum(axis=0)[run.valid]
-    return None if float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))) else run
+    model = build_model(vehicle)
+    nominal = nominal_torques(model, run).sum(axis=0)
+    if abs(run.measured[0]) > RELAXED * float(np.abs(nominal).max()):
+        run = replace(run, valid=run.valid & _forgotten(run, model))
+    total = nominal[run.valid]
+    return None if total.size < 20 or float(np.std(total)) < UNTOLD * float(np.sqrt(np.mean(total**2))) else run
+
+
+def _forgotten(run: Run, model: Model) -> Mask:
+    """Where (n,) little is left of the bristles with which the recording began."""
+    record = model.parameters[0][0]
+    turned = np.abs(run.omega).max(axis=0).cumsum() * float(run.time[1] - run.time[0])
+    return np.asarray(turned > FORGOTTEN * float(record["coulomb_torque"] / record["sigma_0"]))
 
 
 def span(recording: Recording) -> tuple[tuple[float, float], ...]:
@@ -195,7 +209,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
     if not convincing:
         if tiny:
             return _no_torque(vehicle)
-        return _unlike(vehicle, correlation) if abs(correlation) < UNLIKE and not _lacks_terms(vehicle, run, total) else ()
+        return _unlike(vehicle, correlation) if correlation < UNLIKE and not _lacks_terms(vehicle, run, total) else ()
     best = min(h.error for h in convincing)
     if mistyped < min(GOOD, best) or mistyped <= min(POOR, TIE * best + 0.01):
         return ()  # a level of the vehicle file may be wrong as well; all its entries are compared later
@@ -273,7 +287,7 @@ def _unlike(vehicle: Vehicle, correlation: float) -> Faults:
 def _hypotheses(vehicle: Vehicle, run: Run, model: Model, count: int) -> Iterator[_Hypothesis]:
     """Every combination of ``count`` faults of angles and of pressures (or torque)."""
     for of_angles, moved in _angles_undone(vehicle, run):
-        if len(of_angles) > count or _mirrored(vehicle, moved):
+        if len(of_angles) > count or _mirrored(vehicle, moved) or _breaks_geometry(vehicle, run, moved):
             continue
         # The chain is not quite odd (gravity), so undone motion runs through it again.
         expected = nominal_torques(model, moved).sum(axis=0)
@@ -384,7 +398,7 @@ def _angle_units(recording: Recording, vehicle: Vehicle, as_is: Run, model: Mode
             for side, s in recording.angle.items()
         }
         run = prepare(replace(recording, angle=scaled), vehicle)
-        if _off_geometry(vehicle, as_is) < GEOMETRY_RAD < _off_geometry(vehicle, run):
+        if _breaks_geometry(vehicle, as_is, run):
             continue
         statement = f"{' and '.join(named)}: probably in {unit} (multiply by {factor:.6g})"
         error = _error(run, run.measured, nominal_torques(model, run).sum(axis=0))
@@ -408,6 +422,11 @@ def _mirrored(vehicle: Vehicle, run: Run) -> bool | None:
     if max(own, other) < GEOMETRY_RAD or GEOMETRY_RATIO * min(own, other) > max(own, other):
         return None
     return other < own
+
+
+def _breaks_geometry(vehicle: Vehicle, as_is: Run, undone: Run) -> bool:
+    """Whether angles that obey the steering geometry as they are would no longer do so."""
+    return _off_geometry(vehicle, as_is) < GEOMETRY_RAD < _off_geometry(vehicle, undone)
 
 
 def _off_geometry(vehicle: Vehicle, run: Run, sense: float = 1.0) -> float:

@@ -22,7 +22,7 @@ from lugre_steering.bag import Bag, BagWriter, Block
 from lugre_steering.bag.find import REPLAYED
 from lugre_steering.bag.given import in_stamp_order
 from lugre_steering.bag.load import STRAY_NS
-from lugre_steering.bag.reader import damage_words
+from lugre_steering.bag.reader import damage_words, shortened
 from lugre_steering.bag.writer import copied
 from lugre_steering.chain.step import Records
 from lugre_steering.counted import counted
@@ -123,8 +123,9 @@ class Passage:
         topics = bag.match(channels)
         for channel in self.vehicle.channels:
             if channel.kind is Kind.ANGLE and channel not in topics:
-                found = ", ".join(sorted(bag.topics)) or "none"
-                raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}")
+                found = shortened(sorted(bag.topics)) or "none"
+                damage = damage_words(bag.findings)
+                raise BagError(f"{self.path}: topic {channel.topic!r} is missing; topics in the bag: {found}{damage}")
         return topics
 
     def _check_estimates(self, samples: Mapping[str, InputCounts], findings: Sequence[Finding]) -> None:

@@ -47,6 +47,7 @@ SHEET_FILE = config_folder() / "test_vehicle.yaml"
 VEHICLE = vehicle_file.load(SHEET_FILE)
 SHEET = load_sheet(SHEET_FILE)
 LINES = ("main_a", "main_b", "aux_a", "aux_b")
+BAGS = Path(__file__).parents[2] / "bags"
 CONFORMANCE = Path(__file__).resolve().parents[3] / "shared" / "conformance"
 LEFT, RIGHT = "steering/left/joint_state", "steering/right/joint_state"
 AIR = "steering/ambient_temperature"
@@ -599,6 +600,24 @@ def test_silent_on_hidden_physics(first: str, second: str) -> None:
     case = Case(41, (Concealed(first, 2.0), Concealed(second, 2.0)), noise="ripple", manoeuvres=("decaying", "chirp"))
     for bag in simulate_case(case, SHEET).bags:
         assert inspect(recording_of(bag), VEHICLE).findings == ()
+
+
+@pytest.mark.parametrize(
+    ("bag", "start_s", "lasts_s"),
+    [
+        ("synthetic_double_cycle", 30.0, 5.0), ("synthetic_hidden_stop_b", 16.0, 5.0), ("synthetic_hidden_stop_b", 20.5, 5.0),
+        ("synthetic_hidden_stop_b", 51.0, 10.0),
+    ],
+)  # fmt: skip
+def test_nobody_is_accused_by_a_recording_begun_in_mid_sweep(bag: str, start_s: float, lasts_s: float) -> None:
+    """Nobody knows how the bristles stood at its start."""
+
+    def cut(signals: dict[str, Signal]) -> dict[str, Signal]:
+        kept = {name: (s, (s.time_s >= start_s) & (s.time_s < start_s + lasts_s)) for name, s in signals.items()}
+        return {name: Signal(s.time_s[use], s.value[use]) for name, (s, use) in kept.items()}
+
+    whole = read_recording(BAGS / bag, VEHICLE.channels)
+    assert inspect(replace(whole, angle=cut(whole.angle), pressure=cut(whole.pressure), rate={}), VEHICLE).blocking == ()
 
 
 @pytest.mark.skipif(not CONFORMANCE.exists(), reason="conformance recordings are not beside the project")

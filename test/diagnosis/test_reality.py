@@ -358,6 +358,10 @@ DEAD: dict[str, tuple[Callable[[Recording], Recording], str, str]] = {
     "constant pressures": (lambda r: changed(r, pressure=lambda v: np.full(v.size, 5e6)), "dead_sensor", "pressure"),
     "quiet pressures": (lambda r: changed(r, pressure=noise(1.5e4, 5e6)), "dead_sensor", "pressure"),
     "pressures of noise": (lambda r: changed(r, pressure=noise(2e6, 5e6)), "dead_sensor", "pressure"),
+    "one quiet pressure": (
+        lambda r: replace(r, pressure={**r.pressure, "main_a": changed(r, pressure=noise(1.5e4, 2e6)).pressure["main_a"]}),
+        "dead_sensor", "main_a",
+    ),
     "frozen angle": (
         lambda r: replace(r, angle={**r.angle, "left": changed(r, angle=noise(2e-4, 0.1)).angle["left"]}), "dead_sensor", "left",
     ),
@@ -391,6 +395,19 @@ def test_noise_is_told_as_that_of_one_sample(rate_Hz: float) -> None:
 
 def test_sound_channels_are_alive() -> None:
     assert all(inspect_dead(recording, VEHICLE) == () for recording in sound())
+
+
+def test_a_line_at_the_pressure_of_the_supply_is_alive() -> None:
+    """Its counterpart does the work of both."""
+
+    def supplied(recording: Recording) -> Recording:
+        both = {line: recording.pressure[line] for line in ("main_a", "main_b")}
+        time = both["main_a"].time_s
+        apart = both["main_b"].value - np.interp(both["main_b"].time_s, time, both["main_a"].value)
+        held = {"main_a": Signal(time, noise(1.5e4, 2e7)(time)), "main_b": Signal(both["main_b"].time_s, 2e7 + apart)}
+        return replace(recording, pressure={**recording.pressure, **held})
+
+    assert all(inspect_dead(supplied(recording), VEHICLE) == () for recording in sound())
 
 
 def test_a_part_of_one_sweep_is_in_no_other_unit() -> None:
