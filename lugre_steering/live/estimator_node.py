@@ -176,6 +176,11 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.session.outputs.interrupt_commands()
         self.get_logger().error(self.last_exception, throttle_duration_sec=1.0)
 
+    def late(self) -> None:
+        """More comes than can be worked off; the middleware has dropped the rest."""
+        if self.session is not None:
+            self.session.health.unused["more messages came than could be read"] += 1
+
     def _tick(self) -> None:
         session, now_ns = self.session, time.monotonic_ns()
         waited_s = (now_ns - self._reported_ns) * 1e-9
