@@ -56,6 +56,7 @@ class Inputs:
     ) -> None:
         self._node, self._channels, self._health, self._push, self._set_plan = node, vehicle.channels, health, push, set_plan
         self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
+        self._frames: dict[int, str] = {}  # of the first message of each channel
         self._spent_s, self._spent_at = 0.0, 0.0  # time that plans have taken of late, and when that was so (monotonic)
         overrides = QoSOverridingOptions.with_default_policies()
 
@@ -116,6 +117,7 @@ class Inputs:
                 else:
                     i = 0
                 carried = True
+                self._see_frame(topic, channel, message.header.frame_id)
                 angle = position[i] if i < len(position) else math.nan
                 rate = velocity[i] if i < len(velocity) else math.nan
                 if ratio := self._channels[channel].ackermann:
@@ -130,9 +132,15 @@ class Inputs:
         def handle(message: Any) -> None:
             stamp_ns = self._stamp_ns(topic, message.header.stamp)
             if stamp_ns is not None:
+                self._see_frame(topic, channel, message.header.frame_id)
                 self._push(channel, stamp_ns, read(message), math.nan)
 
         return handle
+
+    def _see_frame(self, topic: str, channel: int, frame: str) -> None:
+        """A frame is told, not refused: the value is judged as any other, and drivers fill frames as they like."""
+        if frame != self._frames.setdefault(channel, frame):
+            self._health.unused[f"{topic} of another frame than at first"] += 1
 
     def _stamp_ns(self, topic: str, stamp: Any) -> int | None:
         """None, and counted, for a stamp whose nanoseconds are a second or more: it is no time."""
