@@ -620,3 +620,53 @@ def test_noise_leaves_no_wrong_torque_without_doubt(rate_Hz: int, times: float, 
 def test_the_noise_of_the_sheet_raises_no_doubt(rate_Hz: int, moving: bool) -> None:
     rows, _ = noisy_at(rate_Hz, 1.5, 0.0, 60.0, moving, 60.0)
     assert not rows["doubts"].any()
+
+
+def as_it_is(_side: int, _t: float, value: float) -> float:
+    return value
+
+
+def rated(rate: Fault, reading: Fault = as_it_is, seconds: float = 20.0) -> tuple[Array, Array]:
+    """The drive with rates, noisy by 0.02 rad/s, that ``rate`` turns into others -> times [s], whether rate and angle contradict."""
+    rng = np.random.default_rng(2)
+    estimator, found = Estimator(VEHICLE), []
+    for i in range(round(100 * seconds)):
+        t = 0.01 * i
+        for side, share in enumerate((1.0, 0.95)):
+            angle = reading(side, t, share * 0.3 * math.sin(0.7 * t) + rng.normal(0.0, SIGMA))
+            turned = rate(side, t, share * 0.21 * math.cos(0.7 * t)) + rng.normal(0.0, 0.02)
+            rows = estimator.push(side, T0 + i * PERIOD_NS, angle, turned)[0]
+            found += [(t, "angle and rate contradict" in doubts(row)) for row in rows]
+    times, told = np.array(found).T
+    return times, told.astype(bool)
+
+
+@pytest.mark.parametrize("which", ["rate is off", "rate stands", "angle creeps away"])
+def test_an_angle_that_its_rate_contradicts_is_told_within_a_fifth_of_a_second_and_forgotten_within_one(which: str) -> None:
+    rates = {
+        "rate is off": during(13.0, 14.5, lambda side, _t, rate: rate + 0.3 * side),
+        "rate stands": during(13.0, 14.5, lambda _side, _t, _rate: 0.0),
+    }
+    creeps = during(13.0, 14.5, lambda side, t, angle: angle + 0.2 * (t - 13.0) * (1 - side))
+    t, told = rated(rates.get(which, as_it_is), as_it_is if which in rates else creeps)
+    assert 13.0 < t[told][0] < 13.2
+    assert t[told][-1] < 15.5
+    assert told[(t > 13.2) & (t < 14.5)].all()
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        pytest.param(lambda _side, _t, _rate: 0.0, id="never filled"),
+        pytest.param(lambda _side, _t, rate: math.degrees(rate), id="always in degrees"),
+        pytest.param(lambda _side, t, _rate: 0.21 * math.cos(0.7 * (t - 0.1)), id="late"),
+        pytest.param(as_it_is, id="sound"),
+    ],
+)
+def test_rates_that_never_went_with_the_angle_or_always_do_contradict_nothing(rate: Fault) -> None:
+    """Neither while it drives on nor when it stops dead."""
+
+    def stopped(side: int, t: float, angle: float) -> float:
+        return angle if t < 17.0 else (1.0, 0.95)[side] * 0.3 * math.sin(0.7 * 17.0)
+
+    assert not rated(lambda side, t, value: rate(side, t, value) if t < 17.1 else 0.0, stopped)[1].any()

@@ -19,14 +19,15 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lugre_steering.bench.neighbour import SECOND, Fault, Neighbour, NodeProcess, Sample, as_it_is
+from lugre_steering.bench.neighbour import NO_TEXT, SECOND, Fault, Neighbour, NodeProcess, Sample, as_it_is
 from lugre_steering.estimator import Estimator
 from lugre_steering.recording import NODE, Kind
 from lugre_steering.resources import config_folder
@@ -34,12 +35,15 @@ from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.vehicle.model import baseline_parameters
 
 FAULT_S, REST_S = 0.8, 1.8
+RATED_S = 15.0
+"""More motion than rates must go with before they count as a witness."""
 TOLD_S, RECOVERED_S = 0.2, 1.0
 NEAR = 0.05
 NOTHING: tuple[str, ...] = ()
 """Nothing need be told."""
 ANEW = ("clock an hour ahead", "clock an hour back")
 """After these the estimator begins anew, and so does what it is compared with."""
+CONTRADICTED, THREE, SIMULATED = "rate against angle", "three nodes of one name", "simulated time"
 ARGUMENTS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5", "-p", "max_rate_rad_s:=2.0")
 
 
@@ -124,7 +128,7 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
     hour = 3600 * SECOND
 
     jumped = ("angle jumped", "spike")
-    frozen, stale = ("angle frozen",), ("stale",)
+    frozen, stale, framed = ("angle frozen",), ("stale",), ("of another frame",)
     unlike = ("residual implausible", "pressure frozen")  # "residual formed" is told all the time
     return {
         # First, while the rubber is as cold as at the beginning to which the latter goes back.
@@ -156,6 +160,8 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
         ),
         "rates that contradict": (_of(vehicle, angle, lambda _, sample: sample._replace(rate=50.0)), ("absurd_rate",)),
         "another joint's name": (_of(vehicle, angle, lambda _, sample: sample._replace(joint="boom")), ("without a wanted joint", *stale)),
+        "frame of another sensor": (_of(vehicle, (*angle, *pressure), lambda _, sample: sample._replace(frame="boom")), framed),
+        "frames that are no text": (_of(vehicle, (*angle, *pressure), lambda _, sample: sample._replace(frame=NO_TEXT)), framed),
         "zero stamps": (_of(vehicle, (*angle, *pressure), _stamp(lambda _: 0)), ("zero_stamp",)),
         "pressures are no number": (_of(vehicle, pressure, _value(lambda _: math.nan)), ("not_finite",)),
         "pressures out of range": (_of(vehicle, pressure, _value(lambda _: 1e9)), ("absurd",)),
@@ -191,7 +197,7 @@ class Score:
 class Campaign:
     """One node and its neighbour; faults one after the other."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
+    def __init__(self, folder: Path, seed: int, simulated: bool = False) -> None:
         self.vehicle_file = config_folder() / "test_vehicle.yaml"
         self.vehicle = load(self.vehicle_file)
         self.log, self.rng = folder / "node.log", np.random.default_rng(seed)
@@ -199,8 +205,9 @@ class Campaign:
         self.friction = float(parameters["static_torque"]) * len(self.vehicle.sides)
         self.limit = 3.0 * float(parameters["static_torque"])
         self.slope = float(parameters["sigma_0"])
-        self.node = NodeProcess(self.vehicle_file, self.log, *ARGUMENTS)
-        self.neighbour = Neighbour(self.vehicle, seed)
+        self.arguments = (*ARGUMENTS, "-p", f"use_sim_time:={'true' if simulated else 'false'}")
+        self.node = NodeProcess(self.vehicle_file, self.log, *self.arguments)
+        self.neighbour = Neighbour(self.vehicle, seed, simulated=simulated)
         self.neighbour.wait_for_node()
         time.sleep(2.0)
 
@@ -226,11 +233,11 @@ class Campaign:
         neighbour = self.neighbour
         neighbour.wait_until_it_moves()
         mark = len(neighbour.commands), len(neighbour.told)
-        begin_ns = time.time_ns()
         begin()
+        begin_ns = neighbour.now_ns()
         time.sleep(FAULT_S)
         end()
-        end_ns = time.time_ns()
+        end_ns = neighbour.now_ns()
         if name in ANEW:
             neighbour.clean.clear()
         time.sleep(REST_S)
@@ -241,7 +248,7 @@ class Campaign:
         reach = [self.slope * max(0.05, tb - ta) for (ta, _), (tb, _) in itertools.pairwise(commands)]
         values = [value for _, value in (*commands, *neighbour.torque, *neighbour.feed_forward)]
         wanted = dict(neighbour.left)
-        now_ns = time.time_ns()  # stamps may have been ahead of it
+        now_ns = neighbour.now_ns()  # stamps may have been ahead of it
         fed = [(ns, value) for ns, value in neighbour.feed_forward if end_ns < ns < now_ns]
         held = [ns for ns, value in fed if abs(value - wanted.get(ns, value)) > NEAR * self.friction]
         return Score(
@@ -371,10 +378,96 @@ def killed(campaign: Campaign, number: int) -> tuple[bool, float]:
     time.sleep(0.2)
     zero = neighbour.commands[-1][1] == 0.0
     begin = time.monotonic()
-    campaign.node = NodeProcess(campaign.vehicle_file, campaign.log, *ARGUMENTS)
+    campaign.node = NodeProcess(campaign.vehicle_file, campaign.log, *campaign.arguments)
     ready_s = time.monotonic() - begin
     neighbour.wait_for_node()
     return zero, ready_s
+
+
+def rate_against_angle(campaign: Campaign) -> Score:
+    """Rates that have gone with the angles for a while, and then go another way."""
+    neighbour = campaign.neighbour
+    angles = [i for i, channel in enumerate(campaign.vehicle.channels) if channel.kind is Kind.ANGLE]
+    neighbour.rated = True
+    time.sleep(RATED_S)
+    try:
+        return campaign.samples(
+            CONTRADICTED, lambda _, s: (s._replace(rate=s.rate + 0.3) if s.channel in angles else s,), ("angle and rate contradict",)
+        )
+    finally:
+        neighbour.rated = False
+
+
+def three_at_once(campaign: Campaign) -> Score:
+    """Two more nodes of the name: told as soon as the network knows of the first of them; when they are gone all is as before.
+
+    They give no commands: of two that command one topic nobody can say what comes out.
+    """
+    neighbour, own = campaign.neighbour, (NODE, "/")
+    mark, others = len(neighbour.told), (*campaign.arguments, "-p", "publish_commands:=false")
+
+    def one_more(number: int) -> NodeProcess:
+        return NodeProcess(campaign.vehicle_file, campaign.log.with_name(f"other_{number}.log"), *others)
+
+    with ThreadPoolExecutor() as pool:
+        started = pool.map(one_more, range(2))
+        while neighbour.node.get_node_names_and_namespaces().count(own) < 2:
+            time.sleep(0.001)
+        seen_ns = neighbour.now_ns()
+        nodes = list(started)
+
+    def end() -> None:
+        for node in nodes:
+            node.stop(signal.SIGTERM)
+
+    score = campaign.judge(THREE, lambda: None, end, NOTHING)
+    told = [(ns, text) for ns, text in neighbour.told[mark:] if "of this name" in text]
+    if not told:
+        return replace(score, told_s=math.nan)
+    return replace(score, told_s=max(0, told[0][0] - seen_ns) / SECOND, words=told[0][1])
+
+
+def simulated_time(folder: Path, seed: int) -> Iterator[Score]:
+    """A simulation that begins anew an hour back, as a bag that is looped does, and one whose clock leaps ahead."""
+    campaign = Campaign(folder, seed, simulated=True)
+    neighbour = campaign.neighbour
+
+    def shift(hours: int) -> Callable[[], None]:
+        def begin() -> None:
+            neighbour.shift_ns += hours * 3600 * SECOND
+            neighbour.clean.clear()  # the estimator begins anew, and so does what it is compared with
+
+        return begin
+
+    try:
+        for name, hours in ((f"{SIMULATED} an hour ahead", 1), (f"{SIMULATED} reset", -1)):
+            yield campaign.judge(name, shift(hours), lambda: None, ("time_jump",))
+    finally:
+        campaign.close()
+
+
+def whole(folder: Path, seed: int, only: str, others: dict[str, Any]) -> Iterator[Score]:
+    """All faults with ``only`` in their names, one after the other; what is no score goes into ``others``, if none is left out."""
+    campaign = Campaign(folder, seed)
+    try:
+        for name, (fault, words) in faults_of(campaign.vehicle, campaign.rng).items():
+            if only in name:
+                yield campaign.samples(name, fault, words)
+        for name, (begin, end, words) in events_of(campaign).items():
+            if only in name:
+                yield campaign.judge(name, begin, end, words)
+        if only in CONTRADICTED:
+            yield rate_against_angle(campaign)
+        if only in THREE:
+            yield three_at_once(campaign)
+        if not only:
+            others["wrong parameters refused"] = parameters_set_wrongly(campaign)
+            others["SIGTERM: last command is zero"], others["then ready after [s]"] = killed(campaign, signal.SIGTERM)
+            _, others["SIGKILL: ready after [s]"] = killed(campaign, signal.SIGKILL)
+    finally:
+        campaign.close()
+    if only in SIMULATED:
+        yield from simulated_time(folder, seed)
 
 
 HEAD = f"{'fault':28} {'told s':>7} {'back s':>7} {'free s':>7} {'step N m':>9} {'off replay':>11}  passed"
@@ -395,29 +488,15 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args(argv)
     os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
-    scores = []
+    scores: list[Score] = []
+    others: dict[str, Any] = {}
     if not options.json:
         print(HEAD)
     with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder), options.seed)
-        others: dict[str, Any] = {}
-        try:
-            for name, (fault, words) in faults_of(campaign.vehicle, campaign.rng).items():
-                if options.only in name:
-                    scores.append(campaign.samples(name, fault, words))
-                    if not options.json:
-                        print(line_of(scores[-1]), flush=True)
-            for name, (begin, end, words) in events_of(campaign).items():
-                if options.only in name:
-                    scores.append(campaign.judge(name, begin, end, words))
-                    if not options.json:
-                        print(line_of(scores[-1]), flush=True)
-            if not options.only:
-                others["wrong parameters refused"] = parameters_set_wrongly(campaign)
-                others["SIGTERM: last command is zero"], others["then ready after [s]"] = killed(campaign, signal.SIGTERM)
-                _, others["SIGKILL: ready after [s]"] = killed(campaign, signal.SIGKILL)
-        finally:
-            campaign.close()
+        for score in whole(Path(folder), options.seed, options.only, others):
+            scores.append(score)
+            if not options.json:
+                print(line_of(score), flush=True)
     if options.json:
         json.dump({"faults": [{**asdict(score), "passed": score.passed} for score in scores], **others}, sys.stdout, indent=2)
         print()

@@ -40,10 +40,15 @@ class Sample(NamedTuple):
     value: float
     rate: float = math.nan
     joint: str = ""
+    frame: str = ""
 
 
 Fault = Callable[[int, Sample], Sequence[Sample]]
 """What is sent in place of the sample of a tick."""
+
+
+NO_TEXT = "no text!"
+"""A frame that is sent as bytes which are no UTF-8."""
 
 
 def as_it_is(_: int, sample: Sample) -> Sequence[Sample]:
@@ -82,6 +87,10 @@ class Strokes:
         place, last = int(time_s / STEP_S), self._rows.shape[1] - self._stroke
         return self._rows[:, place if place < last else last + (place - last) % self._stroke]
 
+    def rate(self, channel: int, time_s: float) -> float:
+        """Rate of one channel's value at a time [s]."""
+        return float(self.at(time_s + STEP_S)[channel] - self.at(time_s)[channel]) / STEP_S
+
 
 class NodeProcess:
     """The node as a process of its own."""
@@ -108,18 +117,22 @@ class NodeProcess:
 class Neighbour:
     """Sensors that publish at 1 / ``PERIOD_S`` in a thread of their own, through whatever ``fault`` is set; what the node says is kept."""
 
-    def __init__(self, vehicle: Vehicle, seed: int = 0, period_s: float = PERIOD_S) -> None:
+    def __init__(self, vehicle: Vehicle, seed: int = 0, period_s: float = PERIOD_S, simulated: bool = False) -> None:
+        """``simulated``: the time is published as /clock; ``shift_ns`` sets it."""
         import rclpy
         from diagnostic_msgs.msg import DiagnosticArray
         from geometry_msgs.msg import WrenchStamped
         from rclpy.executors import SingleThreadedExecutor
-        from rclpy.qos import QoSProfile
+        from rclpy.qos import QoSProfile, qos_profile_sensor_data
+        from rosgraph_msgs.msg import Clock
         from sensor_msgs.msg import FluidPressure, JointState, Temperature
         from std_msgs.msg import Float64MultiArray
         from trajectory_msgs.msg import JointTrajectory
 
         self.vehicle, self.period_s = vehicle, period_s
         self.fault: Fault = as_it_is
+        self.shift_ns = 0
+        self.rated = False  # whether the angles come with their rates
         self.sent: list[Sample] = []
         self.clean: list[Sample] = []
         self.torque: list[tuple[int, float]] = []
@@ -134,6 +147,7 @@ class Neighbour:
         rclpy.init(context=self._context, args=[])
         self.node = rclpy.create_node("neighbour", context=self._context)
         self._types = {Kind.ANGLE: JointState, Kind.PRESSURE: FluidPressure, Kind.AIR_TEMPERATURE: Temperature}
+        self._clock = self.node.create_publisher(Clock, "/clock", qos_profile_sensor_data) if simulated else None
         self.publishers: list[Any] = []
         self.restart = True
         # Of a participant of its own, as a planner is: a flood out of the sensors' own shared memory would crowd out what they send.
@@ -185,6 +199,10 @@ class Neighbour:
         while abs(math.cos(2.0 * math.pi * self.phase / STROKE_S)) < 0.8:
             time.sleep(self.period_s)
 
+    def now_ns(self) -> int:
+        """The time that is stamped and, where it is simulated, published."""
+        return time.time_ns() + self.shift_ns
+
     def close(self) -> None:
         self._on = False
         for thread in self._threads:
@@ -194,6 +212,8 @@ class Neighbour:
 
     def send(self, sample: Sample) -> None:
         """Publish one sample; what a sensor's message carries of it is kept in ``sent``."""
+        from rclpy.serialization import serialize_message
+
         channel = self.vehicle.channels[sample.channel]
         message = self._types[channel.kind]()
         if channel.kind is Kind.ANGLE:
@@ -205,9 +225,20 @@ class Neighbour:
         else:
             message.temperature = sample.value
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(sample.stamp_ns, SECOND)
+        message.header.frame_id = sample.frame
         if not sample.joint:
             self.sent.append(sample)
+        if sample.frame == NO_TEXT:
+            message = serialize_message(message).replace(NO_TEXT.encode(), b"\xff" * len(NO_TEXT))
         self.publishers[sample.channel].publish(message)
+
+    def _publish_clock(self, stamp_ns: int) -> None:
+        from rosgraph_msgs.msg import Clock
+
+        if self._clock is not None:
+            message = Clock()
+            message.clock.sec, message.clock.nanosec = divmod(stamp_ns, SECOND)
+            self._clock.publish(message)
 
     def _keep_told(self, message: Any) -> None:
         text = "; ".join(status.message for status in message.status)
@@ -228,12 +259,14 @@ class Neighbour:
             if self.restart:
                 self._make_publishers()
                 last = time.monotonic()
-            stamp_ns = time.time_ns()
+            stamp_ns = self.now_ns()
+            self._publish_clock(stamp_ns)
             values = self._strokes.at(self.phase)
             for i, (channel, value) in enumerate(zip(self.vehicle.channels, values.tolist(), strict=True)):
                 if channel.kind is Kind.AIR_TEMPERATURE and tick % 20:
                     continue
-                sample = Sample(i, stamp_ns, value + noise.get(channel.kind, 0.0) * float(self._rng.standard_normal()))
+                rate = self._strokes.rate(i, self.phase) if self.rated and channel.kind is Kind.ANGLE else math.nan
+                sample = Sample(i, stamp_ns, value + noise.get(channel.kind, 0.0) * float(self._rng.standard_normal()), rate)
                 self.clean.append(sample)
                 for changed in self.fault(tick, sample):
                     self.send(changed)

@@ -50,7 +50,8 @@ CREEP_MEMORY_S = 1.0
 """Motion of the other side that comes slower than this does not speak against an angle that stands but for its noise."""
 SWING_SHARE = 0.1
 """Torque up to this share of the static friction may come or go while angles stand, seen by their noise to be alive: cylinders stick,
-seals and rubber relax."""
+seals and rubber relax. And so far, of the bristle's length, the other side may go meanwhile: at the end of a stroke one sticks before
+the other."""
 PRESSURE_MEMORY_S = 1.0
 """Torque that comes slower than this may leak away or creep in while the vehicle is parked."""
 RESIDUAL_MEMORY_S = 2.0
@@ -64,11 +65,13 @@ REPEATING, REPEATS_MEMORY = 0.1, 50.0
 DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
-    "outside the range of a law", "left and right angle contradict",
+    "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
 )  # fmt: skip
-JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART = (1 << bit for bit in range(len(DOUBTS)))
+(
+    JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY,
+) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
-INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART
+INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY
 """What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
@@ -164,6 +167,13 @@ def _unseen(core):
 
 
 @inner
+def _length(core, side):
+    """Way [rad] over which the bristle of a side comes to the static friction."""
+    p = row(core.parameters, side, BASELINE)
+    return p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else math.inf
+
+
+@inner
 def _watch_other(core, side, dt, stamp_ns):
     """Freeze the angle of a side that stands still at its newest sample, ``dt`` [s] after the last, while the other side moves.
 
@@ -178,7 +188,10 @@ def _watch_other(core, side, dt, stamp_ns):
         g.still_other = theta
     elif g.same < STILL_SAMPLES:
         g.still_other += (theta - g.still_other) * min(1.0, dt / CREEP_MEMORY_S)
-    g.apart = g.apart + 1 if abs(theta - g.still_other) > _unseen(core) else 0
+    limit = _unseen(core)
+    if g.same < STILL_SAMPLES:
+        limit = max(limit, SWING_SHARE * _length(core, side))
+    g.apart = g.apart + 1 if abs(theta - g.still_other) > limit else 0
     if g.apart >= STILL_SAMPLES and still(core, side, stamp_ns):  # fewer may be a spike
         _freeze(core, side)
 
@@ -206,6 +219,8 @@ def angle_doubts(core, side, dt, stamp_ns):
         found |= UNSEEN
     if noisy(core, side):
         found |= NOISY
+    if core.trust[side].contradicts:
+        found |= CONTRARY
     return found
 
 
@@ -242,8 +257,7 @@ def _leap_limit(core, side, dt):
     """How far [rad] a reading may depart from the motion before it, or after it, ``dt`` [s] away."""
     g, p = core.guard[side], row(core.parameters, side, BASELINE)
     noise = LEAP_SIGMA * max(core.config[0].angle_noise, math.sqrt(g.noise))
-    length = p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else math.inf
-    return max(LEAP_SHARE * length, noise) + max(2.0 * FASTER * g.fastest, LEAP_RATE_RAD_S * p.angle_unit) * dt
+    return max(LEAP_SHARE * _length(core, side), noise) + max(2.0 * FASTER * g.fastest, LEAP_RATE_RAD_S * p.angle_unit) * dt
 
 
 @inner

@@ -19,6 +19,11 @@ SHARE_OF_TRAVEL = 0.25
 REDEEMING_SHARE = 0.02
 REDEEMED_S = 10.0
 LASTING = 3  # samples: a spike of the angle is over sooner
+LATELY_S = 0.2
+LAG_S = 0.1
+"""Rates may come so much later than the angle."""
+WITNESS_S, CONTRARY_S, RECONCILED_S = 5.0, 0.05, 0.3
+"""Of motion that rate and angle must have made together before the rate can contradict, apart, and together again."""
 
 TRUST = np.dtype(
     [
@@ -30,6 +35,13 @@ TRUST = np.dtype(
         ("doubts", np.int64),  # samples in a row for which the sum was too large
         ("agreed", np.float64),  # for how long it moved and the sum was small, since it was not [s]
         ("refuted", np.bool_),
+        ("lately", np.float64),  # as ``astray``, over ``LATELY_S`` and with every rate that came [rad]
+        ("way", np.float64),  # in that time, by angle and rate [rad]
+        ("mean_rate", np.float64),  # in that time [rad/s]
+        ("former_rate", np.float64),  # last rate, credible or not [rad/s]
+        ("contrary", np.float64),  # for how long rate and angle have gone different ways [s]
+        ("together", np.float64),  # for how long they have gone the same way, since they did not [s]
+        ("contradicts", np.bool_),  # the angle, which it had gone with before
     ]
 )
 
@@ -41,7 +53,8 @@ def believed(s, ch, c, dt, value, rate):
     ``s`` is one ``TRUST`` record. One rate is left out if it is faster than an angle may be, or departs from the change of
     the angle by more than that change, the last rate and the noise together. All are left out once they add up, over
     ``MEMORY_S``, to another way than the angle went, by a quarter of that way and more than noise could; until they have
-    added up closely for ``REDEEMED_S`` of motion. Left out ones are counted.
+    added up closely for ``REDEEMED_S`` of motion. Left out ones are counted. Rates that have gone with the angle for ``WITNESS_S``
+    and then no more contradict it (``contradicts``): nobody can know which of the two is wrong.
     """
     decay = math.exp(-dt / MEMORY_S)
     s.astray *= decay
@@ -52,9 +65,11 @@ def believed(s, ch, c, dt, value, rate):
     credible = abs(rate) <= c.max_rate
     if dt <= 0.0:
         s.last_rate = rate if credible else 0.0
+        s.former_rate = s.mean_rate = s.last_rate
         return _counted(ch, rate, credible)
     slack = SLACK_SIGMA * (c.angle_noise if c.angle_noise > 0.0 else LEAST_SIGMA)
     change = value - ch.last_value
+    _compare(s, c.max_rate, slack, dt, change, rate)
     single = slack + NOISE_SIGMA * math.sqrt(2.0 * dt / MEMORY_S * s.variance)
     credible = credible and abs(rate * dt - change) <= single + abs(change) + abs(s.last_rate) * dt
     unsure = 0.0
@@ -77,6 +92,31 @@ def believed(s, ch, c, dt, value, rate):
         s.agreed += dt
     s.refuted = s.doubts >= LASTING or (s.refuted and s.agreed < REDEEMED_S)
     return _counted(ch, rate, credible and not s.refuted)
+
+
+@inner
+def _compare(s, max_rate, slack, dt, change, rate):
+    """Learn from a ``rate`` [rad/s] and the ``change`` [rad] of the angle in the time ``dt`` [s] whether they go the same way."""
+    rate = max(-max_rate, min(max_rate, rate))
+    decay = math.exp(-dt / LATELY_S)
+    turned = 0.5 * (rate + s.former_rate) * dt
+    unsure = 0.5 * abs(rate - s.former_rate) * dt
+    s.former_rate = rate
+    s.lately = decay * s.lately + turned - change
+    s.way = decay * s.way + 0.5 * (abs(turned) + abs(change))
+    s.mean_rate += (rate - s.mean_rate) * (1.0 - decay)
+    noise = 2.0 * slack + NOISE_SIGMA * math.sqrt(LATELY_S / MEMORY_S * s.variance)
+    late = max(0.0, math.copysign(LAG_S, s.lately) * (s.mean_rate - rate))
+    if abs(s.lately) > noise + unsure + late + SHARE_OF_TRAVEL * s.way:
+        s.contrary += dt
+        if s.contrary > CONTRARY_S:
+            s.contradicts = s.contradicts or s.together >= WITNESS_S
+            s.together = 0.0
+        return
+    s.contrary = 0.0
+    if s.way > 2.0 * noise:
+        s.together += dt
+        s.contradicts = s.contradicts and s.together < RECONCILED_S
 
 
 @inner

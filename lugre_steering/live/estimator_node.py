@@ -32,8 +32,6 @@ LATENCY_WINDOW = 4096
 REPORT_S = 1.0
 NEWS_S = 0.1
 """What is new is reported at once, or this long after the news before."""
-NAMES_EVERY = 5
-"""Reports: how often the network is asked for a node of the same name."""
 
 
 class SteeringTorqueEstimator(LifecycleNode):
@@ -49,7 +47,6 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._latency_window = latency_window
         self._began_ns = self._reported_ns = self._saved_ns = time.monotonic_ns()
         self._news_ns = 0
-        self._reports = 0
         self._console = Console(self.get_logger())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Steady, so that health is reported while simulated time stands still.
@@ -176,6 +173,11 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.session.outputs.interrupt_commands()
         self.get_logger().error(self.last_exception, throttle_duration_sec=1.0)
 
+    def late(self) -> None:
+        """More comes than can be worked off; the middleware has dropped the rest."""
+        if self.session is not None:
+            self.session.health.unused["more messages came than could be read"] += 1
+
     def _tick(self) -> None:
         session, now_ns = self.session, time.monotonic_ns()
         waited_s = (now_ns - self._reported_ns) * 1e-9
@@ -185,6 +187,8 @@ class SteeringTorqueEstimator(LifecycleNode):
                 self._diagnose([DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{NODE}: outputs", message="not configured")])
             return
         session.tick()
+        own = self.get_name(), self.get_namespace()
+        session.health.namesakes = self.get_node_names_and_namespaces().count(own) - 1
         news = now_ns - self._news_ns >= NEWS_S * 1e9 and session.untold
         if news:
             self._news_ns = now_ns
@@ -200,10 +204,6 @@ class SteeringTorqueEstimator(LifecycleNode):
         session.choose_clock()
         elapsed_s = (monotonic_ns - self._reported_ns) * 1e-9
         self._reported_ns = monotonic_ns
-        if self._reports % NAMES_EVERY == 0:
-            own = self.get_name(), self.get_namespace()
-            session.health.namesakes = self.get_node_names_and_namespaces().count(own) - 1
-        self._reports += 1
         statuses = session.statuses(monotonic_ns, elapsed_s)
         self._diagnose(statuses)
         self._console.tell(statuses, (monotonic_ns - self._began_ns) * 1e-9)

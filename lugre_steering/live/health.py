@@ -140,6 +140,8 @@ class Health:
             found.update((which, key) for key, n in counts.items() if n > told[key])
         if self.exceptions > self._told_exceptions:
             found.add(("exception",))
+        if self.namesakes > 0:
+            found.add(("namesakes", self.namesakes))
         return frozenset(found)
 
     @property
@@ -226,7 +228,7 @@ class Health:
                 hint = "" if self.simulated or abs(self.behind_ns[i]) < FAR_NS else " (is use_sim_time to be set?)"
                 troubles.append(f"{label} stamps are not close to the clock{hint}")
                 level = max(level, WARN)
-        if self.namesakes:
+        if self.namesakes > 0:
             troubles.append(f"{counted(self.namesakes, 'other node')} of this name: their outputs mix with these")
             level = max(level, WARN)
         return self._status("inputs", level, "; ".join(troubles) or "all inputs arrive", values)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
-from rclpy.event_handler import QoSMessageLostInfo, SubscriptionEventCallbacks
+from rclpy._rclpy_pybind11 import EventHandle
+from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -55,20 +56,18 @@ class Inputs:
     ) -> None:
         self._node, self._channels, self._health, self._push, self._set_plan = node, vehicle.channels, health, push, set_plan
         self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
+        self._frames: dict[int, str] = {}  # of the first message of each channel
         self._spent_s, self._spent_at = 0.0, 0.0  # time that plans have taken of late, and when that was so (monotonic)
         overrides = QoSOverridingOptions.with_default_policies()
 
         def subscribe(message: type, topic: str, handle: Callable[..., None], raw: bool = False) -> Any:
-            qos, name = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT), node.resolve_topic_name(topic)
+            qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+            made = node.create_subscription(message, topic, guarded(handle), qos, qos_overriding_options=overrides, raw=raw)
+            lost = EventHandle(made.handle, QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST)
+            self._lost.append((f"{node.resolve_topic_name(topic)} lost on the way", lost))
+            return made
 
-            def lost(info: QoSMessageLostInfo) -> None:
-                health.unused[f"{name} lost on the way"] += info.total_count_change
-
-            return node.create_subscription(
-                message, topic, guarded(handle), qos, qos_overriding_options=overrides, raw=raw,
-                event_callbacks=SubscriptionEventCallbacks(message_lost=guarded(lost)),
-            )  # fmt: skip
-
+        self._lost: list[tuple[str, EventHandle]] = []
         self._subscriptions = []
         joints: dict[str, list[tuple[int, str]]] = {}
         topics = []
@@ -87,7 +86,17 @@ class Inputs:
         self._subscriptions.append(subscribe(JointTrajectory, COMMAND, self._command, raw=True))
         health.set_topics(topics)
 
+    def count_lost(self) -> None:
+        """Count what the middleware has lost since the last time. Asked, not called back: rclpy makes a task of each such event, and many
+        are lost where there is no time for tasks."""
+        for reason, event in self._lost:
+            with event:
+                if new := event.take_event().total_count_change:
+                    self._health.unused[reason] += new
+
     def close(self) -> None:
+        for _, event in self._lost:
+            event.destroy_when_not_in_use()
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
 
@@ -108,6 +117,7 @@ class Inputs:
                 else:
                     i = 0
                 carried = True
+                self._see_frame(topic, channel, message.header.frame_id)
                 angle = position[i] if i < len(position) else math.nan
                 rate = velocity[i] if i < len(velocity) else math.nan
                 if ratio := self._channels[channel].ackermann:
@@ -122,9 +132,15 @@ class Inputs:
         def handle(message: Any) -> None:
             stamp_ns = self._stamp_ns(topic, message.header.stamp)
             if stamp_ns is not None:
+                self._see_frame(topic, channel, message.header.frame_id)
                 self._push(channel, stamp_ns, read(message), math.nan)
 
         return handle
+
+    def _see_frame(self, topic: str, channel: int, frame: str) -> None:
+        """A frame is told, not refused: the value is judged as any other, and drivers fill frames as they like."""
+        if frame != self._frames.setdefault(channel, frame):
+            self._health.unused[f"{topic} of another frame than at first"] += 1
 
     def _stamp_ns(self, topic: str, stamp: Any) -> int | None:
         """None, and counted, for a stamp whose nanoseconds are a second or more: it is no time."""

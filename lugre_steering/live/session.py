@@ -104,8 +104,9 @@ class Session:
         self.health.set_vehicle(vehicle)
 
     def tick(self) -> None:
-        """Called often: leads the feed-forward to zero where that is due."""
+        """Called often: counts what was lost, and leads the feed-forward to zero where that is due."""
         outputs = self.outputs
+        self._inputs.count_lost()
         if outputs.fading is None:
             silent_ns = time.monotonic_ns() - self._arrived_ns
             if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and outputs.released:

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -38,6 +40,25 @@ def failing(self, channel, stamp_ns, value, rate=float("nan")):
     return push(self, channel, stamp_ns, value, rate)
 
 Estimator.push = failing
+sys.exit(run.run(sys.argv))
+"""
+
+
+SLOW_NODE = """
+import sys
+import time
+from lugre_steering.estimator import Estimator
+from lugre_steering.live import run, session
+
+push = Estimator.push
+
+def slow(*sample):
+    time.sleep(0.002)
+    return push(*sample)
+
+run._BACKLOG_S = 0.5
+warm_up = session.warm_up
+session.warm_up = lambda *given: (warm_up(*given), setattr(Estimator, "push", slow))
 sys.exit(run.run(sys.argv))
 """
 
@@ -172,6 +193,33 @@ def test_an_exception_in_a_callback_withholds_the_torque_and_passes(tmp_path: Pa
         assert values["last exception"] == "ZeroDivisionError: made to fail"
         assert int(values["withheld: after an exception"]) > 10
         assert node.process.poll() is None
+
+
+def test_a_node_that_cannot_keep_up_says_so_and_can_be_stopped(tmp_path: Path) -> None:
+    """Its executor's queue is never empty and, left alone, grows with each message that the middleware drops."""
+    script = tmp_path / "slow_node.py"
+    script.write_text(SLOW_NODE)
+    vehicle = load(VEHICLE)
+    with LiveNode(command=[str(script)]) as node, World(vehicle) as world:
+        told, over = "more messages came than could be read", threading.Event()
+
+        def flood() -> None:
+            while not over.is_set():
+                for channel in range(2, len(vehicle.channels)):
+                    world.send(now_sample(channel, 1e6))
+                time.sleep(1e-3)
+
+        flooding = threading.Thread(target=flood)
+        flooding.start()
+        try:
+            heard = world.heard["diagnostics"]
+            world.wait(lambda: any(told in status.message for said in list(heard) for status in said.status))
+            code, seconds = node.stop(signal.SIGTERM)
+        finally:
+            over.set()
+            flooding.join()
+        assert code == 0, node.output
+        assert seconds < 3.0
 
 
 def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> None:

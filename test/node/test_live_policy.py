@@ -1,16 +1,19 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The shipped SROS 2 policy against the topics and services of the running node."""
+"""The shipped SROS 2 policy against the topics and services of the running node; and no node without the security asked for."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rclpy")
 
-from live_harness import NAME, PACKAGE_ROOT, LiveNode, World
+from live_harness import NAME, PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
 
 POLICY = PACKAGE_ROOT / "config" / "sros2_policy.xml"
 
@@ -33,3 +36,15 @@ def test_the_policy_allows_what_the_node_does_and_no_more() -> None:
     assert published == allowed("topics", "publish")
     assert subscribed == allowed("topics", "subscribe")
     assert offered == allowed("services", "reply")
+
+
+def test_a_node_that_is_told_to_be_secure_does_not_run_in_the_open(tmp_path: Path) -> None:
+    """An enclave without keys, where the middleware has security plugins; any enclave where it has none, as that of the Python wheels."""
+    (tmp_path / "enclaves" / NAME[1:]).mkdir(parents=True)
+    secure = {"ROS_SECURITY_KEYSTORE": str(tmp_path), "ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
+    arguments = ["-p", f"vehicle_file:={VEHICLE}", "--enclave", NAME]
+    command = [sys.executable, "-m", "lugre_steering.node", "--ros-args", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment() | secure, check=False)
+    assert done.returncode == 2
+    assert "ready" not in done.stderr
+    assert "ecurity" in done.stderr
