@@ -115,8 +115,9 @@ def search(
     if len(found) > given and is_rig(problem.vehicle):
         found, current = _given_beside(now, noise, weight, split, current, found)
         now, current = settled(now, weight, current)
-        if (sized := _of_sure_size(now, weight, current, found))[1] is not current:
-            found, current = _given_beside(now, noise, weight, split, *reversed(sized))
+        sure_ones, fitted = _of_sure_size(now, weight, current, found)
+        if len(sure_ones) < len(found):
+            found, current = _given_beside(now, noise, weight, split, fitted, sure_ones)
             now, current = settled(now, weight, current)
         given = sum(item.given for item in found)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
