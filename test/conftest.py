@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from catalogue import put_back
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -42,14 +43,5 @@ def pytest_collection_finish() -> None:
 @pytest.fixture(scope="module", autouse=True)
 def catalogue_of_the_package() -> Iterator[None]:
     """Physics that a file of tests adds is gone after it."""
-    from lugre_steering.effects import registry
-
-    known = [(table, dict(table)) for table in (registry.CATALOGUE, registry.ORIGINS)]
-    files = os.environ.get(registry.VARIABLE)
-    yield
-    for table, before in known:
-        table.clear()
-        table.update(before)  # type: ignore[arg-type]
-    os.environ.pop(registry.VARIABLE, None)
-    if files is not None:
-        os.environ[registry.VARIABLE] = files
+    with put_back():
+        yield

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude import experiment, limits
+from lugre_steering.diagnosis.conclude import effects, experiment, limits
+from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search import compare, foreign, search
+from lugre_steering.diagnosis.search.propose import choose
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.effects.relief_saturation import CEILINGS
 from lugre_steering.fitting import fingerprint, noise, split, trial
@@ -270,6 +272,48 @@ def test_a_name_does_not_go_because_its_own_bends_could_stand_in_for_it(problem:
     steps = [search.Found(replace(score, candidate=candidate), (), (), 5.0) for candidate, _ in (linear, slow)]
     _, kept, current = search._pruned(hidden, beside, weight(hidden), steps, both)
     assert len(kept) == len(current.effects) == 2
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_a_name_of_no_sure_size_goes_unless_it_is_given(problem: Problem, given: bool) -> None:
+    """A loss that is there, and an offset that is not."""
+    loss, nothing = effect("line_loss_linear", b=2e4), effect("slope_bias", torque=0.0)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [loss]))
+    both = fit(hidden, weight(hidden), [nothing, loss])
+    hidden = hidden.doubted(doubt(hidden, both, weight(hidden)), hidden.typical)
+    score = Score(loss[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    found = [search.Found(replace(score, candidate=candidate), (), (), 1.0, given=given) for candidate, _ in (nothing, loss)]
+    kept, current = search._of_sure_size(hidden, weight(hidden), both, found)
+    names = ["slope_bias", "line_loss_linear"] if given else ["line_loss_linear"]
+    assert [item.score.candidate.effect.id for item in kept] == names
+    assert [candidate.effect.id for candidate, _ in current.effects] == names
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_a_value_is_no_surer_than_the_form_of_its_law(problem: Problem, given: bool) -> None:
+    """White noise leaves a small part of a loss in doubt; that of a name may be off by the share that laws have wrong."""
+    loss = effect("line_loss_linear", b=2e4)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [loss]))
+    named = fit(hidden, weight(hidden), [loss])
+    item = search.Found(Score(loss[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1.0, given=given)
+    white = noise.Noise(np.full(hidden.valid.size, SIGMA), np.zeros((1, hidden.valid.size)), 0.0)
+    done = Finished(hidden, white, split.split(hidden), search.Search(fit(hidden, weight(hidden)), named, (item,), (), (), None))
+    low, high = effects._intervals(done, named, named)[0]["b"].ci95
+    share = 0.5 * (high - low) / named.effects[0][1]["b"]
+    assert share < 0.05 if given else 0.02**0.5 < share < 0.02**0.5 + 0.05
+
+
+def test_a_place_in_time_is_tried_beside_a_place_in_the_angle() -> None:
+    patch = Candidate(CATALOGUE["surface_patch"], free=("change",))
+    angle, wider, time = (
+        replace(patch, shapes=shapes)
+        for shapes in (
+            (("angle_low", 0.0), ("angle_high", 0.1)), (("angle_low", 0.0), ("angle_high", 0.2)), (("time_start", 5.0), ("time_end", 9.0)),
+        )
+    )  # fmt: skip
+    chance, energies = np.arange(1.0, 5.0), ((angle, 900.0), (wider, 800.0), (time, 500.0))
+    scores = [Score(candidate, energy, 0.5, 0.0, 1.0, (1.0,), chance) for candidate, energy in energies]
+    assert [score.candidate for score in choose(scores)] == [angle, time]
 
 
 @pytest.mark.parametrize("everywhere", [True, False])

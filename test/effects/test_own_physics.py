@@ -10,12 +10,12 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from catalogue import put_back
 from click.testing import Result
 from typer.testing import CliRunner
 
@@ -62,20 +62,6 @@ def run_in_turn(*commands: Sequence[object], **environment: str) -> list[dict[st
     command = [sys.executable, "-c", SEVERAL, json.dumps([list(map(str, arguments)) for arguments in commands])]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment}, check=True)
     return [json.loads(line) for line in done.stdout.splitlines()]
-
-
-@contextmanager
-def put_back() -> Iterator[None]:
-    """The catalogue as it was before."""
-    known, origins, variable = dict(registry.CATALOGUE), dict(registry.ORIGINS), os.environ.get(registry.VARIABLE)
-    yield
-    for table, before in ((registry.CATALOGUE, known), (registry.ORIGINS, origins)):
-        table.clear()
-        table.update(before)  # type: ignore[arg-type]
-    if variable is None:
-        os.environ.pop(registry.VARIABLE, None)
-    else:
-        os.environ[registry.VARIABLE] = variable
 
 
 def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path) -> None:

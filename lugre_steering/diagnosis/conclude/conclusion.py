@@ -15,7 +15,7 @@ from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
-from lugre_steering.diagnosis.conclude.late import beside_all
+from lugre_steering.diagnosis.conclude.late import fitted_to_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
 from lugre_steering.diagnosis.conclude.stands import Stands, standing
 from lugre_steering.diagnosis.conclude.statement import statement
@@ -165,7 +165,7 @@ def _whole(done: Finished, final: Fit) -> tuple[Fit, Fit]:
     there = done.compared
     if not final.effects:
         return fit(done.problem, done.weight, (), final.x), there.found.baseline
-    bent = beside_all(there)
+    bent = fitted_to_all(there)
     return done.in_file(done.weight, bent.effects, bent.x), bent
 
 

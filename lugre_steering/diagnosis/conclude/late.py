@@ -38,17 +38,17 @@ def timed_by_all(done: Finished) -> Finished:
     final = done.compared.found.final
     if not any(candidate.since for candidate, _ in final.effects):
         return done
-    return _with_instants(done, beside_all(done.compared))
+    return _with_instants(done, fitted_to_all(done.compared))
 
 
-def beside_all(there: Finished) -> Fit:
+def fitted_to_all(there: Finished) -> Fit:
     """What was found fitted to all data; what began late is timed anew."""
     fitted = fit(there.problem, there.weight, there.found.final.effects, there.found.final)
-    for index, (candidate, _) in enumerate(fitted.effects):
-        if candidate.since:
-            since = onset.timed(there.problem, there.weight, fitted, index)
-            again = fit(there.problem, there.weight, _since(fitted, index, since).effects, fitted)
-            fitted = again if again.cost < fitted.cost else fitted
+    late = [index for index, (candidate, _) in enumerate(fitted.effects) if candidate.since]
+    for index in late * RETIMED:  # values of what was timed wrongly are no good to time it by
+        since = onset.timed(there.problem, there.weight, fitted, index)
+        again = fit(there.problem, there.weight, _since(fitted, index, since).effects, fitted)
+        fitted = again if again.cost < fitted.cost else fitted
     return fitted
 
 
