@@ -22,9 +22,19 @@ from lugre_steering.vehicle import load
 VEHICLE = load(Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml")
 
 
+def recording(name: str) -> Any:
+    time = np.linspace(0.0, 100.0, 1001)
+    theta, omega = (np.tile(motion, (2, 1)) for motion in (0.6 * np.sin(0.04 * np.pi * time), 0.024 * np.pi * np.cos(0.04 * np.pi * time)))
+    still = np.zeros((2, time.size))
+    return SimpleNamespace(
+        name=name, time=time, theta=theta, omega=omega, alpha=still, pressure=still, measured=still[0], angle_unit=1.0
+    )  # fmt: skip
+
+
 def finished(**more: Any) -> Any:
-    """As much of a finished search of two recordings of 100 s as the sentence needs; a torque amplitude of 50 kN m."""
-    runs = [SimpleNamespace(name=name, time=np.linspace(0.0, 100.0, 11)) for name in ("a", "b")]
+    """As much of a finished search of two recordings of 100 s as the sentence needs; a torque amplitude of 50 kN m, four sweeps between
+    -0.6 and 0.6 rad without a pause."""
+    runs = [recording(name) for name in ("a", "b")]
     given = {
         "problem": SimpleNamespace(runs=runs, vehicle=VEHICLE), "amplitude": 50e3, "needs_form": False,
         "torque": lambda value: words.torque(VEHICLE, value), "title": lambda name: units.title(VEHICLE, CATALOGUE[name]),
@@ -51,7 +61,7 @@ def test_sensors_are_to_be_checked_and_ties_to_be_told_apart_by_a_drive() -> Non
     advice = Experiment("slow-sweeps: half sweeps at 0.5, 1, 4 and 2 deg/s", ("a", "b"), "")
     said = headline.missing(finished(), [stop(), drift], "", advice, kept=True)
     assert "(end_stop), mostly beyond" in said
-    assert "; and a pressure sensor reads a constant too much (pressure_offset), 50 % of the time, up to" in said
+    assert "; and a pressure sensor reads a constant too much (pressure_offset), all through a (50 % of the time), up to" in said
     assert said.endswith(
         "Use augmented.yaml, which has them, in replay and in the live node, and check the pressure sensors, lines and valves, "
         "and drive slow-sweeps next, which tells apart what may be confused."
@@ -65,13 +75,54 @@ def test_sensors_are_to_be_checked_and_ties_to_be_told_apart_by_a_drive() -> Non
         ("steering rate", (-0.1, 0.2), "at a steering rate of -5.73 to 11.5 deg/s (10 % of the time)"),
         ("angle since reversal", (0.0, 0.05), "at an angle since reversal of 0 to 2.86 deg (10 % of the time)"),
         ("direction", (-1.0, 1.0), "(end_stop), 10 % of the time, up to"),
-        ("time", (10.0, 30.0), "(end_stop), 10 % of the time, up to"),
+        ("time", (0.0, 100.0), "(end_stop), 10 % of the time, up to"),
         ("dwell", (None, None), "(end_stop), 10 % of the time, up to"),
     ],
 )
 def test_places_are_told_where_they_are_some(coordinate: str, ends: tuple[float, float], place: str) -> None:
-    where = (Place("a", ((10.0, 30.0),), coordinate, ends, "rad"),)
+    where = tuple(Place(bag, ((1.0, 6.0), (94.0, 99.0)), coordinate, ends, "rad") for bag in ("a", "b"))
     assert place in headline.missing(finished(), [stop(where=where)], "", None, kept=True)
+
+
+@pytest.mark.parametrize("coordinate", ["steering angle", "direction", "time"])
+@pytest.mark.parametrize(
+    ("acts", "place"),
+    [
+        ({"b": ((40.0, 60.0), (61.0, 99.0))}, "from 40 s on in b (29 % of the time)"),
+        ({"a": ((1.0, 30.0),), "b": ((40.0, 60.0),)}, "until 30 s in a and from 40 to 60 s in b (24 % of the time)"),
+        ({"a": ((1.0, 99.0),)}, "all through a (49 % of the time)"),
+        ({"a": ((1.0, 99.0),), "b": ((80.0, 99.0),)}, "all through a and from 80 s on in b (58 % of the time)"),
+    ],
+)
+def test_what_is_local_in_time_is_told_by_time(acts: dict[str, Any], place: str, coordinate: str) -> None:
+    where = tuple(Place(bag, spans, coordinate, (-0.6, 0.6), "rad") for bag, spans in acts.items())
+    assert f"(end_stop), {place}, up to" in headline.missing(finished(), [stop(where=where)], "", None, kept=True)
+
+
+def test_many_stretches_are_counted_and_a_lone_recording_is_not_named() -> None:
+    late = [Place(name, ((70.0, 100.0),), "steering angle", (-0.6, 0.6), "rad") for name in "abcd"]
+    done = finished(problem=SimpleNamespace(runs=[recording(name) for name in "abcd"], vehicle=VEHICLE))
+    said = headline.missing(done, [stop(where=tuple(late))], "", None, kept=True)
+    assert "(end_stop), from 70 s on in a and from 70 s on in b and in stretches of 2 other recordings (30 % of the time)" in said
+    done = finished(problem=SimpleNamespace(runs=[recording("a")], vehicle=VEHICLE))
+    assert "(end_stop), from 70 s on (30 % of the time)" in headline.missing(done, [stop(where=(late[0],))], "", None, kept=True)
+
+
+def test_a_range_that_is_closer_than_its_stretch_is_told_instead() -> None:
+    """A stop that is met once only, in the one sweep that went so far."""
+    once = recording("a")
+    once.theta = np.where(once.time < 25.0, once.theta, 0.5 * once.theta)
+    done = finished(problem=SimpleNamespace(runs=[once], vehicle=VEHICLE))
+    where = (Place("a", ((9.0, 16.0),), "|steering angle|", (0.5, 0.6), "rad"),)
+    assert "mostly beyond 28.6 deg of steering angle" in headline.missing(done, [stop(where=where)], "", None, kept=True)
+
+
+def test_nothing_is_told_to_begin_with_the_first_motion() -> None:
+    parked = recording("a")
+    parked.omega = np.where(parked.time < 60.0, 0.0, parked.omega)
+    done = finished(problem=SimpleNamespace(runs=[parked], vehicle=VEHICLE))
+    where = (Place("a", ((61.0, 99.0),), "direction", (-1.0, 1.0), "1"),)
+    assert "(end_stop), 38 % of the time, up to" in headline.missing(done, [stop(where=where)], "", None, kept=True)
 
 
 def test_other_verdicts_say_the_error_and_what_to_do() -> None:

@@ -7,8 +7,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from lugre_steering.counted import counted
+from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import Experiment, NamedEffect
+from lugre_steering.diagnosis.search import locate
+from lugre_steering.recording import Mask
 from lugre_steering.report import words
 
 CHECKS = {
@@ -20,6 +26,14 @@ NEARLY_ALWAYS = 0.9
 """Share of the recorded time from which a place is no news."""
 NOT_A_PLACE = frozenset({"time", "direction"})
 """Coordinates whose range says nothing that the share of the time does not say better."""
+MOVING = 1e-3
+"""Rate above which a machine of travel 1 moves [1/s]."""
+LOCAL = 0.75
+"""Share of the time spent in the range of its coordinate below which one stretch of time per recording says better where an effect acts."""
+EDGE = 0.05
+"""Share of a recording within which a stretch begins with it, or ends with it."""
+MOST_STRETCHES = 2
+"""Recordings whose stretches are told one by one."""
 
 
 def missing(done: Finished, effects: Sequence[NamedEffect], law: str, advice: Experiment | None, kept: bool) -> str:
@@ -80,7 +94,8 @@ def _share(share: float) -> str:
 
 
 def _where(done: Finished, effect: NamedEffect) -> list[str]:
-    """Where it acts, over all recordings: the range of its coordinate, and how much of the time."""
+    """Where it acts, over all recordings: its stretches of time or the range of its coordinate, whichever is closer, and how much of the
+    time."""
     if not effect.where:
         return []
     recorded = sum(float(run.time[-1] - run.time[0]) for run in done.problem.runs)
@@ -88,13 +103,53 @@ def _where(done: Finished, effect: NamedEffect) -> list[str]:
     often = "all the time" if active > NEARLY_ALWAYS else f"{words.percent(active)} of the time"
     (name, *others), ends = {place.coordinate for place in effect.where}, [end for place in effect.where for end in place.range]
     low, high = min(_numbers(ends), default=math.nan), max(_numbers(ends), default=math.nan)
-    if others or name in NOT_A_PLACE or not low < high:
+    no_range = bool(others) or name in NOT_A_PLACE or not low < high
+    if stretches := _stretches(done.problem.runs, effect, None if no_range else (name, low, high)):
+        return [f"{stretches} ({often})"]
+    if no_range:
         return [often]
     axis = words.coordinate_axis(done.problem.vehicle, name)
     from_, to = (words.number(axis.scale * end, 3) for end in (low, high))
     if name.startswith("|"):
         return [f"mostly beyond {from_} {axis.unit} of {axis.name.strip('|')} to either side ({often})"]
     return [f"at {words.with_article(axis.name)} of {from_} to {to} {axis.unit}".rstrip() + f" ({often})"]
+
+
+def _stretches(runs: Sequence[Run], effect: NamedEffect, among: tuple[str, float, float] | None) -> str:
+    """The one stretch of each recording within which it acts, if these hold it closer than the range of a coordinate, ``among``, or than
+    all that was driven; else nothing."""
+    acts = {place.bag: (place.intervals_s[0][0], place.intervals_s[-1][1]) for place in effect.where if place.intervals_s}
+    within = held = 0.0
+    for run in runs:
+        start, end = acts.get(run.name, (math.inf, -math.inf))
+        driven, axes = _driven(run), locate.coordinates(run, run.measured)
+        there = driven & (axes[among[0]] >= among[1]) & (axes[among[0]] <= among[2]) if among and among[0] in axes else driven
+        step = float(run.time[1] - run.time[0])
+        within += step * float(np.sum(driven & (run.time >= start) & (run.time <= end)))
+        held += step * float(np.sum(there))
+    if within >= LOCAL * held:
+        return ""
+    told = [_stretch(run, *acts[run.name], named=len(runs) > 1) for run in runs if run.name in acts]
+    more = len(told) - MOST_STRETCHES
+    return " and ".join([*told[:MOST_STRETCHES], *([f"in stretches of {counted(more, 'other recording')}"] if more > 0 else [])])
+
+
+def _stretch(run: Run, start: float, end: float, named: bool) -> str:
+    """'from 10 to 30 s in NAME', 'from 10 s on in NAME', 'all through NAME'."""
+    first, last = run.time[_driven(run)][[0, -1]]
+    late, early = start > first + EDGE * (last - first), end < last - EDGE * (last - first)
+    if not late and not early:
+        return f"all through {run.name}"
+    from_, to = words.number(start, 3), words.number(end, 3)
+    when = f"from {from_} to {to} s" if late and early else f"from {from_} s on" if late else f"until {to} s"
+    return f"{when} in {run.name}" if named else when
+
+
+def _driven(run: Run) -> Mask:
+    """Samples from the first to the last motion: what would act before or after cannot be known."""
+    moving = np.flatnonzero(np.abs(run.omega).max(axis=0) > MOVING * run.angle_unit)
+    index = np.arange(run.time.size)
+    return (index >= moving[0]) & (index <= moving[-1]) if moving.size else np.ones(run.time.size, dtype=bool)
 
 
 def _numbers(ends: Sequence[float | None]) -> list[float]:
