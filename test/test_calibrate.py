@@ -202,6 +202,16 @@ def commanded(tmp_path_factory):
     return sheet, out, json.loads(outcome.stdout)
 
 
+def test_the_picture_calls_what_was_fitted_by_its_title():
+    figure = pytest.importorskip("matplotlib.figure")
+    from lugre_steering.calibration.figure import _parameters
+
+    row = {"value": 0.8, "sheet": 0.75, "ci95": [0.7, 0.9], "prior_relative_sd": None, "at_bound": False, "prior_dominated": False}
+    axes = figure.Figure().subplots()
+    _parameters(axes, [{**row, "key": key} for key in ("friction.coulomb", "rubber.heat_transfer_W_m2K")])
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["sliding friction", "heat transfer to the air"]
+
+
 def test_files_of_the_command(commanded):
     sheet, out, printed = commanded
     assert json.loads((out / "calibration.json").read_text(encoding="utf-8")) == printed

@@ -10,6 +10,7 @@ import io
 import json
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,8 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import jsonschema
 import numpy as np
@@ -34,17 +37,19 @@ from lugre_steering.cli import app
 from lugre_steering.diagnosis.conclude.headline import CHECKS, inside
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import DataError, LugreSteeringError, VehicleFileError
+from lugre_steering.fleet.claims import Claim
 from lugre_steering.fleet.command import show_fleet
-from lugre_steering.fleet.result import Fleet
+from lugre_steering.fleet.result import Fleet, VehicleSummary
 from lugre_steering.fleet.run import run
 from lugre_steering.fleet.tables import KINDS
 from lugre_steering.fleet.together import Together
-from lugre_steering.fleet.told import folder_of, told
+from lugre_steering.fleet.told import commands, folder_of, told
 from lugre_steering.fleet.vehicles import member_of, read_members
 from lugre_steering.fleet.work import FleetOptions, Task, process
 from lugre_steering.resources import config_folder
 from lugre_steering.schemas import schema_of
 from lugre_steering.serialise import as_json
+from lugre_steering.vehicle import load
 
 VEHICLE = config_folder() / "test_vehicle.yaml"
 BAGS = Path(__file__).parents[1] / "bags"
@@ -343,6 +348,21 @@ def test_the_page_begins_with_what_an_engineer_acts_on(tmp_path: Path, monkeypat
     show_fleet(console, fleet, tmp_path)
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "12.3 kN m" in text.split("recordings  quarantine")[0]
+
+
+def test_the_command_to_look_closer_takes_recordings_of_every_finding() -> None:
+    """A stop in three recordings, a larger patch in two others: no single finding has the command to itself."""
+    named = {"end_stop": ("stop 1", "stop 2", "stop 3"), "surface_patch": ("patch 1", "patch 2")}
+    found = tuple(
+        Claim("recording", "seven", bag, effect, "change", 1.0, 0.9, 1.1, "1", 1e-9, largest_Nm=size, largest_share=0.1)
+        for size, (effect, bags) in enumerate(named.items()) for bag in bags
+    )  # fmt: skip
+    seven = VehicleSummary("seven", "seven.yaml", "", 5, 0, 1.0, None, None, None, {}, load(VEHICLE))
+    fleet = cast(Fleet, SimpleNamespace(claims=found, vehicles=(seven,), together=()))
+    bags = ["patch 1", "stop 1", "patch 2", "stop 2", "stop 3"]
+    assert shlex.split(commands(fleet)["seven"])[2:7] == bags
+    asked = SimpleNamespace(claims=found, vehicles=(seven,), together=(SimpleNamespace(vehicle="seven", bags=("a", "b")),))
+    assert shlex.split(commands(cast(Fleet, asked))["seven"])[2:5] == ["a", "b", "--vehicle"]
 
 
 @pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="Dask is not installed")

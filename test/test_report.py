@@ -46,6 +46,7 @@ from lugre_steering.diagnosis.result import (
 )
 from lugre_steering.diagnosis.show import show_diagnosis
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.provenance import provenance as made
 from lugre_steering.recording import BagFinding
 from lugre_steering.report import words
 from lugre_steering.report.chart import Chart, Series
@@ -105,6 +106,7 @@ def missing(vehicle: Vehicle, text: str = "run") -> Diagnosis:
         data_quality=(BagFinding("stuck_sensor", text, text, ((0.0, 1.0),), text),),
         next_experiment=Experiment(text, ("end_stop", text), text),
         traces=traces, evidence=evidence, coordinate_of={"end_stop": "steering angle"},
+        provenance=made("diagnose", {"seed": 1}),
     )  # fmt: skip
 
 
@@ -301,6 +303,18 @@ def test_sheet_values_stand_beside_fitted_ones(vehicle: Vehicle) -> None:
     source = render(dataclasses.replace(missing(fitted), sheet=vehicle))
     section = Page(source[source.index('<section id="baseline">') : source.index('<section id="origin">')]).text.replace("\u00a0", " ")
     assert re.search(r"friction\.coulomb\s*0\.75\s*0\.6\s*-20\.0 %", section)
+
+
+def test_the_origin_is_that_of_the_file_given_not_once_more_of_the_result(vehicle: Vehicle) -> None:
+    sheet = vehicle.replace(provenance={"measured_by": "<i>me</i>", "sent": [1.5, None]})
+    found = dataclasses.replace(missing(vehicle, "a result"), sheet=sheet)
+    source = render(found)
+    section = source[source.index('<section id="origin">') : source.index('<section id="reading">')]
+    assert "<i>" not in section
+    said = Page(section).text
+    assert all(words in said for words in ("measured by", "<i>me</i>", "1.5, none"))
+    assert "a result" not in said
+    assert "says of itself" not in render(dataclasses.replace(found, sheet=vehicle))
 
 
 def test_pictures_are_beside_the_page(written: Written) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.calibration.calibrate import Calibrated
+from lugre_steering.fitting.keys import KEYS
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure
 
 BAGS_SHOWN = 3
@@ -62,7 +63,8 @@ def _parameters(ax: Any, rows: list[dict[str, Any]]) -> None:
         colour = SERIES[1] if weak else SERIES[0]
         ax.errorbar(value, i, xerr=[[value - low], [high - value]], fmt="o", color=colour, markersize=5, capsize=4)
     ax.axvline(1.0, color="#888888", linewidth=0.8)
-    ax.set_yticks(range(len(rows)), [row["key"] for row in rows])
+    titles = {key.key: key.title for key in KEYS}
+    ax.set_yticks(range(len(rows)), [titles.get(row["key"], row["key"]) for row in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)
     ends = [end / row["sheet"] for row in rows for end in (row["value"], *row["ci95"])]
     ends += [np.exp(sign * 1.96 * row["prior_relative_sd"]) for row in rows if row["prior_relative_sd"] for sign in (-1, 1)]

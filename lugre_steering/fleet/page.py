@@ -124,10 +124,11 @@ def _effects(fleet: Fleet) -> str:
         shown = best(claims)
         value, ends = words.estimate(shown.value, None if shown.low is None else (shown.low, shown.high))
         of_value = f"{shown.parameter.replace('_', ' ')} {value} {'' if shown.unit == '1' else shown.unit}"
-        leads, named = any(claim.leads for claim in claims), any(claim.kind == "recording" for claim in claims)
+        naming = {claim.bag for claim in claims if claim.kind == "recording"}
+        leads, named = any(claim.leads for claim in claims), bool(naming)
         cells = (
             text(vehicle or ALL), text(title(fleet, shown)), "leads" if leads else "named" if named else "fits too",
-            text(of_value), text(ends), text(size(fleet, shown)), str(max(claim.recordings for claim in claims)),
+            text(of_value), text(ends), text(size(fleet, shown)), str(max(len(naming), *(claim.recordings for claim in claims))),
             text(words.chance(min(claim.q_value for claim in claims))),
         )  # fmt: skip
         rows.append(Row(cells, LEADS if leads or named else None))

@@ -8,6 +8,7 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from lugre_steering import units
 from lugre_steering.counted import counted
@@ -21,7 +22,7 @@ from lugre_steering.vehicle import Vehicle
 ALL = "all vehicles"
 MOST_RIVALS = 2
 """Other names told in one breath."""
-LOOK = "diagnose this vehicle (the report has the command) for the place where it acts"
+LOOK = "diagnose this vehicle for the place where it acts (command: 'Look closer' in the report)"
 
 
 @dataclass(frozen=True)
@@ -103,14 +104,16 @@ def size(fleet: Fleet, claim: Claim) -> str:
 
 
 def commands(fleet: Fleet) -> dict[str, str]:
-    """By vehicle: how to look at it alone, with the recordings that say most."""
-    found: dict[str, str] = {}
+    """By vehicle: how to look at it alone, with the recordings that say most, in turn of each of its findings."""
+    naming: dict[str, list[list[str]]] = {}
     for one in told(fleet):
-        together = [part for part in fleet.together if part.vehicle == one.vehicle]
-        bags = together[0].bags if together else [claim.bag for claim in one.claims if claim.kind == "recording"][:MOST_TOGETHER]
-        if bags and one.vehicle not in found:
-            (file,) = (vehicle.file for vehicle in fleet.vehicles if vehicle.name == one.vehicle)
-            found[one.vehicle] = shlex.join(["lugre-steering", "diagnose", *bags, "--vehicle", file, "--out", folder_of(one.vehicle)])
+        naming.setdefault(one.vehicle, []).append([claim.bag for claim in one.claims if claim.kind == "recording"])
+    asked = {part.vehicle: part.bags for part in fleet.together}
+    found: dict[str, str] = {}
+    for name, file in ((vehicle.name, vehicle.file) for vehicle in fleet.vehicles if vehicle.name in naming):
+        in_turn = dict.fromkeys(bag for bags in zip_longest(*naming[name]) for bag in bags if bag is not None)
+        if bags := asked.get(name) or list(in_turn)[:MOST_TOGETHER]:
+            found[name] = shlex.join(["lugre-steering", "diagnose", *bags, "--vehicle", file, "--out", folder_of(name)])
     return found
 
 

@@ -14,7 +14,7 @@ from lugre_steering.diagnosis.report.names import called, chance, place
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
-from lugre_steering.report.markup import code, pairs, table, text
+from lugre_steering.report.markup import pairs, table, text
 from lugre_steering.report.page import Charts
 
 STAGE_WORDS = {
@@ -59,7 +59,7 @@ def found_laws(diagnosis: Diagnosis, charts: Charts) -> str:
 
 
 def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], charts: Charts) -> str:
-    vehicle, entry = diagnosis.vehicle, CATALOGUE[effect["id"]]
+    entry = CATALOGUE[effect["id"]]
     style = plots.styles(diagnosis)[effect["id"]]
     drawn = ""
     if any(effect["id"] in trace.contributions for trace in diagnosis.traces):
@@ -67,7 +67,6 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], charts: Charts) -> 
         drawn = charts.place(plots.residual_chart(diagnosis, effect), said)
     facts = pairs([
         ("where in the chain", text(STAGE_WORDS.get(effect["stage"], effect["stage"]))),
-        ("law", code(units.law(vehicle, entry.equation))),
         ("source", text(entry.source)),
         ("how it shows", text(entry.trace)),
         ("chance that noise does this", text(chance(effect["p_value"]))),

@@ -38,9 +38,12 @@ def baseline(diagnosis: Diagnosis) -> str:
 
 
 def origin(diagnosis: Diagnosis) -> str:
-    """Version, date, options and hashes, and what the vehicle file says of itself."""
-    made = pairs([(name.replace("_", " "), plain_words(value)) for name, value in diagnosis.vehicle.provenance.items()])
-    return made if diagnosis.provenance is None else made_by(diagnosis.provenance) + made
+    """Version, date, options and hashes, and what the vehicle file that was given says of itself."""
+    said = diagnosis.sheet.provenance if diagnosis.sheet is not None else {}
+    own = pairs([(name.replace("_", " "), plain_words(value)) for name, value in said.items()])
+    return ("" if diagnosis.provenance is None else made_by(diagnosis.provenance)) + (
+        f"<p>What the vehicle file says of itself:</p>\n{own}" if said else ""
+    )
 
 
 GLOSSARY = pairs(
