@@ -16,24 +16,26 @@ from scipy.optimize import least_squares
 from lugre_steering import units
 from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import Run, prepare
-from lugre_steering.data.sensing import sensed, white_noise
+from lugre_steering.data.sensing import FOURTH, sensed, white_noise
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Finding, Kind, Recording, Signal
 from lugre_steering.report.words import percent
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.actuation import line_pressures, total_gains
-from lugre_steering.vehicle.model import build_model
+from lugre_steering.vehicle.model import Model, build_model
 
 MEAN_S = 0.25
 """Over which noise is averaged out before a channel's travel is measured."""
 MOVES = 2.0
 """Presliding lengths that the tracks must turn before anything is expected of other channels."""
 ALIVE = 0.05
-"""Share of its expected travel that a pressure must show, or one angle of the other's."""
+"""Share of its expected travel that a pressure must show, or an angle of that of MOVES."""
 RESTS = 0.1
 """Share of its own travel that a line moves at most where only its counterpart works."""
-ALL_NOISE = 0.5
-"""Share of a channel's variance that may be white noise."""
+ALL_NOISE, BEYOND = 0.5, 10.0
+"""Share of a channel's variance that may be white noise, and times the sheet's noise up to which it may only stand still."""
+WORKS = 0.5
+"""Share of the sliding friction of all tracks that moves them, if it comes both ways."""
 ROUGH = 0.05
 """Of a presliding length: noise of an angle sample from which a bristle cannot be followed."""
 COPIED, APART_RAD = 0.1, float(np.radians(0.3))
@@ -49,6 +51,7 @@ HELD = 0.2
 
 
 TopicNames = dict[tuple[Kind, str], str]
+Intervals = tuple[tuple[float, float], ...]
 
 
 def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
@@ -63,8 +66,8 @@ def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
         run = prepare(recording, vehicle)
     except DataError:
         return ()
-    checks = (_frozen, _zeros, _constant)
-    return tuple(dict.fromkeys(finding for check in checks for finding in check(run, vehicle, topics)))
+    angles = tuple(_frozen(run, vehicle, topics)) or tuple(_zeros(run, vehicle, topics))
+    return (*dict.fromkeys(angles), *_constant(run, vehicle, topics))
 
 
 def inspect_angles(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
@@ -77,8 +80,8 @@ def inspect_angles(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...
     return (*_rough(recording, run, vehicle, topics), *_copied(run, vehicle, topics))
 
 
-def _finding(name: str, topic: str, statement: str) -> Finding:
-    return Finding(name, topic, f"{topic}: {statement}")
+def _finding(name: str, topic: str, statement: str, intervals: Intervals = ()) -> Finding:
+    return Finding(name, topic, f"{topic}: {statement}", intervals)
 
 
 def _signals(recording: Recording, vehicle: Vehicle) -> Iterator[tuple[Kind, str, Signal]]:
@@ -91,24 +94,19 @@ def _signals(recording: Recording, vehicle: Vehicle) -> Iterator[tuple[Kind, str
 
 
 def _noise_alone(recording: Recording, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
-    """All angles, or all pressures, hold more white noise than anything else."""
+    """All angles, or all pressures, hold more white noise than anything else, and far more than the sheet's: no standstill."""
+    sheet = {Kind.ANGLE: vehicle.sensors.angle_sigma, Kind.PRESSURE: vehicle.sensors.pressure_noise_Pa}
     for kind, what in ((Kind.ANGLE, "angle"), (Kind.PRESSURE, "pressure")):
         shown = [(name, signal) for of, name, signal in _signals(recording, vehicle) if of is kind and signal.time_s.size >= 100]
-        random = [name for name, s in shown if white_noise(s) ** 2 > ALL_NOISE * float(np.var(s.value)) > 0.0]
-        if shown and len(random) == len(shown) and _moved(recording, vehicle, kind):
+        random = [
+            name for name, s in shown if white_noise(s) ** 2 > max((BEYOND * sheet[kind]) ** 2, ALL_NOISE * float(np.var(s.value)))
+        ]
+        if shown and len(random) == len(shown):
             topic = ", ".join(dict.fromkeys(topics[kind, name] for name in random))
             statement = f"noise and no {what}: nothing of it lasts from one sample to the next; check the sensor"
             yield _finding("dead_sensor", topic, statement)
 
 
-def _moved(recording: Recording, vehicle: Vehicle, kind: Kind) -> bool:
-    """Whether channels of another kind show motion or work, or the noise is far beyond the sheet's."""
-    limits = {Kind.ANGLE: np.radians(vehicle.sensors.angle_noise_deg), Kind.PRESSURE: vehicle.sensors.pressure_noise_Pa}
-    own = [white_noise(s) > 10.0 * limits[kind] for of, _, s in _signals(recording, vehicle) if of is kind]
-    others = [
-        float(np.var(s.value)) * ALL_NOISE > white_noise(s) ** 2 for of, _, s in _signals(recording, vehicle) if of is not kind
-    ]
-    return all(own) or any(others)
 
 
 def _rough(recording: Recording, run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
@@ -118,8 +116,7 @@ def _rough(recording: Recording, run: Run, vehicle: Vehicle, topics: TopicNames)
     """
     if vehicle.contact is not None:
         return
-    record = build_model(vehicle).parameters[0][0]
-    presliding = float(record["coulomb_torque"] / record["sigma_0"])
+    presliding = _presliding(build_model(vehicle))
     left = run.angle.sigma()
     if left > ROUGH * presliding:
         single = max(sensed(signal).sigma() for signal in recording.angle.values())
@@ -132,22 +129,59 @@ def _rough(recording: Recording, run: Run, vehicle: Vehicle, topics: TopicNames)
         )  # fmt: skip
 
 
+def _smooth(run: Run, values: Array) -> Array:
+    """Values (n,) with noise averaged out."""
+    return np.asarray(uniform_filter1d(values, max(1, round(MEAN_S / float(run.time[1] - run.time[0])))))
+
+
 def _travel(run: Run, values: Array) -> float:
     """Span of (n,) values once noise is averaged out."""
-    smooth = uniform_filter1d(values, max(1, round(MEAN_S / float(run.time[1] - run.time[0]))))
-    return float(np.ptp(smooth)) if smooth.size else 0.0
+    return float(np.ptp(_smooth(run, values))) if values.size else 0.0
+
+
+def _still(values: Array, limit: float) -> tuple[slice, slice]:
+    """The longest beginning and the longest end in which each row of values (k, n) stays within ``limit``."""
+
+    def stays(rows: Array) -> int:
+        return int(((np.maximum.accumulate(rows, axis=1) - np.minimum.accumulate(rows, axis=1)).max(axis=0) <= limit).sum())
+
+    return slice(0, stays(values)), slice(values.shape[1] - stays(values[:, ::-1]), values.shape[1])
+
+
+def _stretch(run: Run, part: slice) -> tuple[str, Intervals]:
+    """When a part of a run was, in words and as intervals; nothing to say of the whole."""
+    if part == slice(0, run.time.size):
+        return "", ()
+    start, end = float(run.time[part][0]), float(run.time[part][-1])
+    return (f" until {end:.1f} s" if part.start == 0 else f" from {start:.1f} s on"), ((start, end),)
+
+
+def _presliding(model: Model) -> float:
+    record = model.parameters[0][0]
+    return float(record["coulomb_torque"] / record["sigma_0"])
 
 
 def _frozen(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
-    """One angle that stays while the other turns."""
-    record = build_model(vehicle).parameters[0][0]
-    spans = [float(np.ptp(theta)) for theta in run.theta]
-    if max(spans) < MOVES * float(record["coulomb_torque"] / record["sigma_0"]):
+    """An angle that stays while the other turns, or all of them while the torque works both ways."""
+    model = build_model(vehicle)
+    least = MOVES * _presliding(model)
+    for row, side in enumerate(vehicle.sides):
+        for part in _still(run.theta[[row]], ALIVE * least):
+            if float(np.ptp(run.theta[:, part], axis=1).max(initial=0.0)) > least:
+                when, intervals = _stretch(run, part)
+                statement = f"stays where it is{when} while the other track turns; check the sensor and its driver"
+                yield _finding("dead_sensor", topics[Kind.ANGLE, side], statement, intervals)
+    if vehicle.contact is not None:  # the load of a joint that is held may come from elsewhere
         return
-    for side, span in zip(vehicle.sides, spans, strict=True):
-        if span < ALIVE * max(spans):
-            statement = "stays where it is while the other track turns; check the sensor and its driver"
-            yield _finding("dead_sensor", topics[Kind.ANGLE, side], statement)
+    enough = WORKS * sum(float(parameters[0]["coulomb_torque"]) for parameters in model.parameters)
+    for part in _still(run.theta, ALIVE * least):
+        work = _smooth(run, run.measured)[part][run.valid[part]]
+        # A shorter stretch may be a stop beside pressures of another clock.
+        if work.size > HELD * run.time.size and min(float(work.max()), -float(work.min())) > enough:
+            when, intervals = _stretch(run, part)
+            statement = f"stays where it is{when} while the cylinders push both ways; check the sensor and its driver"
+            topic = ", ".join(dict.fromkeys(topics[Kind.ANGLE, side] for side in vehicle.sides))
+            yield _finding("dead_sensor", topic, statement, intervals)
 
 
 def _geometry(run: Run, vehicle: Vehicle) -> tuple[Array, Array, float] | None:
@@ -203,13 +237,10 @@ def _zeros(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
 
 
 def _constant(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
-    """Lines that do not move though the tracks turned against friction, and no other line of their circuits does their work."""
+    """Lines that stay though the tracks turn there and back against friction, and no other line of their circuits does their work."""
     if vehicle.hydraulics is None:
         return
     model = build_model(vehicle)
-    record = model.parameters[0][0]
-    if float(np.ptp(run.theta, axis=1).max()) < MOVES * float(record["coulomb_torque"] / record["sigma_0"]):
-        return
     rows = zip(model.parameters, run.theta, run.omega, run.alpha, strict=True)
     torque = np.asarray(np.sum([torque_side(p, model.rubber, run.time, *row) for p, *row in rows], axis=0))
     try:
@@ -217,25 +248,44 @@ def _constant(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Findin
     except DataError:  # angles that these cylinders cannot reach: a matter of units
         return
     lines, cylinders = vehicle.hydraulics.lines, vehicle.hydraulics.cylinders.values()
-    still = {
-        line for line, shown, nominal in zip(lines, run.pressure, expected, strict=True)
-        if _travel(run, shown[run.valid]) < ALIVE * _travel(run, nominal[run.valid]) and _idle(run, shown)
-    }  # fmt: skip
     pressure, nominal = dict(zip(lines, run.pressure, strict=True)), dict(zip(lines, expected, strict=True))
+    least = MOVES * _presliding(model)
+
+    def stays(line: str) -> slice | None:
+        """The part of the run in which the line does not do what it should."""
+        shown = _smooth(run, pressure[line])
+        about = _still(shown[None], ALIVE * _travel(run, nominal[line][run.valid]))
+        for end, noise in enumerate(_idle(run, pressure[line], part) for part in about):
+            part = _still(shown[None], noise)[end]
+            should = _travel(run, nominal[line][part][run.valid[part]])
+            if noise < ALIVE * should and max(_there_and_back(theta[part]) for theta in run.theta) > least:
+                return part
+        return None
+
+    still = {line: part for line in lines if (part := stays(line)) is not None}
 
     def rests(other: str, line: str) -> bool:
         needed = run.valid & (nominal[line] > 0.5 * nominal[line].max())
+        needed[: still[line].start] = needed[still[line].stop :] = False
         return other in still or _travel(run, pressure[other][needed]) < RESTS * _travel(run, pressure[other][run.valid])
 
     circuits = [{c.cap, c.rod} & set(lines) for c in cylinders]
-    dead = [line for line in lines if line in still and all(rests(other, line) for c in circuits if line in c for other in c)]
-    if dead:
-        topic = ", ".join(topics[Kind.PRESSURE, line] for line in dead)
-        statement = "stays constant but for noise while the tracks turn against friction; check sensors, plugs and valves"
-        yield _finding("dead_sensor", topic, statement)
+    dead = [line for line in still if all(rests(other, line) for c in circuits if line in c for other in c)]
+    for when, intervals in dict.fromkeys(_stretch(run, still[line]) for line in dead):
+        topic = ", ".join(topics[Kind.PRESSURE, line] for line in dead if _stretch(run, still[line])[1] == intervals)
+        statement = f"stays constant but for noise{when} while the tracks turn against friction; check sensors, plugs and valves"
+        yield _finding("dead_sensor", topic, statement, intervals)
 
 
-def _idle(run: Run, shown: Array) -> bool:
-    """Whether a pressure shows nothing but its own noise, in whatever unit."""
-    noise = white_noise(Signal(run.time, shown))
-    return _travel(run, shown[run.valid]) < max(IDLE * noise, 1e-9 * float(np.abs(shown).max()))
+def _there_and_back(values: Array) -> float:
+    """How far (n,) values go one way, and at least as far the other."""
+    if not values.size:
+        return 0.0
+    up, down = values - np.minimum.accumulate(values), np.maximum.accumulate(values) - values
+    return float(min(up.max(), down.max()))
+
+
+def _idle(run: Run, shown: Array, part: slice) -> float:
+    """How far a pressure moves in a part of a run by nothing but its own noise, in whatever unit."""
+    noise = white_noise(Signal(run.time[part], shown[part])) if part.stop - part.start > FOURTH.size else 0.0
+    return max(IDLE * noise, 1e-9 * float(np.abs(shown).max()))

@@ -305,7 +305,7 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
     """
     record = build_model(vehicle).parameters[0]
     presliding = float(record["coulomb_torque"][0] / record["sigma_0"][0])
-    angles = {channel: signal for channel, signal in clean.items() if channel.kind is Kind.ANGLE}
+    angles = {channel: signal for channel, signal in clean.items() if channel.kind is Kind.ANGLE and signal.time_s.size > 1}
     for channel, signal in angles.items():
         time = signal.time_s
         period = float(np.median(np.diff(time)))

@@ -128,7 +128,7 @@ def _on_receipt(stamped: Recording, even: Recording) -> bool:
     """Whether stamps of a recording were late by chance, as no clock samples by itself."""
     channels = [(stamped.angle, even.angle), (stamped.pressure, even.pressure)]
     late = [own[name].time_s - signal.time_s for own, evened in channels for name, signal in evened.items()]
-    return any(float(np.std(each)) > ON_RECEIPT_S for each in late)
+    return any(each.size and float(np.std(each)) > ON_RECEIPT_S for each in late)
 
 
 def _baseline(problem: Problem, effects: Effects, start: Fit | None) -> Fit:

@@ -354,6 +354,11 @@ def noise(size: float, level: float = 0.0) -> Change:
     return lambda value: level + size * np.random.default_rng(7).standard_normal(value.size)
 
 
+def half_way(size: float) -> Change:
+    """Noise of a sensor that stays where it is from the middle of the recording on."""
+    return lambda value: np.where(np.arange(value.size) < value.size // 2, value, noise(size, float(value[value.size // 2]))(value))
+
+
 DEAD: dict[str, tuple[Callable[[Recording], Recording], str, str]] = {
     "constant pressures": (lambda r: changed(r, pressure=lambda v: np.full(v.size, 5e6)), "dead_sensor", "pressure"),
     "quiet pressures": (lambda r: changed(r, pressure=noise(1.5e4, 5e6)), "dead_sensor", "pressure"),
@@ -365,6 +370,26 @@ DEAD: dict[str, tuple[Callable[[Recording], Recording], str, str]] = {
     "frozen angle": (
         lambda r: replace(r, angle={**r.angle, "left": changed(r, angle=noise(2e-4, 0.1)).angle["left"]}), "dead_sensor", "left",
     ),
+    "angle frozen half-way": (
+        lambda r: replace(r, angle={**r.angle, "right": changed(r, angle=half_way(2e-4)).angle["right"]}), "dead_sensor", "right",
+    ),
+    "angles frozen half-way": (lambda r: changed(r, angle=half_way(2e-4)), "dead_sensor", "left"),
+    "pressure quiet half-way": (
+        lambda r: replace(r, pressure={**r.pressure, "aux_b": changed(r, pressure=half_way(1.5e4)).pressure["aux_b"]}),
+        "dead_sensor", "aux_b",
+    ),
+    "one constant pressure": (
+        lambda r: replace(r, pressure={**r.pressure, "aux_a": changed(r, pressure=noise(0.0, 2e6)).pressure["aux_a"]}),
+        "stuck_sensor", "aux_a",
+    ),
+    "two constant pressures": (
+        lambda r: replace(
+            r, pressure={**r.pressure, **{line: changed(r, pressure=noise(0.0, 2e6)).pressure[line] for line in ("aux_a", "aux_b")}}
+        ), "stuck_sensor", "aux_b",
+    ),
+    "one constant angle": (
+        lambda r: replace(r, angle={**r.angle, "left": changed(r, angle=noise(0.0, 0.1)).angle["left"]}), "dead_sensor", "left",
+    ),
     "one angle twice": (lambda r: replace(r, angle=dict.fromkeys(r.angle, r.angle["left"])), "copied_sensor", "right"),
     "rough angles": (lambda r: changed(r, angle=lambda v: v + noise(np.radians(0.5))(v)), "noisy_sensor", "left"),
     "angles clipped at zero": (lambda r: changed(r, angle=lambda v: np.maximum(v, 0.0)), "dead_sensor", "left"),
@@ -372,6 +397,7 @@ DEAD: dict[str, tuple[Callable[[Recording], Recording], str, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("fault", DEAD)
 def test_dead_sensors_stop_the_diagnosis(fault: str) -> None:
     break_it, finding, topic = DEAD[fault]
@@ -395,6 +421,33 @@ def test_noise_is_told_as_that_of_one_sample(rate_Hz: float) -> None:
 
 def test_sound_channels_are_alive() -> None:
     assert all(inspect_dead(recording, VEHICLE) == () for recording in sound())
+
+
+def test_a_sensor_that_dies_is_told_with_its_instant() -> None:
+    recording = DEAD["angle frozen half-way"][0](sound()[0])
+    (found,) = inspect_dead(recording, VEHICLE)
+    time = recording.angle["right"].time_s
+    ((start, end),) = found.intervals_s
+    assert start == pytest.approx(float(time[time.size // 2]), abs=1.0)
+    assert end == pytest.approx(float(time[-1]), abs=0.1)
+    assert f"from {start:.1f} s on" in found.statement
+
+
+@pytest.mark.parametrize("manoeuvre", ["hold-and-rest", "varied-rates"])
+def test_a_part_in_which_little_happens_is_not_dead(manoeuvre: str) -> None:
+    """Held, parked, or one sweep at one torque: nothing must have moved there that did not."""
+    recording = simulation(manoeuvre, VEHICLE, {}).recording
+
+    def part(signal: Signal, start: float) -> Signal:
+        inside = (signal.time_s >= start) & (signal.time_s < start + 5.0)
+        return Signal(signal.time_s[inside], signal.value[inside])
+
+    for start in np.arange(0.0, float(recording.angle["left"].time_s[-1]) - 5.0, 2.5):
+        cut = replace(
+            recording, angle={side: part(s, start) for side, s in recording.angle.items()},
+            pressure={line: part(s, start) for line, s in recording.pressure.items()},
+        )  # fmt: skip
+        assert inspect_dead(cut, VEHICLE) == ()
 
 
 def test_a_line_at_the_pressure_of_the_supply_is_alive() -> None:
