@@ -26,6 +26,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+PLACEHOLDERS = {Path: "PATH", str: "TEXT", int: "INTEGER", float: "NUMBER"}
+"""What stands for a value in a help text."""
+
 OwnEffects = Annotated[
     list[Path] | None, typer.Option("--effects", help="file with physics of your own (.yaml or .py); repeatable")
 ]
@@ -77,6 +80,15 @@ def options_of_commands() -> dict[str, dict[str, defaults.Option]]:
     return found
 
 
+def _name_values(signature: inspect.Signature) -> None:
+    """In the help of a command the value of an option is called what it is to people: Typer's releases differ in it ('<list[Path]>')."""
+    for parameter in signature.parameters.values():
+        hint, *info = get_args(parameter.annotation) or (None,)
+        named = [PLACEHOLDERS[kind] for one in (hint, *get_args(hint)) for kind in (one, *get_args(one)) if kind in PLACEHOLDERS]
+        if named and info and isinstance(info[0], typer.models.OptionInfo) and info[0].metavar is None:
+            info[0].metavar = named[0]
+
+
 @contextmanager
 def doubts_told_once() -> Iterator[None]:
     """Doubts about a vehicle file as one line each on stderr, however often it is read; other warnings as ever."""
@@ -118,7 +130,9 @@ def command(name: str | None = None) -> Callable[[F], F]:
 
         own = inspect.signature(function, eval_str=True)
         last = inspect.Parameter("own_effects", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=OwnEffects)
-        run.__signature__ = own.replace(parameters=[*own.parameters.values(), last])  # type: ignore[attr-defined]
+        whole = own.replace(parameters=[*own.parameters.values(), last])
+        _name_values(whole)
+        run.__signature__ = whole  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
         app.command(name)(run)
         return function

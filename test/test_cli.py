@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import codecs
 import inspect
+import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rich.console import Console
+from rich.table import Table
 from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner, Result
 
@@ -25,6 +28,7 @@ from lugre_steering import cli
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.diagnosis.effect_card import show_effect
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.terminal import Prose, output, point
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning", "error::RuntimeWarning")  # a process would show them on stderr
 
@@ -295,3 +299,33 @@ def test_names_of_parameters_are_never_cut() -> None:
         with (console := Console(width=80)).capture() as said:
             show_effect(console, effect, {"shown_by": [], "picture": ""})
         assert [p.name for p in effect.parameters if p.name not in said.get()] == [], effect.id
+
+
+def test_no_line_of_a_terminal_ends_between_a_number_and_its_unit() -> None:
+    said = "Missing from the model: free play between sensor and track, 24 % of the time, up to 9750 N m, beyond 30.1 deg."
+    for width in range(20, 100):
+        with (terminal := Console(width=width)).capture() as shown:
+            terminal.print(Prose(said), point(said))
+        lines = shown.get().splitlines()
+        assert max(map(len, lines)) <= width
+        assert " ".join(line.strip() for line in lines) == f"{said} - {said}"
+        assert not [line for line in lines if re.search(r"\d$|N$", line.rstrip())], width
+
+
+def test_columns_stay_straight_where_letters_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="strict", write_through=True)
+    monkeypatch.setattr(sys, "stdout", shown)
+    table = Table("interval", "unit")
+    for interval in ("1 … 2", "1 to 2", "1\u202f000 → 2"):
+        table.add_row(interval, "m")
+    output().print(table)
+    lines = shown.buffer.getvalue().decode("ascii").splitlines()  # type: ignore[attr-defined]
+    assert any("1 ... 2" in line for line in lines)
+    assert len(set(map(len, lines))) == 1
+    assert len({line.rindex("m") for line in lines if " m " in line}) == 1
+
+
+def test_help_calls_values_what_they_are_to_people() -> None:
+    shown = CliRunner().invoke(cli.app, ["diagnose", "--help"], env={"COLUMNS": "80"}).stdout
+    for option in ("--vehicle PATH", "--without TEXT", "--seed INTEGER", "--material NUMBER", "--effects PATH"):
+        assert option in shown

@@ -85,7 +85,7 @@ def test_live_is_ros_only() -> None:
 def test_the_chain_knows_no_vehicle_file_and_the_report_no_program() -> None:
     arrows = neighbours()[PACKAGE.name]
     assert arrows["chain"] <= {"errors", "recording"}
-    assert arrows["report"] <= {"errors", "files", "provenance", "recording", "units", "vehicle"}
+    assert arrows["report"] <= {"counted", "errors", "files", "provenance", "recording", "units", "vehicle"}
 
 
 @cache

@@ -15,7 +15,7 @@ from lugre_steering import units
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
-from lugre_steering.terminal import point
+from lugre_steering.terminal import Prose, point
 
 EXIT_CODES = {"consistent": 0, "missing_physics": 3, "unlisted_physics": 4, "insufficient_data": 5}
 """Of ``diagnose --exit-code``; 1 and 2 are those of failures and bad input."""
@@ -33,7 +33,7 @@ def show_diagnosis(console: Console, diagnosis: Diagnosis) -> None:
     result = diagnosis.json
     first = result["headline"] or result["statement"]
     console.print(Text(f"{result['verdict'].replace('_', ' ').upper()}\n", "bold"))
-    console.print(f"{first}\n", highlight=False)
+    console.print(Prose(first), "")
     if result["effects"]:
         console.print(_found(diagnosis), "")
     if result["baseline"]["heldout_rmse_Nm"] is not None:

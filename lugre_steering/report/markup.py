@@ -9,14 +9,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lugre_steering.report import words
+from lugre_steering.counted import unparted
 
 _DATE = re.compile(r"\b\d{4}-\d\d-\d\d\b")
 
 
 def text(value: object) -> str:
     """Any words as HTML; numbers are not parted from their unit."""
-    return words.unparted(html.escape(str(value), quote=True))
+    return unparted(html.escape(str(value), quote=True))
 
 
 def dated(value: object) -> str:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.counted import unparted
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.files import MAKER, refuse_foreign, replacing
 from lugre_steering.provenance import Provenance, provenance
-from lugre_steering.report.words import unparted
 
 try:
     import matplotlib as mpl

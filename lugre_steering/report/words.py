@@ -18,9 +18,6 @@ from lugre_steering.vehicle import Vehicle
 _HANDIER = (("rad", "deg", 180.0 / math.pi), ("m", "mm", 1e3), ("Pa", "MPa", 1e-6))
 
 
-_UNIT = re.compile(r"(?<=\d) (?=(?:[kM]?N m|%|deg|rad|s|kN|N|mm)\b|%)")
-
-
 @dataclass(frozen=True)
 class Axis:
     """A quantity on an axis: its name and unit, and what to multiply SI values by."""
@@ -91,11 +88,6 @@ def tenths(value: float, sign: str = "", beside: float = 0.0) -> str:
     size = max(abs(value), beside)
     decimals = 1 if size >= 10.0 or size == 0.0 else min(2 - math.floor(math.log10(size)), 12)
     return f"{value:{sign}.{decimals}f}"
-
-
-def unparted(text: str) -> str:
-    """Prose in which no line ends between a number and its unit."""
-    return _UNIT.sub("\u00a0", text).replace("N m", "N\u00a0m")
 
 
 def quantity(value: float | None, unit: str) -> str:
