@@ -26,6 +26,7 @@ PERIOD_S = 0.5
 """Rates and levels are taken over at least so long, however soon after the last one a report comes."""
 FAR_NS = 10_000_000_000
 """A clock that is wrong by more than that is another clock."""
+OTHER_CLOCK = "is use_sim_time to be set, or a bag played at another rate?"
 RECENT = 5000
 """Latencies that percentiles are taken of, so that they cost the same however many are kept."""
 
@@ -210,7 +211,8 @@ class Health:
         return DiagnosticStatus(level=level, name=name, message=message, hardware_id=self._vehicle.name, values=pairs)
 
     def _inputs(self, now_ns: int, labels: Sequence[str]) -> DiagnosticStatus:
-        level, troubles = OK, []
+        level = OK
+        having: dict[str, list[str]] = {}  # what is wrong with which inputs
         values: dict[str, object] = {}
         for i, label in enumerate(labels):
             age_s = (now_ns - self.arrived_ns[i]) * 1e-9 if self.arrivals[i] else math.inf
@@ -222,12 +224,13 @@ class Health:
             if self._kinds[i] is Kind.AIR_TEMPERATURE:
                 continue  # optional and slow
             if not 0.0 <= age_s <= self._timeouts_s[i]:
-                troubles.append(f"{label} missing" if not self.arrivals[i] else f"{label} stale")
+                having.setdefault(STALE if self.arrivals[i] else "missing", []).append(label)
                 level = max(level, ERROR if self._kinds[i] is Kind.ANGLE else WARN)
             elif abs(self.behind_ns[i]) > self._timeouts_s[i] * 1e9:
-                hint = "" if self.simulated or abs(self.behind_ns[i]) < FAR_NS else " (is use_sim_time to be set?)"
-                troubles.append(f"{label} stamps are not close to the clock{hint}")
+                hint = "" if self.simulated or abs(self.behind_ns[i]) < FAR_NS else f" ({OTHER_CLOCK})"
+                having.setdefault(f"stamps are not close to the clock{hint}", []).append(label)
                 level = max(level, WARN)
+        troubles = [f"{', '.join(inputs)} {what}" for what, inputs in having.items()]
         if self.namesakes > 0:
             troubles.append(f"{counted(self.namesakes, 'other node')} of this name: their outputs mix with these")
             level = max(level, WARN)

@@ -26,6 +26,11 @@ class Line:
         while self.values and now_s - self.values[0][0] > SHOWN_S:
             self.values.popleft()
 
+    def ends(self, now_s: float) -> tuple[float, float]:
+        """Smallest and largest value of the last minute; NaN where nothing came."""
+        known = [value for when, value in self.values if now_s - when <= SHOWN_S and not math.isnan(value)]
+        return min(known, default=math.nan), max(known, default=math.nan)
+
     def columns(self, now_s: float) -> list[float]:
         """The value farthest from zero in each column of the last minute; NaN where nothing came."""
         found = [math.nan] * COLUMNS

@@ -42,9 +42,8 @@ def view(seen: Arrived, now_s: float, ascii_only: bool = False) -> Panel:
         numbers.add_column(column, justify="right" if column in ("now", "from", "to") else "left", no_wrap=column != "")
     for name, line in sorted(seen.lines.items(), key=_order):
         columns = line.columns(now_s)
-        known = [value for value in columns if not math.isnan(value)]
         now = number(line.values[-1][1], 3) if line.values else "-"
-        ends = (number(min(known), 3), number(max(known), 3)) if known else ("-", "-")
+        ends = (number(end, 3) for end in line.ends(now_s))
         numbers.add_row(Text(name), now, Text(line.unit), Text(spark(columns, PLAIN_BARS if ascii_only else BARS)), *ends)
     parts: list[Table | Text] = [numbers if seen.lines else Text("nothing has come yet: is the node running, under this name?")]
     if seen.health:

@@ -84,8 +84,7 @@ def test_stale_pressures_stop_the_residual_and_a_missing_angle_the_torque() -> N
         world.play(no_pressure)
         world.wait(lambda: len(torque) == 300)
         _, message, _ = world.status("inputs")
-        for line in ("main_a", "main_b", "aux_a", "aux_b"):
-            assert f"pressure/{line} stale" in message
+        assert message.endswith("pressure/main_a, pressure/main_b, pressure/aux_a, pressure/aux_b stale")
         assert len(torque) == 300
         assert len(residual) == formed
 

@@ -43,6 +43,8 @@ def test_the_view_shows_numbers_their_last_minute_and_health() -> None:
     for words in ("/a/steering_torque_estimator", "torque", "40\u202f900", "-48\u202f200", "N m", "12.3", "error", "angle/left stale"):
         assert words in shown, shown
     assert "…" not in shown
+    (torque,) = (line.replace("\u202f", "").split() for line in shown.splitlines() if " torque" in line)
+    assert torque[-3:-1] == ["-48200", "40900"]  # all of the minute, also what no column of the line shows
     assert "silent" not in shown
     assert "silent for 30 s" in text_of(state, 80.0)
 

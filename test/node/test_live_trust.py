@@ -99,7 +99,7 @@ def test_an_input_that_ends_is_told_within_a_fifth_of_a_second(neighbour: tuple[
     driver.steer(0.5)
     last_ns = time.time_ns()
     time.sleep(0.4)
-    assert told_after(world, "angle/left stale; angle/right stale", last_ns) < 0.2
+    assert told_after(world, "angle/left, angle/right", last_ns) < 0.2
 
 
 def long_plan(points: int) -> JointTrajectory:
