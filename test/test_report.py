@@ -50,7 +50,7 @@ from lugre_steering.provenance import provenance as made
 from lugre_steering.recording import BagFinding
 from lugre_steering.report import words
 from lugre_steering.report.chart import Chart, Series
-from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.vehicle import EffectEntry, Vehicle, load
 
 VEHICLE_FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
 HOSTILE = '<script>alert("x")</script><img src="http://example.org/x.png" onerror="alert(1)">&amp; ü'
@@ -295,6 +295,15 @@ def test_the_first_screen_says_what_where_how_much_and_what_to_do(vehicle: Vehic
     assert head.count(headline) == 1
     for number in ("up to 9750 N m", "17 % of the torque", "2100 N m → 84 N m", "96 %"):
         assert number in head, number
+
+
+@pytest.mark.parametrize(("end", "live"), [("time_start", "do not give it to the live node"), ("angle_low", "vehicle_file:=augmented")])
+def test_what_holds_at_the_times_of_a_recording_is_not_for_the_live_node(vehicle: Vehicle, end: str, live: str) -> None:
+    patch = dataclasses.replace(missing(vehicle).effects[0], id="surface_patch", parameters={end: FittedValue(0.1, (0.0, 0.2), "s")})
+    changed = vehicle.replace(effects=(EffectEntry("surface_patch", {"change": 0.1, end: 0.1}),))
+    found = Augmented(80.0, 84.0, 0.96, (0.94, 0.97), changed)
+    source = render(dataclasses.replace(missing(vehicle), effects=(patch,), traces=(), augmented=found))
+    assert live in source[source.index('<section id="next">') : source.index('<section id="torque">')]
 
 
 def test_sheet_values_stand_beside_fitted_ones(vehicle: Vehicle) -> None:

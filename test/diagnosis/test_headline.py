@@ -99,6 +99,18 @@ def test_what_is_local_in_time_is_told_by_time(acts: dict[str, Any], place: str,
     assert f"(end_stop), {place}, up to" in headline.missing(finished(), [stop(where=where)], "", None, kept=True)
 
 
+def test_what_is_bound_to_the_time_of_its_recordings_is_nothing_for_the_live_node() -> None:
+    window = {"change": FittedValue(0.2, (0.1, 0.3), "1"), "time_start": FittedValue(55.0, (54.0, 56.0), "s")}
+    said = headline.missing(finished(), [stop(id="surface_patch", stage="contact", parameters=window)], "", None, kept=True)
+    assert said.endswith(
+        "Use augmented.yaml, which has it, to replay these recordings, not in the live node, and look what changed on the machine or its "
+        "ground at that time."
+    )
+    somewhere = {"change": window["change"], "angle_low": FittedValue(0.1, (0.0, 0.2), "rad")}
+    said = headline.missing(finished(), [stop(id="surface_patch", parameters=somewhere)], "", None, kept=True)
+    assert said.endswith("Use augmented.yaml, which has it, in replay and in the live node.")
+
+
 def test_many_stretches_are_counted_and_a_lone_recording_is_not_named() -> None:
     late = [Place(name, ((70.0, 100.0),), "steering angle", (-0.6, 0.6), "rad") for name in "abcd"]
     done = finished(problem=SimpleNamespace(runs=[recording(name) for name in "abcd"], vehicle=VEHICLE))

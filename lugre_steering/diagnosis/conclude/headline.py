@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import Experiment, NamedEffect
 from lugre_steering.diagnosis.search import locate
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Mask
 from lugre_steering.report import words
 
@@ -42,11 +43,23 @@ def missing(done: Finished, effects: Sequence[NamedEffect], law: str, advice: Ex
     them = "it" if len(effects) == 1 and not law else "them"
     beside = [f"beside that {law}, which no entry of the catalogue is"] if law else []
     found = "; and ".join([*(_found(done, effect) for effect in effects), *beside])
-    acts = [f"Use augmented.yaml, which has {them}, in replay and in the live node"] if kept else []
+    use = f"Use augmented.yaml, which has {them},"
+    if any(bound_to_time(effect.id, effect.parameters) for effect in effects):
+        only = f"{use} to replay these recordings, not in the live node"
+        acts = [only if kept else "", "look what changed on the machine or its ground at that time"]
+    else:
+        acts = [f"{use} in replay and in the live node" if kept else ""]
     acts += dict.fromkeys(CHECKS[effect.stage] for effect in effects if effect.stage in CHECKS)
     if advice is not None:
         acts.append(f"drive {advice.manoeuvre.split(':')[0]} next, which tells apart what may be confused")
-    return f"Missing from the model: {found}. {sentence(', and '.join(acts))}"
+    return f"Missing from the model: {found}. {sentence(', and '.join(filter(None, acts)))}"
+
+
+def bound_to_time(name: str, values: Container[str]) -> bool:
+    """Whether an effect with these values acts between two instants of the recordings: other recordings have others."""
+    entry = CATALOGUE.get(name)
+    ends = {end for pair in entry.places for end in pair} if entry is not None else set()
+    return entry is not None and any(p.unit == "s" and p.name in ends and p.name in values for p in entry.parameters)
 
 
 def lawful(said: str, nearest: Sequence[str]) -> str:

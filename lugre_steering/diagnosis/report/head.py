@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from lugre_steering.counted import counted
+from lugre_steering.diagnosis.conclude.headline import bound_to_time
 from lugre_steering.diagnosis.report import plots
 from lugre_steering.diagnosis.report.names import called
 from lugre_steering.diagnosis.result import Diagnosis
@@ -76,10 +77,15 @@ def next_steps(diagnosis: Diagnosis) -> str:
                 "augmented model predicts well either way."
             )
     if {effect["id"] for effect in result["effects"]} & {entry.id for entry in diagnosis.vehicle.effects}:
+        momentary = any(bound_to_time(effect["id"], effect["parameters"]) for effect in result["effects"])
+        live = (
+            "It holds at the times of these recordings only: do not give it to the live node."
+            if momentary
+            else "The live node publishes the better torque with <code>vehicle_file:=augmented.yaml</code>."
+        )
         steps.append(
             "Use the found physics: <code>augmented.yaml</code> beside this page is the vehicle file with it. "
-            "<code>lugre-steering replay BAG --vehicle augmented.yaml --out DIR</code> shows the smaller residual, and the live node "
-            "publishes the better torque with <code>vehicle_file:=augmented.yaml</code>."
+            f"<code>lugre-steering replay BAG --vehicle augmented.yaml --out DIR</code> shows the smaller residual. {live}"
         )
         steps.append("Check it on the machine: the stretches and ranges below say where and when it acts.")
     if result["laws"]:
