@@ -28,6 +28,7 @@ from lugre_steering import cli
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.diagnosis.effect_card import show_effect
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.report.words import number
 from lugre_steering.terminal import Prose, output, point
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning", "error::RuntimeWarning")  # a process would show them on stderr
@@ -299,6 +300,7 @@ def test_names_of_parameters_are_never_cut() -> None:
         with (console := Console(width=80)).capture() as said:
             show_effect(console, effect, {"shown_by": [], "picture": ""})
         assert [p.name for p in effect.parameters if p.name not in said.get()] == [], effect.id
+        assert [p.name for p in effect.parameters if number(p.high) not in said.get()] == [], effect.id
 
 
 def test_no_line_of_a_terminal_ends_between_a_number_and_its_unit() -> None:

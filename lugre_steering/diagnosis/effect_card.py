@@ -37,6 +37,8 @@ REFERENCE = "double-cycle"
 SAMPLE_S = 0.02
 NUDGE = 0.02
 """Finite-difference step of the calibration values."""
+ROUNDING_NM = 1e-6
+"""What two runs differ by where an effect does nothing [N m]."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +205,10 @@ def show_list(console: Console) -> None:
     console.print("'lugre-steering effects ID' explains one; with --out DIR it draws its signature.", highlight=False)
 
 
+def _table(title: str) -> Table:
+    return Table(title=title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
+
+
 def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> None:
     """One entry in full."""
     console.print(Text.assemble((effect.title, "bold"), f" ({effect.id})"), highlight=False)
@@ -222,13 +228,14 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
             facts.add_row(name, text)
     console.print(facts, highlight=False, markup=False)
     if effect.parameters:
-        table = Table(title="Parameters", title_justify="left", title_style="bold")
+        table = _table("\nparameters")
         # Names must be typed as they stand, so none is cut.
-        table.add_column("parameter", overflow="fold", min_width=max(len(p.name) for p in effect.parameters))
-        table.add_column("unit")
+        table.add_column("name", overflow="fold", min_width=max(len(p.name) for p in effect.parameters))
+        table.add_column("unit", no_wrap=True)
         table.add_column("meaning")
-        for column in ("typical", "lowest", "highest"):
-            table.add_column(column, justify="right")
+        table.add_column("typical", justify="right")
+        for column in ("lowest", "highest"):
+            table.add_column(column, justify="right", no_wrap=True)
         for p in effect.parameters:
             name = f"{p.name} (for each line, by its name)" if effect.per_line else p.name
             meaning = f"{p.meaning} (refinement)" if p.optional else p.meaning
@@ -237,13 +244,13 @@ def show_effect(console: Console, effect: Effect, result: dict[str, Any]) -> Non
             table.add_row(name, p.unit, meaning, typical, words.number(p.low), words.number(p.high))
         console.print(table)
     if result["shown_by"]:
-        table = Table(
-            "manoeuvre", "what is driven", title="Shown by (simulated)", title_justify="left", title_style="bold"
-        )
+        table = _table("\nshown by (simulated)")
+        table.add_column("manoeuvre", no_wrap=True)
+        table.add_column("what is driven")
         table.add_column("trace (N m rms)", justify="right")
         table.add_column("after recalibration", justify="right")
         for row in result["shown_by"]:
-            sizes = [words.number(row[key], 3) for key in ("rms_Nm", "visible_rms_Nm")]
+            sizes = [words.number(row[key] if row[key] > ROUNDING_NM else 0.0, 3) for key in ("rms_Nm", "visible_rms_Nm")]
             table.add_row(row["manoeuvre"], row["description"], *sizes)
         console.print(table)
         values = ", ".join(f"{key} = {words.number(value)}" for key, value in result["example"].items())

@@ -58,12 +58,12 @@ EFFECT = Effect(
     trace="torque beyond a knee in the angle, holds included",
     coordinate="steering angle",
     parameters=(
-        Parameter("stiffness", "N m/rad", "k1 of one track", 5e4, 0.0, 1e7),
+        Parameter("stiffness", "N m/rad", "stiffness k1 of one track where the stop begins", 5e4, 0.0, 1e7),
         Parameter(
             "engage_angle", "rad", "track angle at which the stop begins", 0.02, 0.02, 1.5,
             BEGINS, "max_angle", example=0.3,
         ),
-        Parameter("cubic_stiffness", "N m/rad^3", "k3 of one track", 1e7, 0.0, 1e10, optional=True),
+        Parameter("cubic_stiffness", "N m/rad^3", "how it stiffens, k3, of one track", 1e7, 0.0, 1e10, optional=True),
         Parameter("loss", "1", "share of the torque lost on unloading", 0.2, 0.0, 0.95, optional=True),
         Parameter("damping", "N m s/rad", "while the stop is driven in", 1e4, 0.0, 1e6, optional=True),
         Parameter("shift", "rad", "later engagement of negative angles", 0.01, -0.3, 0.3, optional=True),

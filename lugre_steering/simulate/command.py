@@ -36,6 +36,7 @@ from lugre_steering.simulate.paper.outcome import Outcome
 from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import STORAGES, write_bag
+from lugre_steering.terminal import Prose
 from lugre_steering.vehicle import Vehicle
 
 SCHEMA = "lugre_steering/experiment/1"
@@ -179,7 +180,10 @@ def show_run(console: Console, result: Mapping[str, Any], vehicle: Vehicle) -> N
         ends = " and ".join(words.number(value, 3) for value in result["rubber_at_end_degC"])
         table.add_row("rubber at the end", f"{ends} degC")
     for id_, parameters in result["effects"].items():
-        table.add_row(CATALOGUE[id_].title, ", ".join(f"{name} = {words.number(value)}" for name, value in parameters.items()))
+        of = {p.name: units.label(vehicle, p.unit) for p in CATALOGUE[id_].parameters}
+        per_line = next(iter(of.values()))  # of an effect of pressure lines, which stand in place of its parameter
+        given = (f"{name} = {words.number(value)} {of.get(name, per_line)}" for name, value in parameters.items())
+        table.add_row(CATALOGUE[id_].title, Prose(", ".join(each.removesuffix(" 1") for each in given)))
     console.print(table)
     if result["picture_note"]:
         console.print(result["picture_note"])

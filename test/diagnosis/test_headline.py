@@ -103,8 +103,8 @@ def test_what_is_bound_to_the_time_of_its_recordings_is_nothing_for_the_live_nod
     window = {"change": FittedValue(0.2, (0.1, 0.3), "1"), "time_start": FittedValue(55.0, (54.0, 56.0), "s")}
     said = headline.missing(finished(), [stop(id="surface_patch", stage="contact", parameters=window)], "", None, kept=True)
     assert said.endswith(
-        "Use augmented.yaml, which has it, to replay these recordings, not in the live node, and look what changed on the machine or its "
-        "ground at that time."
+        "Use augmented.yaml, which has it, to replay these recordings, not in the live node, and look at what changed on the machine or "
+        "its ground at that time."
     )
     somewhere = {"change": window["change"], "angle_low": FittedValue(0.1, (0.0, 0.2), "rad")}
     said = headline.missing(finished(), [stop(id="surface_patch", parameters=somewhere)], "", None, kept=True)

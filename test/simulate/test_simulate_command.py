@@ -65,7 +65,7 @@ SHORT = "segments: [{sweep: {to_deg: 10, rate_deg_s: 8, hold_s: 1}}]"
     [
         (
             "test_vehicle.yaml", ("--effect", "slope_bias:torque=1000"),
-            (r"largest torque +[\d.]+ kN m", r"steering angle +1[01][.\d]* deg", "torque = 1000"),  # the inner track turns further
+            (r"largest torque +[\d.]+ kN m", r"steering angle +1[01][.\d]* deg", "torque = 1000 N m"),  # the inner track turns further
         ),
         ("linear_axis_example.yaml", (), (r"largest force +[\d.]+ N\b", r"largest position +17\d mm")),  # 10 deg are 0.1745 rad
     ],

@@ -46,7 +46,7 @@ def missing(done: Finished, effects: Sequence[NamedEffect], law: str, advice: Ex
     use = f"Use augmented.yaml, which has {them},"
     if any(bound_to_time(effect.id, effect.parameters) for effect in effects):
         only = f"{use} to replay these recordings, not in the live node"
-        acts = [only if kept else "", "look what changed on the machine or its ground at that time"]
+        acts = [only if kept else "", "look at what changed on the machine or its ground at that time"]
     else:
         acts = [f"{use} in replay and in the live node" if kept else ""]
     acts += dict.fromkeys(CHECKS[effect.stage] for effect in effects if effect.stage in CHECKS)

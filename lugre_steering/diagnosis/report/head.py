@@ -71,10 +71,10 @@ def next_steps(diagnosis: Diagnosis) -> str:
         steps.append(f'Look at <a href="#quality">data quality</a>: {counted(bad, "finding")} about the recording itself.')
     for effect in result["effects"]:
         if effect["indistinguishable_from"]:
-            rivals = " or ".join(called(diagnosis, rival) for rival in effect["indistinguishable_from"])
+            rivals = " or ".join(called(diagnosis, rival, within=True) for rival in effect["indistinguishable_from"])
             steps.append(
-                f"Do not rely on the name {called(diagnosis, effect['id'])} alone: with these data {rivals} would explain the same. The "
-                "augmented model predicts well either way."
+                f"Do not rely on the name alone: with these data {rivals} would explain the same as "
+                f"{called(diagnosis, effect['id'], within=True)}. The augmented model predicts well either way."
             )
     if {effect["id"] for effect in result["effects"]} & {entry.id for entry in diagnosis.vehicle.effects}:
         momentary = any(bound_to_time(effect["id"], effect["parameters"]) for effect in result["effects"])

@@ -8,17 +8,22 @@ from collections.abc import Mapping
 from typing import Any
 
 from lugre_steering import units
+from lugre_steering.diagnosis.conclude.headline import inside
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
 from lugre_steering.report.markup import text
 
 
-def called(diagnosis: Diagnosis, name: str) -> str:
-    """The title of an effect, and small behind it the name by which files know it, a line of the hydraulics in brackets included."""
+def called(diagnosis: Diagnosis, name: str, within: bool = False) -> str:
+    """The title of an effect (``within`` a sentence), and small behind it the name by which files know it, a line of the hydraulics in
+    brackets included."""
     known = name.split("[")[0]
     small = f'<code class="id">{text(name)}</code>'
-    return f"{text(units.title(diagnosis.vehicle, CATALOGUE[known]))} {small}" if known in CATALOGUE else text(name)
+    if known not in CATALOGUE:
+        return text(name)
+    title = units.title(diagnosis.vehicle, CATALOGUE[known])
+    return f"{text(inside(title) if within else title)} {small}"
 
 
 def place(diagnosis: Diagnosis, entry: Mapping[str, Any]) -> list[str]:
