@@ -91,6 +91,21 @@ def test_what_was_wrong_is_forgotten_within_a_second(name: str) -> None:
     assert heat.max() < 1.0  # straight on, the way there and back of four seconds is not seen: 0.2 rad of heat
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_degrees_that_sweep_past_the_joint_are_no_return_of_its_angle(seed: int) -> None:
+    """The joint turns once from left to right at 0.08 rad/s, in degrees from 3 to 7.5 s: then the reading comes past where the joint was
+    at nearly 5 rad/s."""
+    noise, warm = np.random.default_rng(seed).normal(0.0, SIGMA, (2, 1100)), []
+    for wrong in (True, False):
+        estimator = Estimator(VEHICLE)
+        for i in range(noise.shape[1]):
+            for side in (0, 1):
+                angle = 0.4 - 0.0008 * i + float(noise[side, i])
+                rows = estimator.push(side, T0 + i * PERIOD_NS, math.degrees(angle) if wrong and 300 <= i < 750 else angle)[0]
+        warm.append(rows["temperature"][-1].copy())
+    assert np.abs(warm[0] - warm[1]).max() < 0.2
+
+
 def known_again(end_s: float, t: Array) -> Array:
     """When the joints have turned since ``end_s`` by as much as brings any two bristles together: 2 exp(-travel / length) < 0.05."""
     time = np.arange(end_s, 20.0, 0.01)

@@ -290,7 +290,9 @@ def trust(core, side, dt):
     g = core.guard[side]
     g.absurd = False
     if g.shadow_ns != 0:
-        g.calm += dt
+        # What is faster than the joint ever was may only come past where that can be.
+        fast = abs(core.motion[side].omega) * SETTLED_S > farthest(core, side, SETTLED_S)
+        g.calm = 0.0 if g.returned and fast else g.calm + dt
         patience = SUPPORTED_S if _supported(core.config[0]) else TRUSTED_S
         if g.calm >= (SETTLED_S if g.returned else patience):
             g.shadow_ns = 0
