@@ -126,7 +126,7 @@ def _evidence(diagnosis: Diagnosis, file: Path) -> None:
     colour = _colours(diagnosis)
     caption = (
         "Share of the residual's energy that each candidate's fingerprint could explain before any fit (bar), and by "
-        "how much the fit that tried it lowered the held-out error (diamond; none: not tried)."
+        "how much the fit that tried it lowered the held-out error (diamond; at 0: not at all; none: not tried)."
     )
     with figure(1, 1, caption, file, row_inches=0.7 + 0.42 * len(rows), made=diagnosis.provenance) as axes:
         ax = axes[0, 0]
@@ -134,7 +134,7 @@ def _evidence(diagnosis: Diagnosis, file: Path) -> None:
             shade = colour.get(row.label.split("[")[0], "#c4c8ce") if row.verdict == "named" else "#c4c8ce"
             ax.barh(i, 100.0 * row.energy_share, color=shade, height=0.6)
             if row.heldout_gain is not None:
-                ax.plot(100.0 * max(row.heldout_gain, 0.0), i, "D", color="black", markersize=5)
+                ax.plot(100.0 * max(row.heldout_gain, 0.0), i, "D", color="black", markersize=5, clip_on=False)
         ax.set_yticks(range(len(rows)), [f"{row.title} {''.join(row.label.partition('[')[1:])}\n({row.verdict})" for row in rows])
         ax.set_ylim(len(rows) - 0.4, -0.6)
         ax.set_xlim(left=0.0)
