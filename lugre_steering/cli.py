@@ -39,6 +39,13 @@ FailOn = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
 
 
+def _effect_ids(incomplete: str) -> list[str]:
+    """For the shell to complete."""
+    from lugre_steering.effects.registry import CATALOGUE
+
+    return [name for name in CATALOGUE if name.startswith(incomplete)]
+
+
 def print_json(result: Any) -> None:
     """The result of a command on stdout, for scripts."""
     print(serialise.as_json(result))
@@ -289,7 +296,10 @@ def diagnose(
         float, typer.Option(min=0.0, max=1.0, help="share of the torque amplitude from which an effect is called material")
     ] = 0.005,
     without: Annotated[
-        list[str] | None, typer.Option(help="ID of an effect that is not considered, to see what takes its place; may be given again")
+        list[str] | None,
+        typer.Option(
+            autocompletion=_effect_ids, help="ID of an effect that is not considered, to see what takes its place; may be given again"
+        ),
     ] = None,
     report: Annotated[bool, typer.Option(help="write report.html and pictures")] = True,
     exit_code: Annotated[
@@ -423,7 +433,9 @@ def node(
 
 @command()
 def effects(
-    effect_id: Annotated[str, typer.Argument(metavar="ID", help="explain this effect; all are listed if left out")] = "",
+    effect_id: Annotated[
+        str, typer.Argument(metavar="ID", autocompletion=_effect_ids, help="explain this effect; all are listed if left out")
+    ] = "",
     out: Annotated[Path | None, typer.Option(help="folder for a picture of its signature")] = None,
     check: Annotated[bool, typer.Option("--check", help="try what every effect owes the chain (exit code 1 if it fails)")] = False,
     add: Annotated[Path | None, typer.Option(help="keep a law of this vehicle file under the name --id")] = None,

@@ -287,11 +287,19 @@ def test_saved_defaults_stand_in_for_options(
     assert here("effects").exit_code == 0
 
 
-def test_completion_is_offered(tmp_path: Path) -> None:
-    environment = {**ENVIRONMENT, "_LUGRE_STEERING_COMPLETE": "complete_bash", "COMP_WORDS": "lugre-steering diag", "COMP_CWORD": "1"}
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("diag", ["diagnose"]), ("diagnose --mat", ["--material"]), ("effects surf", ["surface_patch"]),
+        ("diagnose --without end", ["end_stop"]),
+    ],
+)
+def test_completion_is_offered(tmp_path: Path, typed: str, offered: list[str]) -> None:
+    words = {"COMP_WORDS": f"lugre-steering {typed}", "COMP_CWORD": str(len(typed.split()))}
+    environment = {**ENVIRONMENT, "_LUGRE_STEERING_COMPLETE": "complete_bash", **words}
     command = [sys.executable, "-m", "lugre_steering"]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == ["diagnose"]
+    assert done.stdout.split() == offered
 
 
 def test_names_of_parameters_are_never_cut() -> None:
