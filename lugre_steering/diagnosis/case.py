@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from lugre_steering.data.quality import Quality
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.result import SCHEMA, Augmented, Diagnosis, Errors, Experiment, Unexplained
+from lugre_steering.errors import DataError
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import Suspect, WrongSheet, sheet_finding
 from lugre_steering.recording import BagFinding, Finding, Recording
@@ -65,6 +66,14 @@ class Case:
         seconds = sum(float(run.time[-1] - run.time[0]) for run in problem.runs)
         statement = f"The recording of {seconds:.0f} s does not determine the baseline: {lacking}. "
         return self.insufficient(statement + "Nothing can be said about missing physics.", advice)
+
+    def unusable(self, error: DataError) -> Diagnosis:
+        """Of a channel too little is left: what the check took out of it is the reason, and told first."""
+        said = str(error)
+        causes = [f"{f.bag}: {f.statement}" for f in self.findings if f.topic and f"'{f.topic}'" in said and said.startswith(f"{f.bag}: ")]
+        if causes:
+            return self.insufficient(f"The data must be put right first. {'; '.join(causes)} ({said}).")
+        return self.insufficient(f"The data do not allow a diagnosis: {said}.")
 
     def wrong_sheet(self, wrong: WrongSheet) -> Diagnosis:
         """The vehicle file is another one's."""

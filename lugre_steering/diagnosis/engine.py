@@ -76,7 +76,7 @@ def diagnose_recordings(
         case.found(cut)
         clocks = synchronised(pieces, vehicle)
     except DataError as error:
-        return case.insufficient(f"The data do not allow a diagnosis: {error}.")
+        return case.unusable(error)
     searched = _searched(case, pieces, clocks, seed, progress)
     if isinstance(searched, Diagnosis):
         return searched

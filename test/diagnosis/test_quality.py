@@ -27,6 +27,7 @@ from lugre_steering.data.offsets import SKEW_RANGE_S
 from lugre_steering.data.quality import inspect
 from lugre_steering.data.wiring import as_well
 from lugre_steering.diagnosis.case import Case as DiagnosisCase
+from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
@@ -233,6 +234,14 @@ def test_a_dead_line_is_stuck_all_the_time(sound: Recording) -> None:
     stands = inspect(angle("left", between(20.0, 25.0, frozen))(sound), VEHICLE).findings
     assert "replace the sensor" in next(f.statement for f in stands if f.finding == "stuck_sensor")
     assert overlap(found.intervals_s, [(0.0, float(sound.pressure["main_b"].time_s[-1]))]) > 0.99
+
+
+def test_the_reason_why_nothing_of_a_channel_is_left_is_told_first(sound: Recording) -> None:
+    told = diagnose_recordings([pressure(scaled(0.0), "main_b")(sound)], VEHICLE).statement
+    assert told.startswith("The data must be put right first. ")
+    assert told.index("switched off or a broken wire") < told.index("samples that can be used")
+    lost = replace(sound, pressure={line: signal for line, signal in sound.pressure.items() if line != "main_b"})
+    assert "The data do not allow a diagnosis" in diagnose_recordings([lost], VEHICLE).statement
 
 
 def test_a_large_drift_of_a_zero(sound: Recording) -> None:
