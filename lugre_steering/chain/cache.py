@@ -3,7 +3,7 @@
 """Compiled code kept between runs, sealed: what a power cut or a full disk leaves of it is told and made anew, never run.
 
 Numba believes whatever lies in its cache: an empty or cut file stops every later start, a flipped byte in the machine code may
-do anything. So each file ends with the hash of what stands before it, which Numba, a reader of pickles, does not see.
+do anything. So each file ends with the hash of its name and of what stands before it, which Numba, a reader of pickles, does not see.
 Of processes that start together, one compiles and the others wait for what it keeps. Copies of the package (a source tree,
 what is installed from it) share what they keep: it lies under the content of its source, not under the path.
 
@@ -30,6 +30,8 @@ from numba.core import bytecode, caching, ccallback, dispatcher
 
 _SEAL = hashlib.sha256
 _SEAL_BYTES = _SEAL().digest_size
+_FORM = b"sealed with the name"
+"""How files are kept: those of earlier versions are neither used nor taken for damaged."""
 _told: set[str] = set()
 _listener: Callable[[str], None] | None = None
 COMPILING = "compiling the model, once for this computer and these effects; this takes up to a minute"
@@ -72,7 +74,7 @@ class _SealedFile(caching.IndexDataCacheFile):
         with super()._open_for_write(filepath) as file:
             yield file
             file.flush()
-            file.write(_SEAL(Path(file.name).read_bytes()).digest())
+            file.write(_seal(filepath, Path(file.name).read_bytes()))
             file.flush()
             os.fsync(file.fileno())
 
@@ -112,7 +114,7 @@ class _ByContent(caching.UserProvidedCacheLocator):
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
-        self._content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        self._content = hashlib.sha256(_FORM + Path(file).read_bytes()).hexdigest()
         self._cache_path = os.path.join(_folder(), f"{function.__module__}_{self._content[:16]}")
 
     def get_source_stamp(self) -> str:
@@ -192,13 +194,18 @@ def _folder() -> str:
     return str(numba.config.CACHE_DIR)  # type: ignore[attr-defined]
 
 
+def _seal(path: str, content: bytes) -> bytes:
+    """With the name: what a repaired file system puts in the place of another file is whole, and yet not what was written there."""
+    return _SEAL(os.path.basename(path).encode() + b"\0" + content).digest()
+
+
 def _check(path: str) -> None:
     """Nothing if the file is whole; ``_DamagedError`` if not. One that is not there is Numba's business."""
     try:
         content = Path(path).read_bytes()
     except FileNotFoundError:
         return
-    if len(content) <= _SEAL_BYTES or _SEAL(content[:-_SEAL_BYTES]).digest() != content[-_SEAL_BYTES:]:
+    if len(content) <= _SEAL_BYTES or _seal(path, content[:-_SEAL_BYTES]) != content[-_SEAL_BYTES:]:
         raise _DamagedError(f"{path}: damaged")
 
 

@@ -68,6 +68,22 @@ def test_damaged_code_is_made_anew(
     assert start() == 1
 
 
+def test_code_of_another_form_in_its_place_is_not_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file system put right after a power cut may give a file the content of another: whole, and wrong."""
+
+    def started(*arguments: float) -> None:
+        numba.njit(cache=True)(law.py_func)(*arguments)
+
+    started(0.01, 0.1)
+    started(1, 0.1)
+    first, second = folder.rglob("*.nbc")
+    contents = first.read_bytes(), second.read_bytes()
+    first.write_bytes(contents[1])
+    second.write_bytes(contents[0])
+    started(0.01, 0.1)
+    assert DAMAGED in capsys.readouterr().err
+
+
 def test_a_lost_file_is_made_anew_without_a_word(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     start()
     next(folder.rglob("*.nbc")).unlink()
