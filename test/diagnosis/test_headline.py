@@ -72,7 +72,8 @@ def test_sensors_are_to_be_checked_and_ties_to_be_told_apart_by_a_drive() -> Non
 @pytest.mark.parametrize(
     ("coordinate", "ends", "place"),
     [
-        ("steering rate", (-0.1, 0.2), "at a steering rate of -5.73 to 11.5 deg/s (10 % of the time)"),
+        ("steering rate", (0.02, 0.05), "at a steering rate of 1.15 to 2.86 deg/s (10 % of the time)"),
+        ("steering rate", (-0.1, 0.2), "(end_stop), 10 % of the time, up to"),  # all rates that were driven are no place
         ("angle since reversal", (0.0, 0.05), "at an angle since reversal of 0 to 2.86 deg (10 % of the time)"),
         ("direction", (-1.0, 1.0), "(end_stop), 10 % of the time, up to"),
         ("time", (0.0, 100.0), "(end_stop), 10 % of the time, up to"),

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 
@@ -107,8 +107,8 @@ def _share(share: float) -> str:
 
 
 def _where(done: Finished, effect: NamedEffect) -> list[str]:
-    """Where it acts, over all recordings: its stretches of time or the range of its coordinate, whichever is closer, and how much of the
-    time."""
+    """Where it acts, over all recordings: its stretches of time or the range of its coordinate, whichever is closer, if either is less
+    than nearly everything; and how much of the time."""
     if not effect.where:
         return []
     recorded = sum(float(run.time[-1] - run.time[0]) for run in done.problem.runs)
@@ -116,10 +116,12 @@ def _where(done: Finished, effect: NamedEffect) -> list[str]:
     often = "all the time" if active > NEARLY_ALWAYS else f"{words.percent(active)} of the time"
     (name, *others), ends = {place.coordinate for place in effect.where}, [end for place in effect.where for end in place.range]
     low, high = min(_numbers(ends), default=math.nan), max(_numbers(ends), default=math.nan)
-    no_range = bool(others) or name in NOT_A_PLACE or not low < high
-    if stretches := _stretches(done.problem.runs, effect, None if no_range else (name, low, high)):
-        return [f"{stretches} ({often})"]
-    if no_range:
+    among = None if others or name in NOT_A_PLACE or not low < high else (name, low, high)
+    acts = {place.bag: (place.intervals_s[0][0], place.intervals_s[-1][1]) for place in effect.where if place.intervals_s}
+    within, held, driven = _durations(done.problem.runs, acts, among)
+    if within < LOCAL * held:
+        return [f"{_stretches(done.problem.runs, acts)} ({often})"]
+    if among is None or held > NEARLY_ALWAYS * driven:
         return [often]
     axis = words.coordinate_axis(done.problem.vehicle, name)
     from_, to = (words.number(axis.scale * end, 3) for end in (low, high))
@@ -128,11 +130,12 @@ def _where(done: Finished, effect: NamedEffect) -> list[str]:
     return [f"at {words.with_article(axis.name)} of {from_} to {to} {axis.unit}".rstrip() + f" ({often})"]
 
 
-def _stretches(runs: Sequence[Run], effect: NamedEffect, among: tuple[str, float, float] | None) -> str:
-    """The one stretch of each recording within which it acts, if these hold it closer than the range of a coordinate, ``among``, or than
-    all that was driven; else nothing."""
-    acts = {place.bag: (place.intervals_s[0][0], place.intervals_s[-1][1]) for place in effect.where if place.intervals_s}
-    within = held = 0.0
+def _durations(
+    runs: Sequence[Run], acts: Mapping[str, tuple[float, float]], among: tuple[str, float, float] | None
+) -> tuple[float, float, float]:
+    """Seconds within the one stretch of each recording in which something ``acts``, within a range of a coordinate (``among``; without
+    one all that was driven), and driven."""
+    within = held = total = 0.0
     for run in runs:
         start, end = acts.get(run.name, (math.inf, -math.inf))
         driven, axes = _driven(run), locate.coordinates(run, run.measured)
@@ -140,8 +143,12 @@ def _stretches(runs: Sequence[Run], effect: NamedEffect, among: tuple[str, float
         step = float(run.time[1] - run.time[0])
         within += step * float(np.sum(driven & (run.time >= start) & (run.time <= end)))
         held += step * float(np.sum(there))
-    if within >= LOCAL * held:
-        return ""
+        total += step * float(np.sum(driven))
+    return within, held, total
+
+
+def _stretches(runs: Sequence[Run], acts: Mapping[str, tuple[float, float]]) -> str:
+    """The stretches of the first recordings in words, and how many more there are."""
     told = [_stretch(run, *acts[run.name], named=len(runs) > 1) for run in runs if run.name in acts]
     more = len(told) - MOST_STRETCHES
     return " and ".join([*told[:MOST_STRETCHES], *([f"in stretches of {counted(more, 'other recording')}"] if more > 0 else [])])
