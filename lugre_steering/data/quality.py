@@ -261,9 +261,9 @@ class _Look:
         return merged
 
     def intervals(self, runs: list[tuple[int, int]]) -> Intervals:
-        """Stretches [s], half a period around their samples."""
+        """Stretches [s], half a period around their samples, and none before the first."""
         half = 0.5 * self.period
-        return tuple((float(self.time[a] - half), float(self.time[b] + half)) for a, b in runs)
+        return tuple((float(max(self.time[a] - half, self.time[0])), float(self.time[b] + half)) for a, b in runs)
 
 
 def _samples(duration_s: float, period: float) -> int:

@@ -234,6 +234,7 @@ def test_a_dead_line_is_stuck_all_the_time(sound: Recording) -> None:
     stands = inspect(angle("left", between(20.0, 25.0, frozen))(sound), VEHICLE).findings
     assert "replace the sensor" in next(f.statement for f in stands if f.finding == "stuck_sensor")
     assert overlap(found.intervals_s, [(0.0, float(sound.pressure["main_b"].time_s[-1]))]) > 0.99
+    assert found.intervals_s[0][0] == sound.pressure["main_b"].time_s[0]
 
 
 def test_the_reason_why_nothing_of_a_channel_is_left_is_told_first(sound: Recording) -> None:
