@@ -234,7 +234,8 @@ def lock_file(file: Path) -> int:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.stat(file), opened):  # else its last owner has just taken it away
                 os.ftruncate(descriptor, 0)
-                os.write(descriptor, f"{os.getpid()}\n".encode())
+                with suppress(OSError):  # on a full disk it holds no less without our number
+                    os.write(descriptor, f"{os.getpid()}\n".encode())
                 return descriptor
         os.close(descriptor)
 

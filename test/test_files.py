@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import os
+import re
+import resource
 import signal
 import subprocess
 import sys
@@ -31,6 +33,7 @@ from lugre_steering.simulate.manoeuvres import from_yaml
 from lugre_steering.vehicle import load, save
 
 SHEET = config_folder() / "test_vehicle.yaml"
+BAG = Path(__file__).parents[1] / "bags" / "synthetic_double_cycle"
 DRIVE = "segments: [{hold: {duration_s: 1.0}}, {sweep: {to_deg: 1.0, rate_deg_s: 2.0}}, {hold: {duration_s: 1.0}}]\n"
 
 
@@ -54,6 +57,38 @@ def test_what_fails_while_it_is_written_changes_nothing(tmp_path: Path) -> None:
         raise KeyboardInterrupt
     assert file.read_text() == "old"
     assert names(tmp_path) == {"a.txt"}
+
+
+@pytest.mark.parametrize("room", [0, 1000, 30_000])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("replay", BAG, "--vehicle", SHEET, "--out", "{out}"),
+        ("simulate", "double-cycle", "--out", "{out}"),
+        ("simulate", "double-cycle", "--storage", "sqlite3", "--out", "{out}"),
+        ("import", "{table}", "--map", "{map}", "--out", "{out}/bag"),
+        ("import", "{table}", "--map", "{map}", "--storage", "sqlite3", "--out", "{out}/bag"),
+    ],
+)
+def test_where_there_is_no_room_the_result_that_was_wanted_is_named_and_nothing_left(
+    tmp_path: Path, arguments: tuple[object, ...], room: int
+) -> None:
+    """A limit of the size of files, in bytes, is a disk that is full for this process."""
+    places = {"out": tmp_path / "new" / "out", "table": tmp_path / "log.csv", "map": tmp_path / "map.yaml"}
+    places["table"].write_text("t,a\n" + "".join(f"{0.01 * i:.2f},{1e-4 * i}\n" for i in range(2000)))
+    places["map"].write_text("schema: lugre_steering/import/1\ntime: {column: t, unit: s}\nchannels: {angle/left: {column: a, unit: rad}}\n")
+    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, unlimited[1]))
+        code, said = command(*(str(argument).format(**places) for argument in arguments))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
+    last = said.splitlines()[-1]
+    assert code == 2
+    assert f"{places['out']}" in last
+    assert "cannot be written" in last
+    assert not re.search(r"/\.", last.replace(str(tmp_path), ""))
+    assert not places["out"].exists() or names(places["out"]) == set()
 
 
 def test_links_are_replaced_and_never_followed(tmp_path: Path) -> None:

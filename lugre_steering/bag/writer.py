@@ -93,7 +93,10 @@ class _Storage(Protocol):
 
 
 class BagWriter:
-    """Writes one rosbag2 folder with metadata.yaml; use as a context manager, which leaves nothing behind if it fails."""
+    """Writes one rosbag2 folder with metadata.yaml; use as a context manager, which leaves nothing behind if it fails.
+
+    ``final``: the path that the folder takes when it is whole, if it is another; errors name that.
+    """
 
     def __init__(
         self,
@@ -102,8 +105,10 @@ class BagWriter:
         custom_data: Mapping[str, str] | None = None,
         *,
         compressed: bool = False,
+        final: Path | None = None,
     ) -> None:
         self.folder = Path(folder)
+        self._final = final or self.folder
         self._custom_data = dict(custom_data or {})
         self._numbers: dict[Connection, int] = {}
         self._counts: list[int] = []
@@ -112,15 +117,15 @@ class BagWriter:
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
-            raise BagError(f"{self.folder}: exists already; recordings are never overwritten") from None
+            raise BagError(f"{self._final}: exists already; recordings are never overwritten") from None
         except OSError as error:
-            raise BagError(f"{self.folder}: cannot be written ({error})") from error
+            raise self._unwritable(error) from error
         try:
             self._file = self.folder / f"{self.folder.name}.{'mcap' if storage == 'mcap' else 'db3'}"
             self._storage: _Storage = _McapStorage(self._file, compressed) if storage == "mcap" else _SqliteStorage(self._file)
         except (OSError, sqlite3.Error) as error:
             shutil.rmtree(self.folder, ignore_errors=True)
-            raise BagError(f"{self.folder}: cannot be written ({error})") from error
+            raise self._unwritable(error) from error
 
     def __enter__(self) -> BagWriter:
         return self
@@ -132,6 +137,10 @@ class BagWriter:
             self.close()
         else:
             self._discard()
+
+    def _unwritable(self, error: OSError | sqlite3.Error) -> BagError:
+        reason = error.strerror if isinstance(error, OSError) else None
+        return BagError(f"{self._final}: cannot be written ({reason or error})")
 
     def _discard(self) -> None:
         """Half a recording would stand in the way of the next attempt."""
@@ -149,7 +158,7 @@ class BagWriter:
         connection = replace(connection, qos=_clear(connection.qos))
         if connection not in self._numbers:
             if len(self._numbers) == _TOPICS_LIMIT:
-                raise BagError(f"{self.folder}: more than {_TOPICS_LIMIT} topics, which no recording can hold")
+                raise BagError(f"{self._final}: more than {_TOPICS_LIMIT} topics, which no recording can hold")
             self._numbers[connection] = len(self._numbers)
             self._counts.append(0)
             self._storage.add_topic(len(self._numbers), connection, _type_hash(connection.msgtype))
@@ -162,11 +171,11 @@ class BagWriter:
             return
         messages = _Ordered(parts, self._storage.head)
         if messages.log_ns[0] < 0:
-            raise BagError(f"{self._file}: log time {messages.log_ns[0]} ns, expected 0 or more (no format holds another)")
+            raise BagError(f"{self._final}: log time {messages.log_ns[0]} ns, expected 0 or more (no format holds another)")
         try:
             self._storage.write(messages)
         except (OSError, sqlite3.Error) as error:
-            raise BagError(f"{self._file}: writing failed ({error})") from error
+            raise self._unwritable(error) from error
         for number, count in enumerate(np.bincount(messages.topic, minlength=len(self._numbers))):
             self._counts[number] += int(count)
         self._first_ns = min(self._first_ns, int(messages.log_ns[0]))
@@ -180,7 +189,7 @@ class BagWriter:
         except BaseException as error:
             self._discard()
             if isinstance(error, (OSError, sqlite3.Error)):
-                raise BagError(f"{self._file}: writing failed ({error})") from error
+                raise self._unwritable(error) from error
             raise
 
     def _metadata(self) -> str:

@@ -44,7 +44,7 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
     marks = {"imported_from": file.name, "import_map": map_file.name, MADE: "\n".join(origin.lines())}
     with (
         staged(out) as folder,
-        BagWriter(folder, "sqlite3" if storage == "sqlite3" else "mcap", marks) as writer,
+        BagWriter(folder, "sqlite3" if storage == "sqlite3" else "mcap", marks, final=out) as writer,
     ):
         writer.write(
             [

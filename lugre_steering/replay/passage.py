@@ -74,7 +74,8 @@ class Passage:
         with Bag(self.path) as bag, new_folder(out / self.name, replace=True) as result:
             channels = self._wanted(bag)
             topics = self._topics(bag, channels)
-            with BagWriter(result, custom_data={**REPLAYED, MADE: "\n".join(origin.lines())}, compressed=True) as writer:
+            marks = {**REPLAYED, MADE: "\n".join(origin.lines())}
+            with BagWriter(result, custom_data=marks, compressed=True, final=out / self.name) as writer:
                 self._stream(bag, channels, writer, progress)
             samples = self._samples(bag, topics)
             self._check_estimates(samples, bag.findings)

@@ -5,6 +5,7 @@ of its own."""
 
 from __future__ import annotations
 
+import sqlite3
 from pathlib import Path
 
 import numpy as np
@@ -62,8 +63,9 @@ def write_bag(
                     writer.write(connections[topic[i]], int(stamps[i]), rows[within[i]].tobytes())
     except WriterError as error:
         raise BagError(f"{folder}: {error}") from error
-    except OSError as error:
-        raise BagError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    except (OSError, sqlite3.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise BagError(f"{folder}: cannot be written ({reason or error})") from error
 
 
 _Topic = tuple[str, str, IntArray, Bytes]
