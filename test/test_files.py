@@ -76,7 +76,8 @@ def test_where_there_is_no_room_the_result_that_was_wanted_is_named_and_nothing_
     """A limit of the size of files, in bytes, is a disk that is full for this process."""
     places = {"out": tmp_path / "new" / "out", "table": tmp_path / "log.csv", "map": tmp_path / "map.yaml"}
     places["table"].write_text("t,a\n" + "".join(f"{0.01 * i:.2f},{1e-4 * i}\n" for i in range(2000)))
-    places["map"].write_text("schema: lugre_steering/import/1\ntime: {column: t, unit: s}\nchannels: {angle/left: {column: a, unit: rad}}\n")
+    channels = "channels: {angle/left: {column: a, unit: rad}}"
+    places["map"].write_text(f"schema: lugre_steering/import/1\ntime: {{column: t, unit: s}}\n{channels}\n")
     unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (room, unlimited[1]))
