@@ -71,9 +71,10 @@ def test_what_fails_while_it_is_written_changes_nothing(tmp_path: Path) -> None:
     ],
 )
 def test_where_there_is_no_room_the_result_that_was_wanted_is_named_and_nothing_left(
-    tmp_path: Path, arguments: tuple[object, ...], room: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[object, ...], room: int
 ) -> None:
-    """A limit of the size of files, in bytes, is a disk that is full for this process."""
+    """A limit of the size of files, in bytes, is a disk that is full for this process; a picture would be refused before the recording."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     places = {"out": tmp_path / "new" / "out", "table": tmp_path / "log.csv", "map": tmp_path / "map.yaml"}
     places["table"].write_text("t,a\n" + "".join(f"{0.01 * i:.2f},{1e-4 * i}\n" for i in range(2000)))
     channels = "channels: {angle/left: {column: a, unit: rad}}"
