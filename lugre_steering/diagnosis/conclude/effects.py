@@ -130,7 +130,7 @@ def _lines(done: Finished, bent: Fit, index: int, item: Found) -> str:
     own = with_line(candidate.line)
     others = [with_line(line) for line in hydraulics.lines if line != candidate.line]
     before = fit(problem, weight, rest, bent, linearisations=6).cost
-    equal = tied(problem, weight, done.compared.roles, own, others, before, law=0.0)
+    equal = tied(problem, weight, done.compared.roles, own, others, before, exact=True)
     key = candidate.free[0]
     unit = done.unit(candidate.parameter(key).unit)
     named = [f"{trial.candidate.line} ({words.quantity(trial.fit.effects[-1][1][key], unit)})" for trial in equal]

@@ -41,8 +41,6 @@ TIE_T, TIE = 2.5, 10.0
 """Models are tied within so many standard errors block by block unless they are SURE apart, or within so many doubts."""
 PER_VALUE = 4.0
 """Doubts that a free value costs where models are tied."""
-LAW = 0.01
-"""Share of what a law takes that another must leave more: none is truer than that."""
 HALF = 0.5
 """Share of the best one's energy that a rival must take; and of their own that names must still take beside a pattern to stand."""
 MARGIN = 0.1
@@ -136,12 +134,12 @@ def _slow(effect: Effect) -> bool:
 
 
 def tied(
-    problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float,
-    law: float = LAW,
+    problem: Problem, weight: Array, split: Split, best: Trial, others: Sequence[Trial], before: float, *, exact: bool = False
 ) -> list[Trial]:
     """Rivals that this data cannot tell from the best.
 
-    Either no clear difference block by block (Vuong 1989), or one smaller than the doubts and the share ``law`` of what the best takes.
+    Either no clear difference block by block (Vuong 1989), or one smaller than the doubts and what another form of the rival's law than
+    nature's may leave of what the best takes; nothing where the law is ``exact``.
     """
     found = []
     error = ((problem.measured - best.fit.prediction) * weight) ** 2
@@ -151,6 +149,7 @@ def tied(
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
         apart = other.cost - best.cost
+        law = 0.0 if exact else TAKEN_OF_SLOW if _slow(other.candidate.effect) else NAME_TAKEN
         if (apart < SURE * problem.doubt and t < TIE_T) or apart < TIE * problem.doubt + law * (before - best.cost):
             found.append(other)
     return found

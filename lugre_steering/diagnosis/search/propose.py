@@ -13,7 +13,7 @@ from scipy import stats
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Round, Trial, is_timed, ranked, refine, worth_of
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, is_timed, ranked, refine, worth_of
 from lugre_steering.recording import Array
 
 SHORTLIST, SHORT = 7, 0.08
@@ -67,10 +67,11 @@ def proposed(
 def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposal:
     """What leads in some rounds once more, with all parts of its laws, in one world."""
     current = fit(problem, weight, seen[0].current.effects, seen[0].current)
-    leading: dict[tuple[str, ...], Trial] = {}
+    leading: dict[tuple[tuple[str, ...], tuple[int, ...] | None], Trial] = {}
     for own in seen:
         best = own.before - own.trials[0].cost if own.trials else 0.0
-        leading |= {trial.candidate.claim: trial for trial in reversed(own.trials) if own.before - trial.cost > LEADING * best}
+        found = [trial for trial in reversed(own.trials) if own.before - trial.cost > LEADING * best]
+        leading |= {(trial.candidate.claim, trial.candidate.bags): trial for trial in found}
     trials, best = list[Trial](), current.cost
     for trial in sorted(leading.values(), key=lambda each: each.cost):
         again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE, worth=worth_of(current.cost, best))
@@ -82,7 +83,17 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
         if trial.cost <= near:
             trials[i] = refine(problem, weight, trial, worth_of(current.cost, best))
             best = min(best, trials[i].cost)
-    return Proposal(problem, current, seen[0].scores, ranked(trials, current.cost))
+    return Proposal(problem, current, seen[0].scores, ranked(_one_of_each(trials, current.cost), current.cost))
+
+
+def _one_of_each(trials: Sequence[Trial], before: float) -> list[Trial]:
+    """Of what worlds claim of different recordings the simpler, unless the other takes clearly more of the energy ``before``."""
+    chosen: dict[tuple[str, ...], Trial] = {}
+    for trial in sorted(trials, key=lambda each: (each.candidate.bags is not None, each.cost)):
+        simpler = chosen.setdefault(trial.candidate.claim, trial)
+        if trial.cost < simpler.cost - PARTIAL * (before - trial.cost):
+            chosen[trial.candidate.claim] = trial
+    return list(chosen.values())
 
 
 def choose(scores: Sequence[Score]) -> list[Score]:

@@ -28,6 +28,7 @@ from lugre_steering.diagnosis.search.compare import (
 )
 from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
+from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
 from lugre_steering.fitting.fingerprint import Score, screen
@@ -122,7 +123,8 @@ def search(
         given = sum(item.given for item in found)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
-            found[i] = _told(item, _rivals(now, noise, weight, split, current, item, i))
+            bare, fitted = _without_own_bends(problem, now, weight, current, range(given, len(found)), i)
+            found[i] = _told(item, _rivals(bare, noise, weight, split, fitted, item, i))
     if not any(item.in_place for item in found):
         problem, baseline = settled(problem, weight, baseline, now.doubt)
     pattern = strongest(problem, baseline, weight)
@@ -302,15 +304,41 @@ def _rivals(
     own = current.effects[index]
     rest = [effect for i, effect in enumerate(current.effects) if i != index]
     without = fit(problem, weight, rest, current, linearisations=6)
+    if item.given:
+        trials = _beside_given(problem, noise, weight, without, own[0].effect)
+    else:
+        had = {trial.candidate.effect.id: trial for trial in reversed(item.trials)}
+        trials = [_again(problem, weight, without, had[name]) for name in sorted(item.rivals)]
+    champion = Trial(item.score, replace(current, effects=(*rest, own)), current.cost)
+    return tied(problem, weight, split, champion, trials, without.cost)
+
+
+def _beside_given(problem: Problem, noise: Noise, weight: Array, without: Fit, given: Effect) -> list[Trial]:
+    """The known rivals of a given effect and the best fingerprints, each in its place."""
     best: dict[str, Score] = {}
-    for score in screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in rest]):
+    for score in screen(problem, without, weight, noise.draws, [candidate.effect.id for candidate, _ in without.effects]):
         best.setdefault(score.candidate.effect.id, score)
     tried = Round(problem, weight, without, list(best.values()))
-    champion = Trial(item.score, replace(current, effects=(*rest, own)), current.cost)
-    among = (*own[0].effect.rivals, *list(best)[:FINGERPRINTS]) if item.given else item.rivals
-    names = {*among} & {*best} - {own[0].effect.id}
-    trials = [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
-    return tied(problem, weight, split, champion, trials, without.cost)
+    names = {*given.rivals, *list(best)[:FINGERPRINTS]} & {*best} - {given.id}
+    return [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
+
+
+def _again(problem: Problem, weight: Array, without: Fit, trial: Trial) -> Trial:
+    """An effect with all parts that its law had when it was tried, beside what a fit has."""
+    fitted = fit(problem, weight, [*without.effects, trial.fit.effects[-1]], without, linearisations=12, tolerance=TRIAL_TOLERANCE)
+    return Trial(trial.score, fitted, fitted.cost)
+
+
+def _without_own_bends(
+    plain: Problem, problem: Problem, weight: Array, current: Fit, names: Iterable[int], index: int
+) -> tuple[Problem, Fit]:
+    """The problem where one of the ``names`` has no bends of its own, as its rivals have none, and the fit there.
+
+    ``plain``: without bends of any name.
+    """
+    others = [i for i in names if i != index]
+    bare, x = _shaped(plain.doubted(problem.doubt, problem.typical), problem, current, others)
+    return bare, fit(bare, weight, current.effects, x)
 
 
 def _told(item: Found, rivals: Sequence[Trial]) -> Found:
