@@ -1,10 +1,10 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""When an effect began that was not there from the start: one instant per recording, found from the errors."""
+"""When an effect began that was not there from the start, one instant per recording, and where its window ends; found from the errors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Problem, Values
 from lugre_steering.recording import Array, Mask
 
 INSTANTS = 16
@@ -51,10 +51,36 @@ def timed(problem: Problem, weight: Array, result: Fit, index: int) -> tuple[flo
     return tuple(since)
 
 
+def placed(problem: Problem, weight: Array, result: Fit, index: int, ends: Mapping[str, Sequence[float]]) -> Values:
+    """The values of effect ``index`` of a fit with each of the ``ends`` of its window, one after the other, at the place from which it
+    explains most: of those given, refined."""
+    left, (candidate, found) = _left_by_values(problem, weight, result, index), result.effects[index]
+    values = dict(found)
+    for name, places in ends.items():
+
+        def here(place: float, name: str = name) -> float:
+            tried = {**values, name: place}
+            windows = ((tried[low], tried[high]) for low, high in candidate.effect.places if name in (low, high))
+            return left(tried) if all(low < high for low, high in windows) else np.inf
+
+        best, step = min([*places, values[name]], key=here), float(np.max(np.diff(places)))
+        grid, step = np.linspace(best - step, best + step, INSTANTS + 1, retstep=True)
+        best = min([best, *grid], key=here)
+        near = minimize_scalar(here, bounds=(best - step, best + step), method="bounded", options={"xatol": 0.1 * step})
+        values[name] = min([best, float(near.x)], key=here)
+    return values
+
+
 def undetermined(problem: Problem, weight: Array, result: Fit) -> Mask:
-    """Samples (n,) between instants at which a late effect could as well have begun, for all that weighted samples tell."""
+    """Samples (n,) between instants at which a late effect could as well have begun, or a window in time end, for all that weighted
+    samples tell."""
     unsure = np.zeros(problem.measured.size, bool)
     for index, (candidate, _) in enumerate(result.effects):
+        ends = [name for pair in candidate.effect.places for name in pair if name in candidate.free]
+        for name in (end for end in ends if candidate.parameter(end).unit == "s"):
+            first, last = _end_alike(problem, weight, result, index, name)
+            for bag in (bag for bag in range(len(problem.runs)) if candidate.active_in(bag)):
+                unsure[problem.edges[bag] : problem.edges[bag + 1]] |= _between(problem.runs[bag].time, first, last)
         if not candidate.since:
             continue
         left = _left(problem, weight, result, index)
@@ -63,8 +89,20 @@ def undetermined(problem: Problem, weight: Array, result: Fit) -> Mask:
             alike = _alike(left, candidate.since, bag)
             first, last = _span_of(alike, float(run.time[0]), float(run.time[-1]) + RESOLUTION_S, start)
             part = slice(problem.edges[bag], problem.edges[bag + 1])
-            unsure[part] |= (run.time > first - RESOLUTION_S) & (run.time < last + RESOLUTION_S)
+            unsure[part] |= _between(run.time, first, last)
     return unsure
+
+
+def _between(time: Array, first: float, last: float) -> Mask:
+    return np.asarray((time > first - RESOLUTION_S) & (time < last + RESOLUTION_S))
+
+
+def _end_alike(problem: Problem, weight: Array, result: Fit, index: int, name: str) -> tuple[float, float]:
+    """First and last instant at which a window in time could as well end."""
+    left, values = _left_by_values(problem, weight, result, index), result.effects[index][1]
+    most = left(values) + ALIKE
+    low, high = min(float(run.time[0]) for run in problem.runs), max(float(run.time[-1]) for run in problem.runs)
+    return _span_of(lambda instant: left({**values, name: instant}) < most, low, high, values[name])
 
 
 def _alike(left: Callable[[Start], float], since: Start, bag: int) -> Callable[[float], bool]:
@@ -97,11 +135,7 @@ def _left(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[
     To first order: errors without the effect, projected off the other columns of the Jacobian and its own trace from the instant.
     """
     candidate, values = result.effects[index]
-    others = [effect for i, effect in enumerate(result.effects) if i != index]
-    first = problem.nuisances + sum(len(effect.free) for effect, _ in result.effects[:index])
-    basis = result.basis(without=slice(first, first + len(candidate.free)))
-    without = [problem.predict(bag, result.x, others) for bag in range(len(problem.runs))]
-    bare = _projected(basis, (problem.measured - np.concatenate(without)) * weight)
+    basis, without, bare = _bare(problem, weight, result, index)
 
     @lru_cache(maxsize=64)
     def trace(bag: int, start: float) -> Array:
@@ -112,11 +146,38 @@ def _left(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[
         return np.asarray((problem.predict(bag, result.x, effects) - without[bag]) * weight[part])
 
     def left(since: Sequence[float]) -> float:
-        own = _projected(basis, np.concatenate([trace(bag, start) for bag, start in enumerate(since)]))
-        along = max(float(own @ bare), 0.0) / max(float(np.sqrt(own @ own)), 1e-9)
-        return float(bare @ bare) - along**2
+        return _beyond(bare, _projected(basis, np.concatenate([trace(bag, start) for bag, start in enumerate(since)])))
 
     return left
+
+
+def _left_by_values(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[[Values], float]:
+    """The same as a function of other values of the effect."""
+    candidate, _ = result.effects[index]
+    basis, without, bare = _bare(problem, weight, result, index)
+
+    def left(values: Values) -> float:
+        effects = [(candidate, values) if i == index else own for i, own in enumerate(result.effects)]
+        trace = [problem.predict(bag, result.x, effects) - without[bag] for bag in range(len(problem.runs))]
+        return _beyond(bare, _projected(basis, np.concatenate(trace) * weight))
+
+    return left
+
+
+def _bare(problem: Problem, weight: Array, result: Fit, index: int) -> tuple[Array, list[Array], Array]:
+    """Of a fit without one of its effects: the basis of the other columns, torque by bag, and weighted errors off that basis."""
+    candidate, _ = result.effects[index]
+    others = [effect for i, effect in enumerate(result.effects) if i != index]
+    first = problem.nuisances + sum(len(effect.free) for effect, _ in result.effects[:index])
+    basis = result.basis(without=slice(first, first + len(candidate.free)))
+    without = [problem.predict(bag, result.x, others) for bag in range(len(problem.runs))]
+    return basis, without, _projected(basis, (problem.measured - np.concatenate(without)) * weight)
+
+
+def _beyond(bare: Array, own: Array) -> float:
+    """Energy of errors that a trace of the best positive size leaves."""
+    along = max(float(own @ bare), 0.0) / max(float(np.sqrt(own @ own)), 1e-9)
+    return float(bare @ bare) - along**2
 
 
 def _projected(basis: Array, values: Array) -> Array:

@@ -132,7 +132,19 @@ class Round:
             best = min([best, self._fitted(score, x, worth=best.cost)], key=lambda each: each.cost)
         for _ in range(RETIMED if tried.since else 0):
             best = retime(self.problem, self.weight, best)
-        return best
+        return self._moved(best)
+
+    def _moved(self, trial: Trial) -> Trial:
+        """The trial with each end of its window where it explains most of the places that the screen has tried: the fit sees only what
+        is at an end, and stops at the next hill."""
+        *earlier, (candidate, _) = trial.fit.effects
+        alike = [score.values for score in self.scores if score.candidate.claim == candidate.claim]
+        ends = {name: sorted({own[name] for own in alike}) for name in candidate.claim[1:] if name in candidate.free}
+        if not ends:
+            return trial
+        moved = onset.placed(self.problem, self.weight, trial.fit, len(earlier), ends)
+        result = fit(self.problem, self.weight, [*earlier, (candidate, moved)], trial.fit, linearisations=GO_ON, tolerance=TRIAL_TOLERANCE)
+        return Trial(trial.score, result, result.cost) if result.cost < trial.cost else trial
 
 
 def worth_of(before: float, best: float) -> float:

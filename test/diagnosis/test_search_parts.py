@@ -15,7 +15,7 @@ from lugre_steering.diagnosis.investigate import recalibrate
 from lugre_steering.diagnosis.search import compare, foreign, propose, search
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.effects.relief_saturation import CEILINGS
-from lugre_steering.fitting import fingerprint, noise, split, trial
+from lugre_steering.fitting import fingerprint, noise, onset, split, trial
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
@@ -92,7 +92,7 @@ def test_a_late_effect_acts_from_its_start_and_is_timed(problem: Problem) -> Non
     tried = trial.Trial(score, result, trial.cost(hidden, result, weight(hidden)))
     for _ in range(trial.RETIMED):
         tried = trial.retime(hidden, weight(hidden), tried)
-    assert tried.candidate.since == pytest.approx(starts, abs=0.3)
+    assert tried.candidate.since == pytest.approx(starts, abs=1.0)
     assert tried.fit.effects[0][1]["torque"] == pytest.approx(400.0, rel=0.02)
 
 
@@ -467,7 +467,7 @@ def test_an_onset_must_explain_clearly_more_to_stand_for_a_group() -> None:
 
 
 def test_laws_that_differ_by_less_than_their_own_form_are_tied(problem: Problem) -> None:
-    """Nature is true to no law to two hundredths of its energy; lines of the same law are another matter."""
+    """Nature is true to no law to four hundredths of its energy; lines of the same law are another matter."""
     roles, x = split.split(problem), problem.start()
     truth = effect("slope_bias", torque=2000.0)
     hidden = with_torque(problem, problem.predict_all(x, [truth]))
@@ -483,7 +483,7 @@ def test_laws_that_differ_by_less_than_their_own_form_are_tied(problem: Problem)
     best = made_up("slope_bias", 0.0)
     far = np.sqrt(before - best.cost) / np.linalg.norm(seen)  # an error as large as all that the best takes
     for share, id_, exact, tied in (
-        (0.015, "back_pressure", False, True), (0.015, "back_pressure", True, False), (0.03, "back_pressure", False, False),
+        (0.03, "back_pressure", False, True), (0.03, "back_pressure", True, False), (0.05, "back_pressure", False, False),
         (0.05, "stress_relaxation", False, True), (0.08, "stress_relaxation", False, False),
     ):  # fmt: skip
         other = made_up(id_, far * share**0.5)
@@ -574,3 +574,37 @@ def test_short_standstills_leave_more_doubt_about_slow_noise(problem: Problem) -
     rest = noise.standstill(run)
     shorter = replace(run, valid=np.where(np.arange(run.time.size) < rest[-1].start, False, run.valid))
     assert noise.slow_doubt(shorter) > 1.3 * noise.slow_doubt(run) > 0.0
+
+
+@pytest.fixture(scope="module")
+def patched(slower: Problem) -> tuple[Problem, Fit]:
+    """Ground that changes in one recording, fitted with a window that ends too early."""
+    candidate = Candidate(CATALOGUE["surface_patch"], free=("change", "time_start", "time_end"), bags=(1,))
+    truth = {"change": -0.1, "time_start": 11.0, "time_end": 44.0}  # in mid-sweep, as at rest nothing shows them
+    hidden = with_torque(slower, slower.predict_all(slower.start(), [(candidate, truth)]))
+    return hidden, fit(hidden, weight(hidden), [(candidate, {**truth, "time_start": 24.0, "time_end": 30.0})], linearisations=1)
+
+
+def test_a_window_ends_where_it_explains_most(patched: tuple[Problem, Fit]) -> None:
+    hidden, wrong = patched
+    assert wrong.effects[0][1]["time_end"] < 44.0 - 5.0
+    places = np.linspace(-1.0, 59.0, 9).tolist()
+    values = onset.placed(hidden, weight(hidden), wrong, 0, {"time_start": places, "time_end": places})
+    assert [values["time_start"], values["time_end"]] == pytest.approx([11.0, 44.0], abs=1.0)
+
+
+def test_where_nothing_was_fitted_a_window_may_end_anywhere(patched: tuple[Problem, Fit]) -> None:
+    hidden, _ = patched
+    second = np.arange(hidden.measured.size) >= hidden.edges[1]
+    elapsed = np.concatenate([run.time - run.time[0] for run in hidden.runs])
+    gap = second & (elapsed > 38.0) & (elapsed < 50.0)
+    felt = second & (elapsed > 46.5)  # bristles carry the change on from here
+    seen = np.where(gap, 0.0, weight(hidden))
+    candidate = Candidate(CATALOGUE["surface_patch"], free=("change", "time_start", "time_end"), bags=(1,))
+    fitted = fit(hidden, seen, [(candidate, {"change": -0.1, "time_start": 11.0, "time_end": 44.0})])
+    unsure = onset.undetermined(hidden, seen, fitted)
+    assert unsure[gap & ~felt].all()
+    assert not unsure[~second].any()
+    assert not unsure[second & (elapsed > 13.0) & (elapsed < 35.0)].any()
+    known = onset.undetermined(hidden, weight(hidden), fit(hidden, weight(hidden), fitted.effects, fitted))
+    assert known.sum() < 0.5 * unsure.sum()

@@ -27,6 +27,8 @@ from lugre_steering.report import words
 
 BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
+ALONG = 0.5
+"""Share of the energy of a law's other form that lies along the law itself, and so in its values."""
 IN_PLACE = "small changes of the form of the friction law, all of them together, would explain as much"
 
 
@@ -71,7 +73,7 @@ def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedVa
     for index, ((candidate, values), (_, freely), (_, shifted), item) in enumerate(those):
         parameters: dict[str, FittedValue] = {}
         torque = locate.contribution(done.compared.problem, bent, index) * done.compared.weight
-        other_form = 0.0 if item.given else float(np.sqrt(NAME_TAKEN) * np.linalg.norm(torque))
+        other_form = 0.0 if item.given else float(np.sqrt(ALONG * NAME_TAKEN) * np.linalg.norm(torque))
         for key in candidate.free:
             known = verify.NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
             moved = other_form / max(per_value[position], 1e-300)

@@ -30,9 +30,10 @@ SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
-NAME_TAKEN, TAKEN_OF_SLOW = 0.02, 0.06
-"""What FORM_TAKEN is of names, which have fewer freedoms of their own; and of those that settle with time, or follow the acceleration:
-how rubber, oil and sensors settle is known less well than how they act, and an acceleration only as smoothed as the angles ask for."""
+NAME_TAKEN, TAKEN_OF_SLOW = 0.04, 0.06
+"""What FORM_TAKEN is of names, which have fewer freedoms of their own: the energy of an error of a fifth of their torque; and of those
+that settle with time, or follow the acceleration: how rubber, oil and sensors settle is known less well than how they act, and an
+acceleration only as smoothed as the angles ask for."""
 ROUNDS, ALIKE = 3, 0.1
 """Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)

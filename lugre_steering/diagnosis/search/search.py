@@ -282,8 +282,13 @@ def _names(rivals: Sequence[Trial]) -> tuple[str, ...]:
 
 
 def _taken(there: Problem, weight: Array, current: Fit, best: Fit) -> float:
-    """Energy that the last name of ``best`` takes, the bends as large as the data ask for without it and with it."""
-    return left(*settled(there, weight, fit(there, weight, current.effects, current), there.doubt)) - left(there, best)
+    """Energy that the last name of ``best`` takes, the bends as large as the data ask for without it and with it.
+
+    What the earlier ones have beside it may be better without it too: that is none of its own.
+    """
+    starts = [(current.effects, current.x), (best.effects[: len(current.effects)], best.x[: there.nuisances])]
+    without = (settled(there, weight, fit(there, weight, effects, x), there.doubt) for effects, x in starts)
+    return min(left(*model) for model in without) - left(there, best)
 
 
 def _round(
