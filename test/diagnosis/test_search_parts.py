@@ -352,14 +352,14 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
 
 
 def test_names_that_settle_with_time_are_doubted_by_all_that_they_do(problem: Problem) -> None:
-    """Others by what they took alone, a fiftieth of it."""
+    """Others by what they took alone, a twenty-fifth of it."""
     for one, settles in ((effect("line_loss_quadratic", c=3e5), False), (effect("pressure_lag", tau=0.05), True)):
         torque = problem.predict_all(problem.start(), [one])
         result = fit(with_torque(problem, torque), weight(problem), [one])
         little, much = (compare.may_differ(problem, result, [gain]) for gain in (1e3, 1e6))
         assert (little == much) == settles
         does = float(np.sum(((torque - problem.predict_all(problem.start())) * weight(problem)) ** 2))
-        assert 0.0 < little <= (0.061 * does if settles else 20.0)
+        assert 0.0 < little <= (0.061 * does if settles else 40.0)
 
 
 def test_the_error_of_an_arm_counts_in_the_torque_as_measured(problem: Problem) -> None:
