@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,12 +15,14 @@ from typer.testing import CliRunner
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.bag import read_recording
-from lugre_steering.calibration import calibrate_recordings, coverage
+from lugre_steering.calibration import calibrate_recordings, coverage, identify
 from lugre_steering.calibration.calibrate import chosen
 from lugre_steering.calibration.estimate import _larger, estimate
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import prepare
+from lugre_steering.data.seen import seen_range
 from lugre_steering.errors import DataError
+from lugre_steering.estimator.known import SLACK, known_range
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.keys import KEYS
@@ -210,6 +213,27 @@ def test_the_picture_calls_what_was_fitted_by_its_title():
     axes = figure.Figure().subplots()
     _parameters(axes, [{**row, "key": key} for key in ("friction.coulomb", "rubber.heat_transfer_W_m2K")])
     assert [label.get_text() for label in axes.get_yticklabels()] == ["sliding friction", "heat transfer to the air"]
+
+
+def test_what_was_seen_of_a_linear_axis_is_told_in_metres_and_earlier_files_still_read():
+    axis = vehicle_file.load(ROOT / "config" / "linear_axis_example.yaml")
+    runs = [SimpleNamespace(theta=np.array([[0.1, -0.15]]), omega=np.array([[0.0123456, 0.0]]))]
+    assert seen_range(axis, runs) == {"position_m": 0.15, "rate_m_s": 0.01235}
+    assert seen_range(SHEET, runs) == {"angle_deg": 8.59, "rate_deg_s": 0.71}
+    earlier = {"angle_deg": np.degrees(0.15), "rate_deg_s": np.degrees(0.01235)}
+    for vehicle, seen in ((axis, seen_range(axis, runs)), (axis, earlier), (SHEET, earlier)):
+        for note in ({"seen": seen}, {"calibration": {"seen": seen}}):
+            known = known_range(vehicle.replace(provenance=note))
+            assert (known.angle, known.rate) == (pytest.approx(SLACK * 0.15), pytest.approx(SLACK * 0.01235))
+    nothing = known_range(axis.replace(provenance={"seen": {"position_m": "far"}}))
+    assert (nothing.angle, nothing.rate) == (np.inf, np.inf)
+
+
+@pytest.mark.parametrize("weak", [["stribeck_speed"], ["stribeck_speed", "stiffness"]])
+def test_what_is_not_determined_is_called_by_its_name(weak):
+    direction = np.ones(len(weak))
+    assert "Stribeck speed" in identify._fitted(weak, direction, 0.1).statement
+    assert identify._tied("load", dict.fromkeys(weak, 1.0), 0.1).statement.startswith("load is the sheet's: only the ratio with Stribeck")
 
 
 def test_files_of_the_command(commanded):

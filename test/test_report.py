@@ -8,6 +8,7 @@ import dataclasses
 import importlib.util
 import io
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -28,7 +29,7 @@ from typer.testing import CliRunner
 from lugre_steering.cli import app
 from lugre_steering.counted import counted
 from lugre_steering.diagnosis import effect_card as card
-from lugre_steering.diagnosis.report import plots
+from lugre_steering.diagnosis.report import head, plots
 from lugre_steering.diagnosis.report.page import Written, render, write_report
 from lugre_steering.diagnosis.result import (
     SCHEMA,
@@ -238,7 +239,7 @@ def test_nothing_is_loaded_from_anywhere(written: Written) -> None:
 
 def test_numbers_stand_in_the_text(written: Written) -> None:
     text = Page(written.files[0].read_text(encoding="utf-8")).text.replace("\u00a0", " ")
-    for number in ("96 %", "94 % to 97 %", "93 %", "41 %", "22.918°", "0.3996 … 0.4004", "< 0.001", "321"):
+    for number in ("96 %", "94 to 97 %", "93 %", "41 %", "22.918°", "0.3996 … 0.4004", "< 0.001", "321"):
         assert number in text, number
     assert "soil_shear" in text
 
@@ -401,6 +402,47 @@ def test_fitted_law_lies_on_what_the_rest_of_the_model_leaves(vehicle: Vehicle) 
     np.testing.assert_allclose(
         y, STIFFNESS * np.sign(x) * np.maximum(np.abs(np.radians(x)) - ENGAGE, 0.0) * 1e-3, atol=3e-3
     )
+
+
+def test_a_patch_between_two_instants_is_drawn_over_time_and_one_of_the_angle_over_the_angle(vehicle: Vehicle) -> None:
+    diagnosis = missing(vehicle)
+    traces = tuple(
+        dataclasses.replace(t, contributions={"surface_patch": t.contributions["end_stop"]}, coordinates={**t.coordinates, "time": t.time})
+        for t in diagnosis.traces
+    )  # fmt: skip
+    diagnosis = dataclasses.replace(diagnosis, traces=traces, coordinate_of={"surface_patch": "steering angle"})
+    for ends, unit, label in ((("time_start", "time_end"), "s", "time (s)"), (("angle_low", "angle_high"), "rad", "steering angle (deg)")):
+        window = {name: FittedValue(value, None, unit) for name, value in zip(ends, (0.1, 0.3), strict=True)}
+        patch = dataclasses.replace(diagnosis.effects[0], id="surface_patch", parameters={"change": FittedValue(0.5, None, "1"), **window})
+        told = dataclasses.replace(diagnosis, effects=(patch,))
+        cloud = plots.Cloud.of(told, told.json["effects"][0])
+        chart = plots.residual_chart(told, told.json["effects"][0])
+        assert chart.label == label
+        shown = np.concatenate([t.coordinates[cloud.name] for t in traces])
+        assert set(cloud.x) <= set(shown)
+        assert np.ptp(cloud.x) == pytest.approx(np.ptp(shown), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [
+        (0.968, 0.982, "97 to 98 %"), (0.978, 0.981, "97.8 to 98.1 %"), (0.9801, 0.9804, "about 98 %"), (0.98, 0.98, "about 98 %"),
+        (-0.031, 0.2, "-3 to 20 %"), (-0.003, 0.004, "-0.3 to 0.4 %"), (-0.0001, 0.0001, "about 0 %"), (0.9996, 0.9999, "about 100 %"),
+        (0.9981, 0.9999, "99.8 to 100.0 %"), (None, 0.5, "-"), (math.nan, 0.5, "-"),
+    ],
+)  # fmt: skip
+def test_the_ends_of_an_interval_are_told_apart_or_as_one(low: float | None, high: float | None, told: str) -> None:
+    assert words.percents(low, high) == told
+
+
+def test_page_and_screen_tell_an_interval_of_one_percent_with_a_digit_more(vehicle: Vehicle) -> None:
+    diagnosis = missing(vehicle)
+    close = dataclasses.replace(diagnosis.augmented, improvement_ci95=(0.978, 0.981))
+    diagnosis = dataclasses.replace(diagnosis, augmented=close)
+    assert "95 % interval 97.8 to 98.1 %" in re.sub(r"&nbsp;|&#160;|\u00a0", " ", head.head(diagnosis))
+    console = Console(width=100, record=True, file=io.StringIO())
+    show_diagnosis(console, diagnosis)
+    assert "97.8 to 98.1 %" in console.export_text().replace("\u00a0", " ")
 
 
 def test_heldout_bars_are_the_errors_that_were_judged(vehicle: Vehicle) -> None:
@@ -623,7 +665,7 @@ def test_the_verdict_on_a_terminal_is_a_table_of_80_columns_with_the_first_sente
     assert text.startswith(f"MISSING PHYSICS {headline} what was found")
     assert "unit Elastic end stop of the steering engage angle 0.4 0.3996 … 0.4004 rad" in text
     assert "held-out data 2100 N m 84 N m 80 N m" in text
-    assert "improvement 96 % 94 % to 97 %" in text
+    assert "improvement 96 % 94 to 97 %" in text
     assert "- Look here." in text
 
 

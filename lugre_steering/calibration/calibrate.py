@@ -42,8 +42,9 @@ from lugre_steering.calibration.identify import Assumed, Combination, identifiab
 from lugre_steering.calibration.terms import term_rows, terms_of, with_terms
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.quality import inspect
+from lugre_steering.data.seen import seen_range
 from lugre_steering.errors import DataError
-from lugre_steering.fitting.apply import apply_calibration, seen_range
+from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.keys import KEYS, Key
@@ -206,7 +207,7 @@ def _summed_up(
         data_quality=tuple(found),
         statement=units.words(problem.vehicle, first + statement(rows, rmse, held, weak, assumed)),
         calibrated=calibrated,
-        seen=seen_range(problem),
+        seen=seen_range(problem.vehicle, problem.runs),
         per_bag=tuple(_per_bag(problem, fitted)),
     )
 

@@ -17,6 +17,7 @@ import numpy as np
 from lugre_steering.calibration.estimate import Estimate, physical_jacobian
 from lugre_steering.fitting.problem import GAIN, KINGPIN, Problem, SheetValue
 from lugre_steering.recording import Array
+from lugre_steering.report.words import named
 
 SENSITIVITY = SheetValue("temperature_sensitivity", (), 0.15, -0.6, 0.6)
 """Exponent on the rubber table's ratios: how strongly stiffness and friction follow the temperature."""
@@ -140,7 +141,7 @@ def _fitted(names: Sequence[str], direction: Array, data_over_sheet: float) -> C
     largest = direction[np.argmax(np.abs(direction))]
     parts = {n: float(v) for n, v in zip(names, direction / largest, strict=True) if _counts(v)}
     parts = dict(sorted(parts.items(), key=lambda item: -abs(item[1])))
-    first, *others = (name.replace("_", " ") for name in parts)
+    first, *others = map(named, parts)
     if not others:
         statement = f"{first} is not determined by these recordings"
     elif len(others) == 1:
@@ -155,8 +156,8 @@ def _tied(name: str, shifts: dict[str, float], data_over_sheet: float) -> Combin
     """A sheet value that cannot be told from fitted parameters: they move with it (ratio known) or against it."""
     said = []
     for kind, sign in (("ratio", 1.0), ("product", -1.0)):
-        partners = [partner.replace("_", " ") for partner, shift in shifts.items() if shift * sign > 0.0]
+        partners = [named(partner) for partner, shift in shifts.items() if shift * sign > 0.0]
         if partners:
             said.append(f"only the {kind} with {' and with '.join(partners)} is determined")
-    statement = f"{name.replace('_', ' ')} is the sheet's: {', '.join(said)}"
+    statement = f"{named(name)} is the sheet's: {', '.join(said)}"
     return Combination({name: 1.0, **shifts}, data_over_sheet, statement)

@@ -127,7 +127,7 @@ class Calibration(Result):
     statement: str
     calibrated: Vehicle = field(repr=False, metadata=IN_MEMORY)
     seen: Mapping[str, float] = field(repr=False, metadata=IN_MEMORY)
-    """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``."""
+    """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``; of a linear axis ``position_m``, ``rate_m_s``."""
     picture: str | None = None
     picture_note: str | None = None
     per_bag: tuple[BagErrors, ...] = field(default=(), metadata=ADDED)

@@ -85,6 +85,6 @@ def _errors(diagnosis: Diagnosis) -> Table:
         errors = [words.torque(vehicle, result[model][key]) for model in (("baseline", "augmented") if better else ("baseline",))]
         table.add_row(label, *errors, words.torque(vehicle, result["noise_floor_Nm"]))
     if better:
-        low, high = (words.percent(end) for end in result["augmented"]["improvement_ci95"])
-        table.add_row("improvement", "", words.percent(result["augmented"]["improvement"]), f"{low} to {high}")
+        between = words.percents(*result["augmented"]["improvement_ci95"])
+        table.add_row("improvement", "", words.percent(result["augmented"]["improvement"]), between)
     return table

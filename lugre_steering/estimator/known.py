@@ -12,6 +12,7 @@ from lugre_steering.vehicle import Vehicle
 
 SLACK = 1.1
 """The causal estimates of a motion swing a little farther than the smoothed ones that were kept."""
+_DEG = math.pi / 180.0
 
 
 @dataclass(frozen=True)
@@ -24,15 +25,18 @@ class KnownRange:
 
 
 def known_range(vehicle: Vehicle) -> KnownRange:
-    """From ``provenance``: ``seen: {angle_deg, rate_deg_s}`` and ``heldout_rmse_Nm``, of ``calibration`` or at its top."""
+    """From ``provenance``: ``seen`` (written by ``data/seen.py``) and ``heldout_rmse_Nm``, of ``calibration`` or at its top."""
     notes = [note for note in (vehicle.provenance, vehicle.provenance.get("calibration")) if isinstance(note, Mapping)]
     seen: object = next((note["seen"] for note in notes if "seen" in note), None)
     seen = seen if isinstance(seen, Mapping) else {}
     rmse: object = next((note["heldout_rmse_Nm"] for note in notes if "heldout_rmse_Nm" in note), 0.0)
     if isinstance(rmse, Mapping):
         rmse = rmse.get("calibrated", 0.0)
-    angle, rate = (_positive(seen.get(key)) for key in ("angle_deg", "rate_deg_s"))
-    return KnownRange(SLACK * math.radians(angle or math.inf), SLACK * math.radians(rate or math.inf), _positive(rmse))
+    angle, rate = (
+        next((si * value for key, si in keys if (value := _positive(seen.get(key)))), math.inf)
+        for keys in ((("position_m", 1.0), ("angle_deg", _DEG)), (("rate_m_s", 1.0), ("rate_deg_s", _DEG)))
+    )
+    return KnownRange(SLACK * angle, SLACK * rate, _positive(rmse))
 
 
 def _positive(value: object) -> float:

@@ -122,6 +122,22 @@ def percent(share: float | None) -> str:
     return f"{100.0 * share:.1f} %" if size < 10.0 else f"{100.0 * share:.0f} %"
 
 
+def percents(low: float | None, high: float | None) -> str:
+    """An interval: '97 to 98 %', '97.8 to 98.1 %' where whole percents are one, 'about 98 %' where tenths are too."""
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        return "-"
+    for decimals in (0, 1):
+        ends = [f"{round(100.0 * end, decimals) + 0.0:.{decimals}f}" for end in (low, high)]  # + 0.0: nothing is no minus nothing
+        if ends[0] != ends[1]:
+            return f"{ends[0]} to {ends[1]} %"
+    return f"about {ends[0].removesuffix('.0')} %"
+
+
+def named(key: str) -> str:
+    """A key of a file in words: 'heat capacity', 'Stribeck speed'."""
+    return re.sub(r"\bstribeck\b", "Stribeck", key.replace("_", " "))
+
+
 def chance(p: float | None) -> str:
     if p is None:
         return "-"

@@ -12,12 +12,12 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits, unlisted
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
-from lugre_steering.diagnosis.conclude.statement import at_end
+from lugre_steering.diagnosis.conclude.statement import _gain, at_end, calibrations_at_bounds
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.search import Search
-from lugre_steering.diagnosis.verify import rmse
+from lugre_steering.diagnosis.verify import Judged, rmse
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting import fingerprint, split
 from lugre_steering.fitting.fingerprint import Score
@@ -54,6 +54,19 @@ def test_the_line_that_is_named_stands_alone_in_the_evidence(problem: Problem) -
     rows = {row.label: row.verdict for row in evidence(finished(hidden, baseline, tuple(scores)), [entry])}
     assert {label for label, verdict in rows.items() if verdict == "named"} == {"pressure_offset[main_a]"}
     assert {f"pressure_offset[{line}]" for line in ("main_a", "main_b", "aux_a", "aux_b")} <= set(rows)
+
+
+def test_a_name_keeps_its_capital_where_recalibration_stops_at_a_bound(problem: Problem) -> None:
+    (place,) = (i for i, calibration in enumerate(problem.calibrations) if calibration.name == "stribeck_speed")
+    baseline = fit(problem, weight(problem))
+    bound = baseline.x.copy()
+    bound[place] = problem.bounds()[1][place]
+    assert calibrations_at_bounds(finished(problem, replace(baseline, x=bound))) == ["Stribeck speed"]
+
+
+def test_an_interval_within_one_percent_is_told_with_a_digit_more() -> None:
+    told = _gain(SimpleNamespace(torque="{:.0f} N m".format), Judged(1000.0, 20.0, 0.98, (0.978, 0.981), False), "it")  # type: ignore[arg-type]
+    assert told.endswith("(improvement 98 %, 95 % interval 97.8 to 98.1 %).")
 
 
 def named(effect: str, parameter: str, value: float, unit: str) -> NamedEffect:

@@ -7,10 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from lugre_steering.data.seen import seen_range
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import NamedEffect
 from lugre_steering.effects.registry import ORIGINS
-from lugre_steering.fitting.apply import apply_calibration, seen_range
+from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.weather import initial_of, weather_findings
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
@@ -43,7 +44,7 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
             entries.append(EffectEntry(candidate.effect.id, keep, source, sha256))
     provenance = {
         "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
-        "heldout_rmse_Nm": round(heldout_rmse, 3), "seen": seen_range(problem),
+        "heldout_rmse_Nm": round(heldout_rmse, 3), "seen": seen_range(problem.vehicle, problem.runs),
         "recalibrated": {
             field: {"sheet": float(problem.model.parameters[0][0][field]), "now": round(value, 6)}
             for field, value in problem.fields(whole.x).items()

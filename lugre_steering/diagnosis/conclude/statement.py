@@ -38,7 +38,7 @@ def calibrations_at_bounds(done: Finished) -> list[str]:
     problem, x = done.problem, done.found.final.x
     low, high = problem.bounds()
     return [
-        c.name.replace("_", " ")
+        words.named(c.name)
         for c, value, least, most in zip(problem.calibrations, x, low, high, strict=False)
         # Static friction that is no more than the sliding one is nothing to wonder at.
         if min(np.inf if c.name == STATIC.name else value - least, most - value) < 1e-6 * (most - least)
@@ -85,10 +85,9 @@ def _formed(done: Finished, form: FrictionForm | None) -> list[str]:
 
 
 def _gain(done: Finished, judged: Judged, with_: str) -> str:
-    low, high = judged.interval
     return (
         f"With {with_} the held-out error falls from {done.torque(judged.before)} to {done.torque(judged.after)} (improvement "
-        f"{100 * judged.gain:.0f} %, 95 % interval {100 * low:.0f} to {100 * high:.0f} %)."
+        f"{100 * judged.gain:.0f} %, 95 % interval {words.percents(*judged.interval)})."
     )
 
 

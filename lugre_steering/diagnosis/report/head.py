@@ -54,7 +54,7 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     if result["effects"] or result["laws"]:
         rows.append(("error on held-out data", f"{words.torque(vehicle, before)} → {words.torque(vehicle, after)}", noise))
         ends = result["augmented"]["improvement_ci95"]
-        between = f"95 % interval {words.percent(ends[0])} to {words.percent(ends[1])}" if ends else ""
+        between = f"95 % interval {words.percents(*ends)}" if ends else ""
         rows.append(("improvement", words.percent(result["augmented"]["improvement"]), between))
     else:
         rows.append(("error on held-out data", words.torque(vehicle, before), noise))

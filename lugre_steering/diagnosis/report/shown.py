@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+from lugre_steering.diagnosis.conclude.headline import bound_to_time
 from lugre_steering.diagnosis.result import BagTrace
 
 EFFECT_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31")
@@ -25,8 +26,10 @@ WIDESPREAD = 0.6
 def law_coordinate(effect: Mapping[str, Any], told_by: str, coordinates: Collection[str]) -> str:
     """Name of the recorded coordinate an effect is drawn along: the catalogue's, else the one it was located by.
 
-    A law of the direction is drawn along the angle, where it opens into a loop.
+    A law of the direction is drawn along the angle, where it opens into a loop; one between two instants over time.
     """
+    if bound_to_time(effect["id"], effect["parameters"]):
+        return "time"
     found = [entry.get("coordinate") for entry in effect["where"]]
     name = next((name for name in (told_by, *found) if name in coordinates), "time")
     return "steering angle" if name == "direction" else name
