@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 import typer.main
 import yaml
-from test_packaging import environment
+from test_packaging import SLOWLY, environment
 from test_report import CHROMIUM, needs_chromium
 from typer.testing import CliRunner
 
@@ -179,7 +179,9 @@ LOG = "time_s,angle_left_deg,angle_right_deg,main_a_bar,main_b_bar,aux_a_bar,aux
 
 
 def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In their order; what the first diagnosis writes is a vehicle file in its place. They find what the page says."""
+    """In their order; what the first diagnosis writes is a vehicle file in its place. They find what the page says, at 25 Hz too."""
+    (tmp_path / "defaults.yaml").write_text("simulate.rate: 25.0\n")
+    monkeypatch.setenv("LUGRE_STEERING_CONFIG", str(tmp_path / "defaults.yaml"))
     for name in ("bags", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "out/diagnosis").mkdir(parents=True)
@@ -220,7 +222,7 @@ def test_notebooks_run_and_hold_no_outputs(notebook: Path, tmp_path: Path) -> No
     for name in ("bags", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env=environment(MPLBACKEND="Agg"), capture_output=True, text=True, check=False
+        [sys.executable, "-c", SLOWLY + code], cwd=tmp_path, env=environment(MPLBACKEND="Agg"), capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
 

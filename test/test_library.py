@@ -19,7 +19,7 @@ import jsonschema
 import numpy as np
 import pytest
 from bag_making import thinned_bag
-from test_packaging import environment
+from test_packaging import SLOWLY, environment
 from typer.testing import CliRunner
 
 import lugre_steering as ls
@@ -116,7 +116,8 @@ def test_the_examples_of_the_page_run(tmp_path: Path) -> None:
     code = "\n".join(block for need, block in blocks() if not need or importlib.util.find_spec(need))
     shutil.copytree(ROOT / "config", tmp_path / "config")
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, env=environment(MPLBACKEND="Agg"), capture_output=True, text=True
+        [sys.executable, "-W", "error", "-c", SLOWLY + code],
+        cwd=tmp_path, env=environment(MPLBACKEND="Agg"), capture_output=True, text=True,
     )
     assert done.returncode == 0, done.stderr
     refused = re.search(r"print\(error\)  # (.*)", PAGE)

@@ -85,6 +85,14 @@ def environment(**changes: str) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])} | changes
 
 
+SLOWLY = """
+import functools
+import lugre_steering as ls
+ls.simulate = functools.partial(ls.simulate, angle_rate_Hz=20.0, pressure_rate_Hz=20.0)
+"""
+"""Before an example of the guide, so that what it simulates is quicker to diagnose."""
+
+
 # ------------------------------------------------------------- package.xml
 
 

@@ -6,14 +6,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.recording import Channel, Kind
+
+if TYPE_CHECKING:
+    from lugre_steering.proof.sensors import Samples
+    from lugre_steering.proof.simulator import CaseData
 
 T0 = 1_790_000_000_000_000_000
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -124,3 +129,13 @@ def thinned_bag(bag: Path, folder: Path, seconds: float = np.inf) -> Path:
                 kept.append((connection.topic, connection.msgtype, log_ns, bytes(raw)))
             seen[connection.topic] += 1
     return write(folder / bag.name, kept)
+
+
+def slowly_sampled(data: CaseData, seconds: float = np.inf, stride: int = STRIDE) -> CaseData:
+    """A case of the second simulator with one sample of ``stride`` of each sensor, or the first seconds of it, before it is written."""
+
+    def every(samples: tuple[Samples, ...]) -> tuple[Samples, ...]:
+        kept = [np.flatnonzero(one.time < seconds)[::stride] for one in samples]
+        return tuple(one._replace(time=one.time[at], value=one.value[at]) for one, at in zip(samples, kept, strict=True))
+
+    return replace(data, bags=tuple(replace(bag, angles=every(bag.angles), pressures=every(bag.pressures)) for bag in data.bags))

@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bag_making import STRIDE
+from bag_making import STRIDE, slowly_sampled
 
 from lugre_steering.bag import read_recording
 from lugre_steering.diagnosis.result import Diagnosis
@@ -19,22 +18,20 @@ from lugre_steering.vehicle import load
 VEHICLE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
 
 
-def made(folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white") -> tuple[CaseData, list[Path]]:
-    """Two blind bags with hidden effects."""
+SLOWEST = 8
+"""Of 100 Hz leaves 12.5 Hz, with which most effects are found as well."""
+
+
+def made(
+    folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white", seconds: float = np.inf, stride: int = STRIDE
+) -> tuple[CaseData, list[Path]]:
+    """Two slow blind bags with hidden effects, or their first seconds."""
     data = simulate_case(Case(seed, effects, noise, ("sweeps", "decaying")), load_sheet(VEHICLE))  # type: ignore[arg-type]
-    return data, write_case(data, folder / "case", folder / "truth")
+    return data, write_case(slowly_sampled(data, seconds, stride), folder / "case", folder / "truth")
 
 
-def thinned(bags: list[Path]) -> list[Recording]:
-    """The bags with one sample of STRIDE."""
-
-    def every(signal: Signal) -> Signal:
-        return Signal(signal.time_s[::STRIDE], signal.value[::STRIDE])
-
-    return [
-        replace(r, angle={k: every(s) for k, s in r.angle.items()}, pressure={k: every(s) for k, s in r.pressure.items()})
-        for r in (read_recording(bag, load(VEHICLE).channels) for bag in bags)
-    ]
+def read(bags: list[Path]) -> list[Recording]:
+    return [read_recording(bag, load(VEHICLE).channels) for bag in bags]
 
 
 def cut(recording: Recording, until_s: float, since_s: float = 0.0) -> Recording:

@@ -12,12 +12,10 @@ from typing import cast
 
 import numpy as np
 import pytest
-from bag_making import thinned_bag
-from hidden_cases import VEHICLE, cut, made, thinned
+from hidden_cases import SLOWEST, VEHICLE, cut, made, read
 from small_problem import effect, small_problem, weight
 
 import lugre_steering as ls
-from lugre_steering.bag import read_recording
 from lugre_steering.calibration import coverage
 from lugre_steering.diagnosis import engine
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
@@ -33,7 +31,7 @@ from lugre_steering.vehicle import load
 @pytest.mark.parametrize("noise", ["white", "coloured", "ripple"])
 def test_silent_when_nothing_is_hidden(tmp_path: Path, noise: str) -> None:
     _, bags = made(tmp_path, seed=21, noise=noise)
-    result = diagnose_recordings(thinned(bags), load(VEHICLE))
+    result = diagnose_recordings(read(bags), load(VEHICLE))
     assert result.json["verdict"] == "consistent"
     assert result.json["effects"] == []
     assert result.json["augmented"]["heldout_rmse_Nm"] == result.json["baseline"]["heldout_rmse_Nm"]
@@ -41,8 +39,8 @@ def test_silent_when_nothing_is_hidden(tmp_path: Path, noise: str) -> None:
 
 
 def test_without_the_right_entry_a_law_of_the_angle_takes_its_place(tmp_path: Path) -> None:
-    _, bags = made(tmp_path, Concealed("end_stop"))
-    result = ls.diagnose([cut(recording, 70.0) for recording in thinned(bags)], VEHICLE, without="end_stop")
+    _, bags = made(tmp_path, Concealed("end_stop"), seconds=70.0, stride=SLOWEST)
+    result = ls.diagnose(bags, VEHICLE, without="end_stop")
     assert "end_stop" not in result.json["detection_limits"]
     assert registry.sought(registry.effect("end_stop"))  # by the next diagnosis again
     assert result.json["verdict"] == "unlisted_physics"
@@ -64,7 +62,7 @@ def test_a_name_to_be_left_out_must_be_one() -> None:
 
 def test_physics_outside_the_catalogue_is_unlisted(tmp_path: Path) -> None:
     _, bags = made(tmp_path, Concealed("gear_ripple"))
-    result = diagnose_recordings(thinned(bags[:1]), load(VEHICLE))
+    result = diagnose_recordings(read(bags[:1]), load(VEHICLE))
     assert result.json["verdict"] == "unlisted_physics"
     assert result.json["unexplained"]["structured"]
     assert "theta" in result.json["unexplained"]["formula"]
@@ -72,7 +70,7 @@ def test_physics_outside_the_catalogue_is_unlisted(tmp_path: Path) -> None:
 
 
 def test_a_recording_counts_once_and_names_are_told_apart(tmp_path: Path) -> None:
-    first, second = (thinned_bag(bag, tmp_path) for bag in made(tmp_path, seed=21)[1])
+    first, second = made(tmp_path, seed=21)[1]
     copy = shutil.copytree(first, tmp_path / "copy")
     inside = next(file for file in first.iterdir() if file.name != "metadata.yaml")
     for again in (first, inside, copy):
@@ -88,7 +86,7 @@ def test_a_recording_counts_once_and_names_are_told_apart(tmp_path: Path) -> Non
 def test_too_short_a_recording_is_insufficient_and_says_what_to_drive(tmp_path: Path) -> None:
     vehicle = load(VEHICLE)
     _, bags = made(tmp_path)
-    result = diagnose_recordings([cut(read_recording(bags[0], vehicle.channels), 3.0)], vehicle)
+    result = diagnose_recordings([cut(read(bags)[0], 3.0)], vehicle)
     assert result.json["verdict"] == "insufficient_data"
     assert "double-cycle" in result.json["next_experiment"]["manoeuvre"]
     assert result.vehicle == vehicle

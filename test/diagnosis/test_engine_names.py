@@ -9,15 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import thinned_bag
-from hidden_cases import VEHICLE, cut, made, overlap, thinned
+from bag_making import STRIDE, slowly_sampled
+from hidden_cases import SLOWEST, VEHICLE, made, overlap, read
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.proof.campaign import Hiding
-from lugre_steering.proof.simulator import Concealed
+from lugre_steering.proof.simulator import Concealed, write_case
 from lugre_steering.proof.sizing import make
+from lugre_steering.proof.worlds import SecondCase
 from lugre_steering.vehicle import load
 
 
@@ -28,8 +29,7 @@ def command(*arguments: object) -> None:
 
 def test_hidden_end_stop_is_named_placed_fitted_and_runs_in_replay(tmp_path: Path) -> None:
     seconds = 70.0
-    data, whole = made(tmp_path, Concealed("end_stop"))
-    bags = [thinned_bag(bag, tmp_path / "bags", seconds) for bag in whole]
+    data, bags = made(tmp_path, Concealed("end_stop"), seconds=seconds, stride=SLOWEST)
     out = tmp_path / "out"
     command("diagnose", *bags, "--vehicle", VEHICLE, "--out", out)
     found = json.loads((out / "diagnosis.json").read_text())
@@ -54,13 +54,16 @@ def test_hidden_end_stop_is_named_placed_fitted_and_runs_in_replay(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("hidden", "count", "seconds"),
-    [("cylinder_friction", 1, 60.0), ("backlash", 1, 60.0), ("time_delay", 2, 130.0), ("carcass_heat_sink", 2, 130.0)],
-)
-def test_one_effect_per_stage_is_named(tmp_path: Path, hidden: str, count: int, seconds: float) -> None:
+    ("hidden", "count", "seconds", "stride"),
+    [
+        ("cylinder_friction", 1, 60.0, SLOWEST), ("backlash", 1, 60.0, STRIDE), ("time_delay", 2, 130.0, STRIDE),
+        ("carcass_heat_sink", 2, 130.0, SLOWEST),
+    ],
+)  # fmt: skip
+def test_one_effect_per_stage_is_named(tmp_path: Path, hidden: str, count: int, seconds: float, stride: int) -> None:
     """One minute is enough for some; heat takes two bags, and so does a delay, to be told from a clock that differs."""
-    _, bags = made(tmp_path, Concealed(hidden))
-    result = diagnose_recordings([cut(recording, seconds) for recording in thinned(bags[:count])], load(VEHICLE))
+    _, bags = made(tmp_path, Concealed(hidden), seconds=seconds, stride=stride)
+    result = diagnose_recordings(read(bags[:count]), load(VEHICLE))
     assert result.json["verdict"] == "missing_physics"
     assert [effect["id"] for effect in result.json["effects"]] == [hidden]
     assert result.json["augmented"]["improvement_ci95"][0] > 0.0
@@ -70,5 +73,7 @@ def test_two_names_of_which_each_keeps_the_other_in_doubt_are_found_together(tmp
     """The slow error that a drift leaves makes a small asymmetry doubtful, and the other way round."""
     effects = ("direction_asymmetry", "pressure_drift")
     case, _ = make(Hiding("pair", "pair", effects, ratio=1.0, noise="coloured", seed=3048347980), VEHICLE)
-    result = diagnose_recordings(thinned(case.write(tmp_path / "seen", tmp_path / "unseen")), load(VEHICLE))
+    assert isinstance(case, SecondCase)
+    bags = write_case(slowly_sampled(case.data), tmp_path / "seen", tmp_path / "unseen")
+    result = diagnose_recordings(read(bags), load(VEHICLE))
     assert {effect["id"] for effect in result.json["effects"]} == set(effects)

@@ -77,8 +77,8 @@ def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path)
     assert parameters["torque"]["value"] == pytest.approx(1500.0, rel=0.02)
     assert parameters["pitch"]["value"] == pytest.approx(0.11, rel=0.01)
     augmented = tmp_path / "d" / "augmented.yaml"
-    told = run("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")
-    assert told.returncode == 2
+    told = run_here("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")
+    assert told.exit_code == 2
     assert "chain_ripple.yaml, which is not here" in told.stderr
     assert len(told.stderr.splitlines()) == 1
     ran = run_here("replay", bag, "--vehicle", augmented, "--effects", RIPPLE, "--out", tmp_path / "r", "--json")
@@ -238,13 +238,13 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
     found = json.loads(done["stdout"])
     assert [effect["id"] for effect in found["effects"]] == ["centre_detent"]
     assert found["effects"][0]["parameters"]["hold"]["value"] == pytest.approx(4000.0, rel=0.02)
-    lacking = run("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")
-    assert lacking.returncode == 2
+    lacking = run_here("replay", bag, "--vehicle", augmented, "--out", tmp_path / "r")  # not installed here
+    assert lacking.exit_code == 2
     assert "lugre-steering-example-physics" in lacking.stderr
     code = tmp_path / "site" / "example_physics.py"
     code.write_text(code.read_text().replace("0.5 * (1.0 - x * x)", "0.4 * (1.0 - x * x)"))
     assert "others under the same name" in run("vehicle", augmented, PYTHONPATH=path).stderr
-    assert "not in the catalogue" in run("effects", "centre_detent").stderr
+    assert "not in the catalogue" in run_here("effects", "centre_detent").stderr
 
 
 @pytest.mark.parametrize(

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bag_making import slowly_sampled
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError
-from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, sizing
+from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, simulator, sizing
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
 from lugre_steering.proof.table import page_lines
 
@@ -390,6 +391,7 @@ def test_diagnosis_sees_bags_and_sheet_alone(simulator: int, monkeypatch: pytest
         raise blind.subprocess.TimeoutExpired(command, 1.0)
 
     monkeypatch.setattr(blind.subprocess, "run", look)
+    monkeypatch.setattr(sizing, "_sized", lambda wanted, *_: wanted)  # of any size, as nothing is judged
     case = campaign.Hiding("single/end_stop/1/0", "beside", ("end_stop",), 1.0, "white", 11, simulator=simulator)
     result = blind.run(blind.Job(case, SHEET_FILE, "v", peers=False))
     assert result["error"] is not None
@@ -400,7 +402,10 @@ def test_diagnosis_sees_bags_and_sheet_alone(simulator: int, monkeypatch: pytest
 
 
 @pytest.mark.usefixtures("_short_manoeuvres")
-def test_blind_end_to_end() -> None:
+def test_blind_end_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Recordings as slow as those of the field, which are quicker to diagnose."""
+    write = simulator.write_case
+    monkeypatch.setattr(simulator, "write_case", lambda data, *folders: write(slowly_sampled(data), *folders))
     stop = campaign.Hiding("single/end_stop/10/0", "single", ("end_stop",), 10.0, "white", 11)
     found = blind.run(blind.Job(stop, SHEET_FILE, "v", peers=False))
     assert found["error"] is None
