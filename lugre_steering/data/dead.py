@@ -107,8 +107,6 @@ def _noise_alone(recording: Recording, vehicle: Vehicle, topics: TopicNames) -> 
             yield _finding("dead_sensor", topic, statement)
 
 
-
-
 def _rough(recording: Recording, run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
     """Angles too noisy to follow a bristle; a rig's stiffness is a guess, by which nothing is judged.
 
@@ -255,7 +253,7 @@ def _constant(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Findin
         """The part of the run in which the line does not do what it should."""
         shown = _smooth(run, pressure[line])
         about = _still(shown[None], ALIVE * _travel(run, nominal[line][run.valid]))
-        for end, noise in enumerate(_idle(run, pressure[line], part) for part in about):
+        for end, noise in enumerate(_moved_by_noise(run, pressure[line], part) for part in about):
             part = _still(shown[None], noise)[end]
             should = _travel(run, nominal[line][part][run.valid[part]])
             if noise < ALIVE * should and max(_there_and_back(theta[part]) for theta in run.theta) > least:
@@ -285,7 +283,7 @@ def _there_and_back(values: Array) -> float:
     return float(min(up.max(), down.max()))
 
 
-def _idle(run: Run, shown: Array, part: slice) -> float:
+def _moved_by_noise(run: Run, shown: Array, part: slice) -> float:
     """How far a pressure moves in a part of a run by nothing but its own noise, in whatever unit."""
     noise = white_noise(Signal(run.time[part], shown[part])) if part.stop - part.start > FOURTH.size else 0.0
     return max(IDLE * noise, 1e-9 * float(np.abs(shown).max()))

@@ -36,7 +36,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("width", "rad", "full width of the gap", 0.006, 0.0, 0.1),
         Parameter(
-            "softness", "N m", "torque over which a flank gives, beyond 100 N m at a vehicle", 500.0, 0.0, 2e3, optional=True,
+            "softness", "N m", "torque over which a flank gives, beyond 100 N m at a vehicle", 500.0, 0.0, 2e4, optional=True,
         ),
     ),
     hooks={"wind_up": wind_up},

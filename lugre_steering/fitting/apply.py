@@ -7,19 +7,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.loads import vertical_load
-
-
-def seen_range(problem: Problem) -> dict[str, float]:
-    """Largest angle and rate of any track that the recordings hold, as ``provenance.seen`` keeps them: beyond, the model is a guess."""
-    angle = max(float(np.abs(run.theta).max()) for run in problem.runs)
-    rate = max(float(np.abs(run.omega).max()) for run in problem.runs)
-    return {"angle_deg": round(math.degrees(angle), 2), "rate_deg_s": round(math.degrees(rate), 2)}
 
 
 def apply_calibration(vehicle: Vehicle, problem: Problem, x: Array) -> Vehicle:

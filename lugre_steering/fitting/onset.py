@@ -60,8 +60,8 @@ def placed(problem: Problem, weight: Array, result: Fit, index: int, ends: Mappi
 
         def here(place: float, name: str = name) -> float:
             tried = {**values, name: place}
-            windows = ((tried[low], tried[high]) for low, high in candidate.effect.places if name in (low, high))
-            return left(tried) if all(low < high for low, high in windows) else np.inf
+            windows = [pair for pair in candidate.effect.places if name in pair and tried.keys() >= {*pair}]
+            return left(tried) if all(tried[low] < tried[high] for low, high in windows) else np.inf
 
         best, step = min([*places, values[name]], key=here), float(np.max(np.diff(places)))
         grid, step = np.linspace(best - step, best + step, INSTANTS + 1, retstep=True)

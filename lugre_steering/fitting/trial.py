@@ -139,7 +139,8 @@ class Round:
         is at an end, and stops at the next hill."""
         *earlier, (candidate, _) = trial.fit.effects
         alike = [score.values for score in self.scores if score.candidate.claim == candidate.claim]
-        ends = {name: sorted({own[name] for own in alike}) for name in candidate.claim[1:] if name in candidate.free}
+        places = {name: sorted({own[name] for own in alike}) for name in candidate.claim[1:] if name in candidate.free}
+        ends = {name: tried for name, tried in places.items() if len(tried) > 1}
         if not ends:
             return trial
         moved = onset.placed(self.problem, self.weight, trial.fit, len(earlier), ends)

@@ -608,3 +608,18 @@ def test_where_nothing_was_fitted_a_window_may_end_anywhere(patched: tuple[Probl
     assert not unsure[second & (elapsed > 13.0) & (elapsed < 35.0)].any()
     known = onset.undetermined(hidden, weight(hidden), fit(hidden, weight(hidden), fitted.effects, fitted))
     assert known.sum() < 0.5 * unsure.sum()
+
+
+def test_a_window_with_one_place_to_end_or_with_one_end_is_no_trouble(patched: tuple[Problem, Fit]) -> None:
+    """As physics of one's own may have it."""
+    hidden, wrong = patched
+    candidate, values = wrong.effects[0]
+    one = replace(candidate, shapes=(("time_start", 24.0), ("time_end", 30.0)))
+    result = replace(wrong, effects=((one, values),))
+    score = Score(one, 1.0, 1.0, 0.0, 1.0, (1.0,) * 3, np.ones(4))
+    tried = trial.Trial(score, result, result.cost)
+    assert trial.Round(hidden, weight(hidden), result, [score])._moved(tried) is tried
+    half = {name: value for name, value in values.items() if name != "time_start"}
+    alone = replace(wrong, effects=((replace(candidate, free=("change", "time_end")), half),))
+    moved = onset.placed(hidden, weight(hidden), alone, 0, {"time_end": [20.0, 40.0]})
+    assert moved.keys() == half.keys()
