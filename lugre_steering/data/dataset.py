@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lugre_steering.data.sensing import SensorNoise, sensed
+from lugre_steering.data.sensing import SensorNoise, louder, sensed
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.data.stamps import evened
 from lugre_steering.errors import DataError
@@ -107,15 +107,18 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         pressure = np.array([_at(time, present[f"pressure/{line}"]) for line in lines]) - gauge_offset(vehicle)
         turned = line_gains(vehicle, theta + TURNED_RAD)
         sensors = [seen[f"pressure/{line}"] for line in lines]
-        noise = np.array([max(vehicle.sensors.pressure_noise_Pa, sensor.sigma()) for sensor in sensors])
-        sigma = np.sqrt(((gains.sum(axis=0) * noise[:, None]) ** 2).sum(axis=0))
+        sheet = vehicle.sensors.pressure_noise_Pa
+        usual = np.array([[max(sheet, sensor.sigma())] for sensor in sensors])
+        noise = usual * np.array([_louder(time, present[f"pressure/{line}"], sheet) for line in lines])
+        sigma = np.sqrt(((gains.sum(axis=0) * noise) ** 2).sum(axis=0))
         if any(sensor.coarse and sensor.sigma() > vehicle.sensors.pressure_noise_Pa for sensor in sensors):
             rounding = np.array([sensor.resolution if sensor.coarse else 0.0 for sensor in sensors])
     else:
         assert vehicle.torque_sensor is not None
         gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
         pressure = _at(time, present["measured_torque"])[None, :]
-        sigma = np.full(time.size, max(vehicle.torque_sensor.noise_Nm, seen["measured_torque"].sigma()))
+        sheet = vehicle.torque_sensor.noise_Nm
+        sigma = max(sheet, seen["measured_torque"].sigma()) * _louder(time, present["measured_torque"], sheet)
     side_torque, side_slope = _of_sides(gains, turned, pressure)
     measured = side_torque.sum(axis=0)
     if float(np.ptp(measured)) <= 1e-9 * float(np.abs(measured).max()):
@@ -207,6 +210,11 @@ def _on_clock(time: Array, signal: Signal, sensor: SensorNoise) -> SensorNoise:
     """What a sample of the clock has of a sensor's noise: less where several samples are averaged."""
     averaged = _averaged(time, signal)
     return sensor if sensor.coarse else SensorNoise(sensor.sigma(averaged), 0.0)
+
+
+def _louder(time: Array, signal: Signal, sheet: float) -> Array:
+    """How many times its usual noise a channel has, on the clock."""
+    return np.interp(time, signal.time_s, louder(signal, sheet, by_level=True))
 
 
 def _averaged(time: Array, signal: Signal) -> int:

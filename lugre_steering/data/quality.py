@@ -21,7 +21,16 @@ from lugre_steering.counted import counted
 from lugre_steering.data.dataset import GAP_S
 from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
 from lugre_steering.data.pieces import in_pieces
-from lugre_steering.data.sensing import FOURTH, worse_than_said
+from lugre_steering.data.sensing import (
+    FOURTH,
+    LOUDER,
+    WINDOW_S,
+    local_noise,
+    louder,
+    samples_in,
+    stretches,
+    worse_than_said,
+)
 from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.data.wiring import BLOCKING, inspect_wiring, span
 from lugre_steering.recording import Array, Channel, Finding, Kind, Mask, Recording, Signal
@@ -40,16 +49,11 @@ CLIPPED_SAMPLES = 5
 SPIKE_SIGMA = 8.0
 SPIKE_SAMPLES = 3
 """Longer excursions are not isolated samples, and may be physics."""
-NOISE_RATIO = 2.0
-NOISE_S = 2.0
-NOISE_RATE_HZ = 20.0
-"""Slower channels cannot tell noise from motion."""
-WINDOW_S = 1.0
 FORGOTTEN = 5.0
 """Presliding lengths after which less than 1 % of a wrong bristle deflection is left."""
 WENT_ON, EDGE_SAMPLES, LONGEST_UNSEEN_S = 0.05, 10, 1.0
 """Share of a presliding length by which the turn in a gap may miss that of the rates at its edges, samples that give those, and
-the longest gap [s] that they can speak for."""
+the longest gap [s] in which a track may have begun to turn, or stopped, but not turned to and fro."""
 PARKED = 0.02
 """Share of a presliding length that a track at rest may seem to move by angle noise."""
 LATE_S = 1.0
@@ -231,12 +235,12 @@ class _Look:
         levels = np.diff(np.unique(value))
         # Of a continuous signal this is next to nothing; of a quantised one its step, even if spikes lie off the grid.
         resolution = float(np.quantile(levels, 0.1)) if levels.size else 0.0
-        sigma = _white_noise(time, value, period)
+        sigma = local_noise(signal, period)
         turns = np.zeros(value.size)
         step = np.diff(value)
         turns[1:-1] = step[1:] * step[:-1] < 0.0
         loud = sigma > max(resolution, 1e-6 * float(np.ptp(value)), 0.05 * sheet)
-        flickers = (uniform_filter1d(turns, _samples(0.5, period)) > 0.35) & loud
+        flickers = (uniform_filter1d(turns, samples_in(0.5, period)) > 0.35) & loud
         return _Look(time, value, period, resolution, sheet, sigma, flickers)
 
     @cached_property
@@ -251,43 +255,12 @@ class _Look:
 
     def runs(self, mask: Mask, bridge_s: float = 0.0) -> list[tuple[int, int]]:
         """(first, last) sample of each stretch of ``mask``; stretches less than ``bridge_s`` apart count as one."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-        merged: list[tuple[int, int]] = []
-        for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
-            if merged and self.time[first] - self.time[merged[-1][1]] < bridge_s:
-                merged[-1] = (merged[-1][0], last)
-            else:
-                merged.append((first, last))
-        return merged
+        return stretches(self.time, mask, bridge_s)
 
     def intervals(self, runs: list[tuple[int, int]]) -> Intervals:
         """Stretches [s], half a period around their samples, and none before the first."""
         half = 0.5 * self.period
         return tuple((float(max(self.time[a] - half, self.time[0])), float(self.time[b] + half)) for a, b in runs)
-
-
-def _samples(duration_s: float, period: float) -> int:
-    return max(3, round(duration_s / period))
-
-
-def _white_noise(time: Array, value: Array, period: float) -> Array:
-    """Standard deviation (n,) of the white part around each sample, from fourth differences over WINDOW_S.
-
-    What stamp jitter makes of a slope is taken off; windows with a lost message do not count.
-    """
-    width = _samples(WINDOW_S, period)
-    spacing = np.diff(time)
-    regular = np.zeros(value.size)
-    regular[2:-2] = np.lib.stride_tricks.sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
-    size = np.zeros(value.size)
-    size[2:-2] = np.abs(np.convolve(value, FOURTH, mode="valid"))
-    share = uniform_filter1d(regular, width)
-    mean = uniform_filter1d(size * regular, width) / np.maximum(share, 0.1)
-    sigma = mean * np.sqrt(np.pi / 2.0) / np.sqrt(FOURTH @ FOURTH)
-    jitter = 1.4826 * float(np.median(np.abs(spacing - period)))
-    slope = np.gradient(uniform_filter1d(value, _samples(0.1, period)), time)
-    excess = sigma**2 - jitter**2 * uniform_filter1d(slope**2, width)
-    return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
 
 
 def _without(signal: Signal, intervals: Intervals) -> Signal:
@@ -315,7 +288,7 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
                 continue
             if _went_on(signal, int(i), presliding):
                 continue
-            after = slice(i + 1, None, _samples(0.2, period))
+            after = slice(i + 1, None, samples_in(0.2, period))
             turned = np.cumsum(np.abs(np.diff(signal.value[after], prepend=signal.value[i + 1])))
             forgotten = np.searchsorted(turned, FORGOTTEN * presliding)
             start, end = float(time[i]), float(time[after][min(int(forgotten), turned.size - 1)])
@@ -333,11 +306,12 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
 
 
 def _went_on(signal: Signal, last: int, presliding: float) -> bool:
-    """The track moved through the gap after sample ``last`` as it did before and after it, so nothing happened unseen."""
+    """The track turned one way through the gap after sample ``last``, so friction is as if it had been seen.
+
+    It did where one change from the rate before to that after makes it turn as far as it has, or where it went on at one rate.
+    """
     time, value = signal.time_s, signal.value
     gap = float(time[last + 1] - time[last])
-    if gap > LONGEST_UNSEEN_S:
-        return False
     ends = []
     for part in (slice(max(last - EDGE_SAMPLES, 0), last + 1), slice(last + 1, last + 2 + EDGE_SAMPLES)):
         if time[part].size < 3 or float(np.diff(time[part]).max()) > _gap_limit(float(np.median(np.diff(time)))):
@@ -345,9 +319,12 @@ def _went_on(signal: Signal, last: int, presliding: float) -> bool:
         slope, offset = np.polyfit(time[part] - time[last], value[part], 1)
         ends.append((float(slope), float(offset)))
     (before, from_), (after, back) = ends
-    turned = back + after * gap - from_
-    expected = 0.5 * (before + after) * gap
-    return before * after >= -((WENT_ON * presliding / gap) ** 2) and abs(turned - expected) < WENT_ON * presliding
+    turned, slack = back + after * gap - from_, WENT_ON * presliding
+    if before * after < -((slack / gap) ** 2):
+        return False
+    least, most = sorted((before * gap, after * gap))
+    never_stood = min(abs(least), abs(most)) > max(slack, 0.5 * max(abs(least), abs(most)))
+    return least - slack < turned < most + slack and (gap <= LONGEST_UNSEEN_S or never_stood)
 
 
 def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool:
@@ -386,22 +363,21 @@ def _examine(
     spikes = [(a, b) for a, b in look.runs(_spikes(look) & keep) if b - a < SPIKE_SAMPLES and _returns(look, a, b)]
     for first, last in spikes:
         keep[first : last + 1] = False
-    noisy = _noise_change(look, keep)
-    for first, last in noisy:
-        keep[first : last + 1] = False
+    noisy = _noise_change(look, keep, by_level=channel.kind is not Kind.ANGLE)
+    if channel.kind is Kind.ANGLE:  # what it seems to move there would pass for friction
+        for first, last in noisy:
+            keep[first : last + 1] = False
     # Where the noise changes, the scatter that spikes are measured by is wrong.
     spikes = [(a, b) for a, b in spikes if not any(first <= b and a <= last for first, last in _widened(look, noisy))]
     report("spikes", look.intervals(spikes), f"{counted(len(spikes), 'isolated outlier')}, not used; check shielding and connectors")
     at = look.intervals(noisy)
-    report(
-        "noise_change", at,
-        f"noise more than {NOISE_RATIO:g} times that of the rest of the run for {_total(at):.1f} s; not used there",
-    )  # fmt: skip
+    where, so = ("of the rest of the run", "not used") if channel.kind is Kind.ANGLE else ("usual at such a load", "counts as much less")
+    report("noise_change", at, f"noise more than {LOUDER:g} times that {where} for {_total(at):.1f} s; {so} there")
     return found, keep
 
 
 def _widened(look: _Look, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    width = _samples(WINDOW_S, look.period)
+    width = samples_in(WINDOW_S, look.period)
     return [(first - width, last + width) for first, last in runs]
 
 
@@ -484,7 +460,7 @@ def _spikes(look: _Look) -> Mask:
     trend = uniform_filter1d(middle, width)
     flat = look.value - trend  # on a slope an outlier would only swap ranks with its neighbours
     off = np.abs(flat - median_filter(flat, width, mode="nearest"))
-    scatter = 1.4826 * median_filter(off, _samples(WINDOW_S, look.period), mode="reflect")
+    scatter = 1.4826 * median_filter(off, samples_in(WINDOW_S, look.period), mode="reflect")
     noise = 1.4826 * float(np.median(np.abs(np.convolve(look.value, FOURTH, mode="valid")))) / np.sqrt(FOURTH @ FOURTH)
     steepest = uniform_filter1d(np.abs(np.gradient(trend, look.time)) * look.period, width)
     limit = SPIKE_SIGMA * np.maximum(scatter, max(look.floor, look.resolution, noise)) + steepest
@@ -500,14 +476,11 @@ def _returns(look: _Look, first: int, last: int) -> bool:
     return bool(abs(after - before) < 0.5 * height + (last - first + 2) * usual)
 
 
-def _noise_change(look: _Look, keep: Mask) -> list[tuple[int, int]]:
-    """Stretches longer than NOISE_S with more than NOISE_RATIO times the noise of the quieter part of the run."""
-    if look.period > 1.0 / NOISE_RATE_HZ or keep.sum() < 2 * _samples(WINDOW_S, look.period):
+def _noise_change(look: _Look, keep: Mask, *, by_level: bool) -> list[tuple[int, int]]:
+    """Stretches where a channel is clearly noisier than usual."""
+    kept = np.flatnonzero(keep)
+    if kept.size < 2:
         return []
-    sigma = np.zeros(look.value.size)
-    sigma[keep] = _white_noise(look.time[keep], look.value[keep], look.period)
-    quiet = max(float(np.quantile(sigma[keep], 0.25)), look.floor)
-    return [
-        (first, last) for first, last in look.runs(sigma > NOISE_RATIO * quiet, 0.5 * WINDOW_S)
-        if look.time[last] - look.time[first] > NOISE_S
-    ]  # fmt: skip
+    loud = np.zeros(keep.size, bool)
+    loud[kept] = louder(Signal(look.time[kept], look.value[kept]), look.sheet, by_level=by_level) > 1.0
+    return look.runs(loud, 0.5 * WINDOW_S)

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import uniform_filter1d
 
 from lugre_steering.data.stamps import evened
-from lugre_steering.recording import Array, Signal
+from lugre_steering.recording import Array, Mask, Signal
 
 FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 """Fourth difference: blind to motion and to pump ripple far below the sampling rate, sqrt(70) times white noise."""
@@ -25,6 +26,11 @@ WORSE, LATE_S = 1.5, 1e-3
 """Times the sheet's noise, and scatter of stamps [s], from which a sensor or its clock is worth a finding."""
 STEPS_SEEN = 0.9
 """Share of neighbouring levels that are whole multiples of the resolution, if it is one."""
+LOUDER, LOUD_S, SLOWEST_HZ = 2.0, 2.0, 20.0
+"""Times the usual noise, for longer than so many seconds, that is a change of it; slower channels cannot tell noise from motion."""
+LEVELS, QUIETER = 8, 0.25
+"""Parts of a channel's range of which each has its usual noise, as ripple grows with the load; and the share of a part's samples that
+are quieter than that: the rest may be disturbed."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,65 @@ def white_noise(signal: Signal) -> float:
         return 0.0
     mean = np.bincount(window, squares * whole)[full] / count[full]
     return float(np.sqrt(np.median(mean) / (FOURTH @ FOURTH)))
+
+
+def local_noise(signal: Signal, period: float) -> Array:
+    """Standard deviation (n,) of the white part around each sample, from fourth differences over WINDOW_S.
+
+    What stamp jitter makes of a slope is taken off; windows with a lost message do not count.
+    """
+    time, value = signal.time_s, signal.value
+    width = samples_in(WINDOW_S, period)
+    spacing = np.diff(time)
+    regular = np.zeros(value.size)
+    regular[2:-2] = sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
+    size = np.zeros(value.size)
+    size[2:-2] = np.abs(np.convolve(value, FOURTH, mode="valid"))
+    share = uniform_filter1d(regular, width)
+    mean = uniform_filter1d(size * regular, width) / np.maximum(share, 0.1)
+    sigma = mean * np.sqrt(np.pi / 2.0) / np.sqrt(FOURTH @ FOURTH)
+    jitter = 1.4826 * float(np.median(np.abs(spacing - period)))
+    slope = np.gradient(uniform_filter1d(value, samples_in(0.1, period)), time)
+    excess = sigma**2 - jitter**2 * uniform_filter1d(slope**2, width)
+    return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
+
+
+def louder(signal: Signal, sheet: float, *, by_level: bool) -> Array:
+    """How many times its usual noise, that of its ``sheet`` at least, a channel has around each sample (n,); 1 unless it is LOUDER for
+    LOUD_S.
+
+    ``by_level``: what is usual goes with the level of the signal, as ripple with the load.
+    """
+    period = float(np.median(np.diff(signal.time_s)))
+    found = np.ones(signal.value.size)
+    if period > 1.0 / SLOWEST_HZ or signal.value.size < 2 * samples_in(WINDOW_S, period):
+        return found
+    sigma, level = local_noise(signal, period), np.abs(uniform_filter1d(signal.value, samples_in(WINDOW_S, period)))
+    floor = max(sheet, 0.5 * resolution(signal.value), 1e-9 * float(level.max()))
+    parts = np.array_split(np.argsort(level), LEVELS if by_level else 1)
+    middles = [float(np.median(level[part])) for part in parts]
+    usual = np.maximum(np.interp(level, middles, [float(np.quantile(sigma[part], QUIETER)) for part in parts]), floor)
+    for first, last in stretches(signal.time_s, sigma > LOUDER * usual, 0.5 * WINDOW_S):
+        if signal.time_s[last] - signal.time_s[first] > LOUD_S:
+            found[first : last + 1] = np.maximum(sigma[first : last + 1] / usual[first : last + 1], 1.0)
+    return found
+
+
+def stretches(time: Array, mask: Mask, bridge_s: float = 0.0) -> list[tuple[int, int]]:
+    """(first, last) sample of each stretch of ``mask`` (n,); stretches less than ``bridge_s`` apart count as one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    merged: list[tuple[int, int]] = []
+    for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+        if merged and time[first] - time[merged[-1][1]] < bridge_s:
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    return merged
+
+
+def samples_in(duration_s: float, period: float) -> int:
+    """Samples in a stretch of time, three at least."""
+    return max(3, round(duration_s / period))
 
 
 def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -> str | None:

@@ -84,13 +84,14 @@ def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     as they look after detrending, and exchanged for what those are before it.
     """
     dt = runs[0].time[1] - runs[0].time[0]
-    stretches = [run.measured[part] / run.sigma[part] for run in runs for part in standstill(run)]
+    stretches = [np.array([run.measured[part], run.sigma[part]]) for run in runs for part in standstill(run)]
     order = max(2, round(AR_ORDER_S / dt))
-    size = min(round(CHUNK_S / dt), int(np.median([stretch.size for stretch in stretches]))) if stretches else 0
-    chunks = [s[k : k + size] for s in stretches for k in range(0, s.size - size + 1, max(size, 1))]
+    size = min(round(CHUNK_S / dt), int(np.median([stretch.shape[1] for stretch in stretches]))) if stretches else 0
+    chunks = [s[:, k : k + size] for s in stretches for k in range(0, s.shape[1] - size + 1, max(size, 1))]
     if size <= 2 * order or len(chunks) * size * dt < MIN_QUIET_S:
         return QuietNoise(1.0, np.ones(1), assumed=True)
-    clean = _detrend(np.array(chunks).T)
+    torque, sigma = np.moveaxis(np.array(chunks), 1, 0)
+    clean = _detrend(torque.T) / sigma.T
     seen = _autocovariance(clean, order)
     memories = np.exp(-np.arange(size) / np.maximum(np.array(MEMORIES_S) / dt, 1e-9)[:, None])
     memories[0] = np.arange(size) == 0
