@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.conclude.late import begun_late, timed_by_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
-from lugre_steering.diagnosis.laws.rival import in_place, keeps_names, leaves_names, room_for_laws
+from lugre_steering.diagnosis.laws.rival import in_place, in_place_of_one, keeps_names, leaves_names, room_for_laws
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.fit import fit
@@ -121,8 +121,9 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
         return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
     beside = find(done, done.freely, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):
-        beside = beside or find(done, done.freely, seed, progress)
-        if beside is None or not keeps_names(done, beside, alone):
+        swapped = in_place_of_one(done, alone, seed)
+        beside = swapped or beside or find(done, done.freely, seed, progress)
+        if beside is None or not (swapped or keeps_names(done, beside, alone)):
             nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
             return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
     elif beside is not None and not leaves_names(done, beside):

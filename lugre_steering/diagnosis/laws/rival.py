@@ -4,8 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
+from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
 from lugre_steering.diagnosis.loudness import excess
@@ -55,17 +59,46 @@ def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
     return parts <= len(alone.gains) and beside.beyond(done.held) <= alone.beyond(done.held) and leaves_names(done, beside)
 
 
+def in_place_of_one(done: Finished, alone: FoundLaws, seed: int) -> FoundLaws | None:
+    """The names in place of one of the laws ``alone``, with the others beside them, if that is no less evident: then what the names do not
+    explain is what another law is there for. None where no law can be spared."""
+    best, energy = None, np.inf
+    for index in range(len(alone.gains)):
+        swapped = _swapped(done, alone, index, seed)
+        mine, laws, base = _energies(done, [beside_form(done, swapped), beside_form(done, alone)])
+        if mine < laws + MARGIN * (base - laws) and mine < energy and leaves_names(done, swapped):
+            best, energy = swapped, mine
+    return best
+
+
+def _swapped(done: Finished, alone: FoundLaws, index: int, seed: int) -> FoundLaws:
+    """Laws without one of them, beside the names."""
+    names, rest = done.freely, [effect for i, effect in enumerate(alone.fitted.effects) if i != index]
+    problem = Problem(done.problem.vehicle, done.problem.runs, done.problem.calibrations, more_laws=MOST_LAWS, beside_names=True)
+    effects, x = [*names.effects, *rest], alone.fitted.x[: problem.nuisances]
+    fitted, whole = (fit(problem, weight, effects, x, linearisations=12) for weight in (done.fitted, done.weight))
+    judged = verify.verify(problem, done.weight, names, fitted, done.roles, seed)
+    gains = tuple(gain for i, gain in enumerate(alone.gains) if i != index)
+    return replace(alone, problem=problem, fitted=fitted, fit=whole, judged=judged, gains=gains, ties=alone.ties if index else ())
+
+
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:
-    """By the doubt of the model that leaves least in doubt; a name wins a draw."""
+    """A name wins a draw."""
+    there = done.compared
+    mine, names, base = _energies(done, [beside_form(done, laws), (there.problem, there.fitted, there.found.final)])
+    return mine < names - MARGIN * (base - names)
+
+
+def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> list[float]:
+    """What models leave, with what their values cost, and what the baseline does: by the doubt of the one that leaves least in doubt."""
     there, weight = done.compared, done.compared.fitted
-    named = there.problem, there.found.final
-    law = settled(*beside_form(done, laws))
-    least = min(named[0].doubt, law[0].doubt)
+    known = [settled(*model) for model in models]
+    least = min(problem.doubt for problem, _ in known)
     energies = []
-    for problem, result in (named, law, (there.problem, there.found.baseline)):
+    for problem, result in (*known, (there.problem, there.found.baseline)):
         problem, result = settled(problem, weight, fit(problem, weight, result.effects, result.x), least)
         energies.append(left(problem, result) + PER_VALUE * least * sum(len(candidate.free) for candidate, _ in result.effects))
-    return energies[1] < energies[0] - MARGIN * (energies[2] - energies[0])
+    return energies
 
 
 def beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
