@@ -198,14 +198,17 @@ class World:
         message.header.stamp = to_time(stamp_ns)
         self._publishers[self._topics[channel]].publish(message)
 
-    def play(self, samples: Sequence[Sample], speed: float = 1.0) -> None:
-        """Publish samples in order, paced by their stamps."""
+    def play(self, samples: Sequence[Sample], speed: float = 1.0, until: Callable[[], bool] = lambda: False) -> bool:
+        """Publish samples in order, paced by their stamps, all or ``until`` something has come; whether it has."""
         begin, first = time.monotonic(), samples[0].stamp_ns
         for sample in samples:
+            if until():
+                return True
             wait = begin + (sample.stamp_ns - first) / SECOND / speed - time.monotonic()
             if wait > 0.0:
                 time.sleep(wait)
             self.send(sample)
+        return until()
 
     def stamps(self, topic: str) -> list[int]:
         return [to_ns(message.header.stamp) for message in self.heard[topic]]
@@ -214,6 +217,9 @@ class World:
         """Level, message and values of a component from the next diagnostics message."""
         seen = len(self.heard["diagnostics"])
         self.wait(lambda: len(self.heard["diagnostics"]) > seen, timeout_s)
+        return self.last_status(component)
+
+    def last_status(self, component: str) -> tuple[bytes, str, dict[str, str]]:
         status = next(s for s in self.heard["diagnostics"][-1].status if s.name == f"{NAME[1:]}: {component}")
         return status.level, status.message, {pair.key: pair.value for pair in status.values}
 
