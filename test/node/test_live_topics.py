@@ -242,7 +242,7 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
         world.command.publish(early)
         world.wait(lambda: len(refused()) == 1)
         world.play(still[:50])
-        world.wait(lambda: len(world.heard["torque"]) == 50)
+        world.wait(lambda: len(world.heard["torque"]) == 25)
         world.command.publish(good)
         for message in bad:  # one by one: a node that is given little time leaves out what comes at once
             before = len(refused())
