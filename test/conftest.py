@@ -7,13 +7,16 @@ from collections.abc import Iterator
 
 import pytest
 from catalogue import put_back
+from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ["LUGRE_STEERING_CONFIG"] = "/nowhere/defaults.yaml"  # what a developer has saved changes no test
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LUGRE_STEERING_THREADS", "1")
-
+# Other tests have the processors as well: how long an example takes says nothing.
+settings.register_profile("shared", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("shared")
 
 LONGEST = (
     "test_engine_names.py", "test_rigs.py", "test_engine.py", "test_own_physics.py", "test_laws_found.py", "test_replay.py", "test_docs.py",

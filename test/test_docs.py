@@ -83,7 +83,7 @@ def test_nothing_of_the_site_is_wider_than_a_phone(site: Path) -> None:
     host.write_text(f"<!doctype html><body>{frames}{WIDTHS}</body>", encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", f"--user-data-dir={site / 'profile'}"]
     command = [str(CHROMIUM), *options, "--virtual-time-budget=10000", "--dump-dom", host.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=600)
     told = re.search(r'data-told="([^"]*)"', done.stdout)
     assert told is not None, done.stderr
     widest = {page: max(widths) for page, widths in zip(pages, json.loads(told[1]), strict=True)}

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lugre_steering.bench import untold
 from lugre_steering.bench.neighbour import Strokes
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
@@ -26,7 +27,8 @@ from lugre_steering.vehicle.sections import EffectEntry
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
 T0 = 1_790_000_000_000_000_000
-PERIOD_NS = 10_000_000
+SECOND = 1_000_000_000
+PERIOD_NS = SECOND // 100
 SIGMA = math.radians(0.01)
 BEGIN_S, END_S = 6.0, 10.0
 FRICTION_NM = 24e3
@@ -685,3 +687,56 @@ def test_rates_that_never_went_with_the_angle_or_always_do_contradict_nothing(ra
         return angle if t < 17.0 else (1.0, 0.95)[side] * 0.3 * math.sin(0.7 * 17.0)
 
     assert not rated(lambda side, t, value: rate(side, t, value) if t < 17.1 else 0.0, stopped)[1].any()
+
+
+def frozen_at(readings: Array, rate_Hz: int = 100) -> Array:
+    """Times [s] at which an angle is told to be frozen; readings (samples,) of both sides, each with noise of its own added before."""
+    estimator, told = Estimator(VEHICLE), []
+    for i, pair in enumerate(readings):
+        for side in (0, 1):
+            rows = estimator.push(side, T0 + i * SECOND // rate_Hz, float(pair[side]))[0]
+            told += [i / rate_Hz for row in rows if "angle frozen" in doubts(row)]
+    return np.array(told)
+
+
+def crawl(seconds: float, rate_Hz: int, noise: float = SIGMA) -> Array:
+    """Stands for 4 s, then turns at 0.01 rad/s: angles (samples, 2) [rad]."""
+    time = np.arange(0.0, seconds, 1.0 / rate_Hz)
+    turned = 0.1 + 0.01 * np.maximum(0.0, time - 4.0)
+    return turned[:, None] + np.random.default_rng(3).normal(0.0, noise, (time.size, 2))
+
+
+@pytest.mark.parametrize("rate_Hz", [60, 100, 500])
+def test_two_encoders_that_freeze_together_in_a_slow_drive_are_told_within_a_fifth_of_a_second(rate_Hz: int) -> None:
+    """Neither side moves and no torque swings: that a reading with noise repeats is all there is to see."""
+    angles = crawl(14.0, rate_Hz)
+    begin, end = 8 * rate_Hz, 10 * rate_Hz
+    angles[begin:end] = angles[begin]
+    told = frozen_at(angles, rate_Hz)
+    assert 8.0 < told[0] <= 8.2
+    assert told.size == pytest.approx(end - told[0] * rate_Hz, abs=0.05 * rate_Hz)  # until it is over, and no longer
+
+
+@pytest.mark.parametrize(("noise", "step"), [(0.0, 0.0), (0.0, 0.5 * SIGMA), (SIGMA, 2.0 * SIGMA), (0.5 * SIGMA, SIGMA)])
+def test_a_reading_whose_noise_is_not_to_be_seen_may_repeat(noise: float, step: float) -> None:
+    angles = crawl(14.0, 100, noise)
+    angles[800:1000] = angles[800]
+    assert frozen_at(step * np.round(angles / step) if step else angles).size == 0
+
+
+def test_what_the_guide_says_of_faults_that_hardly_anything_tells() -> None:
+    found = untold.frozen(VEHICLE, 7.0)
+    assert max(found["repeats, noise was seen"]) < 0.12
+    assert 0.2 < max(found["keeps its noise"]) < 3.5  # at the next reversal
+    drift = untold.drifting(VEHICLE, 0.05)
+    assert drift["reason"] == "left and right angle contradict"
+    assert 4.0 <= float(drift["told_s"]) < 7.0  # 0.2 rad, and what the geometry allows
+
+
+def test_an_angle_whose_noise_comes_and_goes_while_it_stands_is_frozen_once_at_most() -> None:
+    """As where the noise is of an engine that is switched off."""
+    running = np.random.default_rng(3).normal(0.1, SIGMA, (400, 2))
+    off = np.full((400, 2), 0.1)
+    told = frozen_at(np.concatenate([running, off, running, off, running]))
+    assert 4.0 < told.min() <= 4.2
+    assert told.max() <= 8.1

@@ -215,11 +215,11 @@ def test_a_bag_that_grows_is_left_for_the_next_run(tmp_path: Path) -> None:
 
     def record() -> None:
         with growing.open("ab") as file:
-            for place in range(len(content) - 20_000, len(content), 40):
-                file.write(content[place : place + 40])
+            for place in range(len(content) - 20_000, len(content)):  # for longer than any run takes
+                file.write(content[place : place + 1])
                 file.flush()
                 if stop.wait(0.02):
-                    file.write(content[place + 40 :])
+                    file.write(content[place + 1 :])
                     return
 
     recorder = threading.Thread(target=record)

@@ -39,9 +39,9 @@ PAGE = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
 
 
 def loaded_by(code: str) -> tuple[float, set[str]]:
-    """Seconds that ``import lugre_steering`` takes, and the packages that are loaded after ``code``."""
+    """Seconds of a processor that ``import lugre_steering`` takes, and the packages that are loaded after ``code``."""
     program = (
-        "import sys, time; before = time.perf_counter(); import lugre_steering as ls; took = time.perf_counter() - before\n"
+        "import sys, time; before = time.process_time(); import lugre_steering as ls; took = time.process_time() - before\n"
         f"{code}\nprint(took, *{{name.split('.')[0] for name in sys.modules}})"
     )
     done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True)

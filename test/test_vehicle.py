@@ -386,7 +386,7 @@ def paths(node: Any, prefix: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.data(), st.sampled_from([SHEET, JOINT]))
 def test_any_mutation_gives_a_vehicle_or_a_clear_error(data: st.DataObject, original: dict[str, Any]) -> None:
     sheet = copy.deepcopy(original)
@@ -414,7 +414,7 @@ def test_any_mutation_gives_a_vehicle_or_a_clear_error(data: st.DataObject, orig
     assert str(FILE) in message
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.binary(max_size=80), st.integers(0, 3000))
 def test_any_bytes_give_a_vehicle_or_a_clear_error(noise: bytes, position: int) -> None:
     text = FILE.read_bytes()
@@ -536,7 +536,7 @@ PIECES = [b"&a ", b"*a", b"<<: ", b"[", b"]", b"{", b"}", b"- ", b"? ", b": ", b
 hostile = st.lists(st.tuples(st.integers(0, 4000), st.sampled_from(PIECES) | st.binary(max_size=6)), min_size=1, max_size=4)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.sampled_from([(FILE.read_bytes(), load), (PARAMETERS, read_options), (DRIVE, from_yaml)]), hostile)
 def test_any_text_gives_a_result_or_one_line(given: tuple[bytes, Callable[[Path], Any]], inserted: list[tuple[int, bytes]]) -> None:
     """Vehicle, parameter and manoeuvre files with YAML's own signs put anywhere."""
@@ -557,7 +557,7 @@ def test_any_text_gives_a_result_or_one_line(given: tuple[bytes, Callable[[Path]
     assert "\n" not in said
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.sampled_from([path for path in paths(SHEET) if not isinstance(path[-1], int)]), st.floats() | st.integers(-(10**40), 10**40))
 def test_any_number_anywhere_gives_a_finite_sheet_or_one_line(path: tuple[Any, ...], number: float) -> None:
     sheet = copy.deepcopy(SHEET)

@@ -35,6 +35,8 @@ from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.vehicle.model import baseline_parameters
 
 FAULT_S, REST_S = 0.8, 1.8
+HEARD_S = 5.0
+"""So long, at most, an answer is on its way."""
 RATED_S = 15.0
 """More motion than rates must go with before they count as a witness."""
 TOLD_S, RECOVERED_S = 0.2, 1.0
@@ -363,7 +365,7 @@ def parameters_set_wrongly(campaign: Campaign) -> bool:
     refused = []
     for name, value in wrong.items():
         future = client.call_async(SetParametersAtomically.Request(parameters=[Parameter(name=name, value=value)]))
-        end = time.monotonic() + 5.0
+        end = time.monotonic() + HEARD_S
         while not future.done() and time.monotonic() < end:
             time.sleep(0.01)
         refused.append(future.done() and not future.result().result.successful)
@@ -375,7 +377,9 @@ def killed(campaign: Campaign, number: int) -> tuple[bool, float]:
     neighbour = campaign.neighbour
     neighbour.wait_until_it_moves()
     campaign.node.stop(number)
-    time.sleep(0.2)
+    end = time.monotonic() + HEARD_S
+    while neighbour.commands[-1][1] != 0.0 and time.monotonic() < end:
+        time.sleep(0.01)
     zero = neighbour.commands[-1][1] == 0.0
     begin = time.monotonic()
     campaign.node = NodeProcess(campaign.vehicle_file, campaign.log, *campaign.arguments)

@@ -44,6 +44,13 @@ STANDING_SIGMA = 5.0
 """A reading this many times its noise from where it stood has moved: chance alone does that once in 200 000 samples."""
 STILL_NS = 100_000_000
 STILL_SAMPLES = 5
+SETTLED_SAMPLES = 20
+"""A reading that stands since so many samples goes by less than a quarter of its noise from one to the next."""
+JITTERY, JITTER_SAMPLES = 0.58, 200
+"""Of white noise two changes of three go back on the one before; where more than this share did, over so many samples of a reading that
+stands, its noise is to be seen."""
+REPEATED = 10
+"""Such an encoder has steps of less than a third of its noise, and one sample of eleven repeats: ten in a row do once in many years."""
 UNSEEN_STEPS = 3.0
 """Motion of so many of an encoder's steps must change its reading, though the sides do not go equally far."""
 CREEP_MEMORY_S = 1.0
@@ -90,6 +97,8 @@ GUARD = np.dtype(
         ("still_ns", np.int64),  # since when the reading has not changed by more than its noise
         ("still", np.int64),  # samples since
         ("same", np.int64),  # samples in a row that were equal to the one before
+        ("settled", np.int64),  # changes while the joint hardly moved
+        ("jitter", np.float64),  # share of them, of late, that went back on the one before
         ("place", np.float64),  # where it stands: mean of the first of them [rad]
         ("still_other", np.float64),  # angle of the other side then, followed slowly [rad]; NaN: none yet
         ("apart", np.int64),  # samples in a row for which the other side was away from there
@@ -117,9 +126,10 @@ def _stand(g, stamp_ns, value):
 
 @inner
 def _thaw(core, side, ch, stamp_ns, value):
-    """A frozen angle moves: if it goes on from where it was, it may have been sound and only stood."""
+    """A frozen angle moves, or has its noise again: if it goes on from where it was, it may have been sound and only stood."""
     g = core.guard[side]
-    if abs(value - g.frozen_at) <= UNSEEN_SIGMA * core.config[0].angle_noise:
+    alive = _repeating(g) and value != ch.last_value
+    if not alive and abs(value - g.frozen_at) <= UNSEEN_SIGMA * core.config[0].angle_noise:
         return
     g.stands = g.stands or reachable(core, side, ch.last_ns, stamp_ns, value - ch.last_value)
     lose_sight(core, side, stamp_ns, value, (stamp_ns - g.frozen_ns) * 1e-9)
@@ -134,6 +144,9 @@ def watch(core, side, ch, stamp_ns, dt, value):
     if g.frozen_ns != 0:
         _thaw(core, side, ch, stamp_ns, value)
     same = g.same + 1 if change == 0.0 else 0
+    if g.still >= SETTLED_SAMPLES and same < STILL_SAMPLES:  # a frozen reading teaches nothing about a sound one
+        g.settled = min(JITTER_SAMPLES, g.settled + 1)
+        g.jitter += ((1.0 if change * g.before < 0.0 else 0.0) - g.jitter) / g.settled
     if change != 0.0 and dt > 0.0:
         g.step = min(abs(change), g.step) if g.step > 0.0 else abs(change)
     if dt <= 0.0 or abs(value - g.place) > STANDING_SIGMA * sigma:
@@ -144,6 +157,12 @@ def watch(core, side, ch, stamp_ns, dt, value):
             g.place += (value - g.place) / (g.still + 1)
         g.same = same
     learn_noise(core, side, dt, change)
+
+
+@inner
+def _repeating(g):
+    """Whether a reading whose noise is to be seen repeats."""
+    return g.settled == JITTER_SAMPLES and g.jitter > JITTERY and g.same >= REPEATED
 
 
 @inner
@@ -213,6 +232,8 @@ def angle_doubts(core, side, dt, stamp_ns):
         found |= JUMPED
     if core.motion.size > 1 and c.angle_noise > 0.0:
         _watch_other(core, side, dt, stamp_ns)
+    if _repeating(g) and not g.stands and g.same * dt * 1e9 >= STILL_NS:
+        _freeze(core, side)
     if g.frozen_ns != 0:
         found |= FROZEN
     if g.unseen_ns != 0:

@@ -50,7 +50,7 @@ def test_encoded_columns_equal_rosbags_byte_for_byte(frame: str) -> None:
                 assert bytes(encoded[i]) == make.joint_state(int(t), names, *arrays, frame=frame)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     frame=st.text(max_size=9),
     names=st.lists(

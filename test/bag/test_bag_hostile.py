@@ -143,11 +143,11 @@ def test_a_chunk_that_unpacks_without_end(tmp_path: Path, kind: str, declared: i
     data = file.read_bytes()
     end = data.rindex(b"\x0f" + struct.pack("<Q", 4))
     file.write_bytes(data[:end] + chunk(kind, zeros(kind, 1000), declared) * 5 + data[end:])
-    begin = time.monotonic()
+    begin = time.process_time()
     count, said = values(file)
     assert count == len(make.steering(1.0))
     assert "unpack" in said
-    assert time.monotonic() - begin < 10.0
+    assert time.process_time() - begin < 10.0  # other programs may have the processors
 
 
 def test_a_compressed_file_that_unpacks_without_end(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_chunks_of_messages_without_end(tmp_path: Path, padding: int, records_of
     count, said = values(file)
     assert count == len(messages)
     assert "unpack to more than" in said
-    assert time.process_time() - begin < 10.0  # other programs may have the processors
+    assert time.process_time() - begin < 10.0
 
 
 def test_a_long_recording_in_well_packed_chunks_is_read_to_its_end(tmp_path: Path) -> None:

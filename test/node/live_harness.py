@@ -14,6 +14,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,6 +39,10 @@ PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 VEHICLE = PACKAGE_ROOT / "config" / "test_vehicle.yaml"
 DOMAIN = 1 + os.getpid() % 100
 START_TIMEOUT_S = 240.0  # a first start compiles
+PATIENCE_S = 60.0
+"""What is waited for comes at once where nothing is wrong, and at last on a machine that is busy with all other tests."""
+STOP_S = 10.0
+"""Supervisors kill what is not gone then; the ramp to zero takes two seconds of it at most."""
 NAME = "/steering_torque_estimator"
 SECOND = 1_000_000_000
 T0 = 1_700_000_000 * SECOND
@@ -60,6 +65,14 @@ class Sample(NamedTuple):
     stamp_ns: int
     value: float
     rate: float = math.nan
+
+
+class Status(NamedTuple):
+    """What a diagnostics message says about one component."""
+
+    level: bytes
+    message: str
+    values: dict[str, str]
 
 
 def to_time(stamp_ns: int) -> Time:
@@ -103,7 +116,7 @@ class Live:
         """Exit code, and seconds it took."""
         begin = time.monotonic()
         self.process.send_signal(number)
-        return self.process.wait(timeout=20.0), time.monotonic() - begin
+        return self.process.wait(timeout=PATIENCE_S), time.monotonic() - begin
 
     def __enter__(self) -> LiveNode:
         return self
@@ -111,7 +124,7 @@ class Live:
     def __exit__(self, *_: object) -> None:
         if self.process.poll() is None:
             self.process.terminate()
-            self.process.wait(timeout=20.0)
+            self.process.wait(timeout=PATIENCE_S)
         self.log.unlink()
 
 
@@ -162,8 +175,8 @@ class World:
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
         matched = [*self._publishers.values(), self.command]
-        self.wait(lambda: all(publisher.get_subscription_count() for publisher in matched), 20.0)
-        self.wait(lambda: bool(self.heard["diagnostics"]), 20.0)  # the way back works as well
+        self.wait(lambda: all(publisher.get_subscription_count() for publisher in matched))
+        self.wait(lambda: bool(self.heard["diagnostics"]))  # the way back works as well
         time.sleep(0.2)
 
     def _spin(self) -> None:
@@ -172,8 +185,8 @@ class World:
 
     def _listen(self, message: type, topic: str, name: str) -> None:
         def keep(received: Any) -> None:
-            self.heard[name].append(received)
             self.arrived[name].append(time.monotonic())
+            self.heard[name].append(received)
 
         self.node.create_subscription(message, topic, keep, QoSProfile(depth=10_000))
 
@@ -185,7 +198,7 @@ class World:
         self._thread.join(5.0)
         self._executor.shutdown()
 
-    def wait(self, condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    def wait(self, condition: Callable[[], bool], timeout_s: float = PATIENCE_S) -> None:
         deadline = time.monotonic() + timeout_s
         while not condition():
             assert time.monotonic() < deadline, "waited in vain"
@@ -198,24 +211,34 @@ class World:
         message.header.stamp = to_time(stamp_ns)
         self._publishers[self._topics[channel]].publish(message)
 
-    def play(self, samples: Sequence[Sample], speed: float = 1.0) -> None:
-        """Publish samples in order, paced by their stamps."""
+    def play(self, samples: Sequence[Sample], speed: float = 1.0, until: Callable[[], bool] = lambda: False) -> bool:
+        """Publish samples in order, paced by their stamps, all or ``until`` something has come; whether it has."""
         begin, first = time.monotonic(), samples[0].stamp_ns
         for sample in samples:
+            if until():
+                return True
             wait = begin + (sample.stamp_ns - first) / SECOND / speed - time.monotonic()
             if wait > 0.0:
                 time.sleep(wait)
             self.send(sample)
+        return until()
 
     def stamps(self, topic: str) -> list[int]:
         return [to_ns(message.header.stamp) for message in self.heard[topic]]
 
-    def status(self, component: str, timeout_s: float = 5.0) -> tuple[bytes, str, dict[str, str]]:
-        """Level, message and values of a component from the next diagnostics message."""
+    def statuses(self, component: str, since: int = 0) -> list[Status]:
+        """What all diagnostics messages, or those after so many, say about a component."""
+        found = (s for message in self.heard["diagnostics"][since:] for s in message.status if s.name == f"{NAME[1:]}: {component}")
+        return [Status(s.level, s.message, {pair.key: pair.value for pair in s.values}) for s in found]
+
+    def status(self, component: str, wanted: Callable[[Status], bool] = lambda _: True) -> Status:
+        """What is said next about a component, or next such that it is as ``wanted``: reports come when they like."""
         seen = len(self.heard["diagnostics"])
-        self.wait(lambda: len(self.heard["diagnostics"]) > seen, timeout_s)
-        status = next(s for s in self.heard["diagnostics"][-1].status if s.name == f"{NAME[1:]}: {component}")
-        return status.level, status.message, {pair.key: pair.value for pair in status.values}
+        deadline = time.monotonic() + PATIENCE_S
+        while not (found := [status for status in self.statuses(component, seen) if wanted(status)]):
+            assert time.monotonic() < deadline, f"never told; last: {self.statuses(component)[-1:]}"
+            time.sleep(0.01)
+        return found[0]
 
 
 def message_of(vehicle: Vehicle, sample: Sample) -> Any:
@@ -287,10 +310,17 @@ class Driver:
             self.time += now - last  # a busy machine makes gaps, no haste afterwards
             last = now
 
+    def steer_until(self, condition: Callable[[], bool], fault: Callable[[int, float], float] = lambda _, angle: angle) -> None:
+        """Steer on, however slow this machine is, until what is waited for has come."""
+        end = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < end, "steered in vain"
+            self.steer(PERIOD_S, fault)
 
-def call(world: World, kind: Any, name: str, request: Any, timeout_s: float = 20.0) -> Any:
+
+def call(world: World, kind: Any, name: str, request: Any, timeout_s: float = PATIENCE_S) -> Any:
     client = world.node.create_client(kind, name)
-    assert client.wait_for_service(timeout_sec=10.0)
+    assert client.wait_for_service(timeout_sec=PATIENCE_S)
     future = client.call_async(request)
     world.wait(future.done, timeout_s)
     world.node.destroy_client(client)
@@ -311,3 +341,10 @@ def set_parameters(world: World, **values: float | str) -> Any:
 
 def commands(world: World) -> list[float]:
     return [message.data[0] for message in world.heard["feed_forward/commands"]]
+
+
+def jump(world: World, since: int) -> float:
+    """Largest step [N m] of the left feed-forward, from zero on, that is more than turning makes of the time between two stamps."""
+    fastest = math.degrees(5393.7) * 0.3 * 0.9  # presliding stiffness and rate of the driver [N m/s]
+    said = [(to_ns(message.header.stamp), message.effort[0]) for message in world.heard["feed_forward"][since:]]
+    return max(abs(said[0][1]), *(abs(b - a) - fastest * (later - sooner) * 1e-9 for (sooner, a), (later, b) in pairwise(said)))

@@ -51,7 +51,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
     del env["PYTHONPATH"]  # only what the workspace adds: the installed package, not this source tree
     env["PATH"] = f"{Path(sys.executable).parent}:{env['PATH']}"
     build = [sys.executable, "-m", "colcon", "build", "--packages-select", PACKAGE]
-    done = subprocess.run(build, cwd=workspace, env=env, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(build, cwd=workspace, env=env, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     shell = ["bash", "-c", ". install/local_setup.bash && env -0"]
     sourced = subprocess.run(shell, cwd=workspace, env=env, capture_output=True, text=True, check=True).stdout

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -88,7 +89,7 @@ def test_stamps_are_moved_and_nothing_else() -> None:
 
 def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
     pytest.importorskip("rclpy")
-    from live_harness import environment
+    from live_harness import NAME, PATIENCE_S, World, environment
 
     from lugre_steering.bench.replay import write_cycle
 
@@ -99,19 +100,22 @@ def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
         assert node.stderr is not None
         while "ready, executor" not in node.stderr.readline():
             assert node.poll() is None
-        seen = subprocess.Popen([*command, "watch", "--seconds", "9"], env=environment(), stdout=subprocess.PIPE, text=True)
-        time.sleep(1.5)
-        begun = time.monotonic()
-        bag = [*command, "play", tmp_path / "run", "--json"]
-        played = subprocess.run(bag, env=environment(), capture_output=True, text=True, check=True)
-        assert time.monotonic() - begun > 5.9  # its own timing
-        result = json.loads(played.stdout)
-        assert set(result["messages"].values()) == {600}
-        assert len(result["messages"]) == 6
-        shown, _ = seen.communicate(timeout=30)
+        seen = subprocess.Popen([*command, "watch"], env=environment(), stdout=subprocess.PIPE, text=True)
+        with World(outputs=["residual"]) as world:
+            world.wait(lambda: world.node.count_subscribers(f"{NAME}/residual") == 2)
+            begun = time.monotonic()
+            bag = [*command, "play", tmp_path / "run", "--json"]
+            played = subprocess.run(bag, env=environment(), capture_output=True, text=True, check=True)
+            assert time.monotonic() - begun > 5.9  # its own timing
+            result = json.loads(played.stdout)
+            assert set(result["messages"].values()) == {600}
+            assert len(result["messages"]) == 6
+            world.wait(lambda: len(world.heard["residual"]) > 100)
+        seen.send_signal(signal.SIGINT)
+        shown, _ = seen.communicate(timeout=PATIENCE_S)
     finally:
         node.terminate()
-        node.communicate(timeout=30)
+        node.communicate(timeout=PATIENCE_S)
     for words in ("torque", "residual", "rubber left", "left_track_steer_joint", "health", "inputs"):
         assert words in shown, shown
     assert "nothing has come" not in shown

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from live_harness import NAME, PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
+from live_harness import NAME, PACKAGE_ROOT, START_TIMEOUT_S, VEHICLE, LiveNode, World, environment
 
 POLICY = PACKAGE_ROOT / "config" / "sros2_policy.xml"
 
@@ -44,7 +44,7 @@ def test_a_node_that_is_told_to_be_secure_does_not_run_in_the_open(tmp_path: Pat
     secure = {"ROS_SECURITY_KEYSTORE": str(tmp_path), "ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
     arguments = ["-p", f"vehicle_file:={VEHICLE}", "--enclave", NAME]
     command = [sys.executable, "-m", "lugre_steering.node", "--ros-args", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment() | secure, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S, env=environment() | secure, check=False)
     assert done.returncode == 2
     assert "ready" not in done.stderr
     assert "ecurity" in done.stderr

@@ -14,7 +14,7 @@ import yaml
 
 pytest.importorskip("rclpy")
 
-from live_harness import PACKAGE_ROOT, VEHICLE, LiveNode, World, environment
+from live_harness import PACKAGE_ROOT, PATIENCE_S, START_TIMEOUT_S, STOP_S, VEHICLE, LiveNode, World, environment
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
@@ -26,7 +26,7 @@ CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"
 
 def start_refused(*ros_args: str) -> str:
     command = [sys.executable, "-m", "lugre_steering.node", "--ros-args", *ros_args]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(), check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S, env=environment(), check=False)
     assert done.returncode == 2, done.stderr
     lines = [line for line in done.stderr.splitlines() if not line.startswith(("[ERROR]", "[INFO]"))]  # of the log
     assert len(lines) == 1, done.stderr
@@ -68,7 +68,7 @@ def test_a_middleware_that_only_fails_ends_the_node(tmp_path: Path) -> None:
     """A supervisor must learn of it; the executor is the one thing that is not real here."""
     (tmp_path / "broken.py").write_text(BROKEN_EXECUTOR)
     command = [sys.executable, str(tmp_path / "broken.py"), "--ros-args", "-p", f"vehicle_file:={VEHICLE}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment(), check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S, env=environment(), check=False)
     assert done.returncode == 2
     assert "estimator: no callback runs any more" in done.stderr
     assert "the middleware is gone" in done.stderr
@@ -94,7 +94,7 @@ def test_stops_cleanly(executor: str, number: int) -> None:
     with LiveNode("-p", f"executor:={executor}") as node:
         code, seconds = node.stop(number)
         assert code == 0, node.output
-        assert seconds < 3.0
+        assert seconds < STOP_S
         assert "Traceback" not in node.output
 
 
@@ -105,7 +105,7 @@ def test_parameters_are_described_and_ranged() -> None:
 
         def call(service: type, name: str, request: object) -> object:
             client = world.node.create_client(service, f"/steering_torque_estimator/{name}")
-            assert client.wait_for_service(10.0)
+            assert client.wait_for_service(PATIENCE_S)
             future = client.call_async(request)
             world.wait(future.done)
             return future.result()
@@ -141,5 +141,5 @@ def test_the_node_imports_no_plotting_bags_or_command_line() -> None:
         "print(','.join(sorted(heavy & set(sys.modules))))"
     )
     command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment(), check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S, env=environment(), check=True)
     assert done.stdout.strip() == ""

@@ -22,6 +22,7 @@ from lugre_steering.watch.window import read_window
 def test_a_marked_window_is_written(tmp_path: Path) -> None:
     with LiveNode("-p", f"watch_folder:={tmp_path}", "-p", "watch_before_s:=60.0") as _, World() as world:
         Driver(world).steer(2.0)
+        world.wait(lambda: len(world.heard["torque"]) == 200)
         answer = call(world, Trigger, f"{NAME}/mark", Trigger.Request())
         assert answer.success, answer.message
         file = Path(answer.message)
