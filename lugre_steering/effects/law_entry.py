@@ -15,7 +15,6 @@ from lugre_steering.effects.entry import Effect
 from lugre_steering.recording import Array
 from lugre_steering.schema import Reader, quantity, suggestion
 
-
 NARROWEST, WIDEST = 1e-12, 1e12
 """How far apart the ends of a range may be, in any unit."""
 
