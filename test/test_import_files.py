@@ -234,7 +234,7 @@ def test_what_unpacks_to_far_more_than_any_recording_is_refused(tmp_path: Path, 
     assert read_table(tmp_path / "noise.npz").column("t").size == 200_000
     np.savez_compressed(tmp_path / "zeros.npz", t=np.zeros(90_000), a=np.zeros(90_000))
     monkeypatch.setattr(np.lib.format, "read_array", lambda *_, **__: pytest.fail("unpacked"))
-    with pytest.raises(MapFileError, match="to 180000 numbers, expected at most 100000 in one of its size"):
+    with pytest.raises(MapFileError, match="to 180000 numbers, expected at most 100000 in one of this size"):
         read_table(tmp_path / "zeros.npz")
 
 
