@@ -29,3 +29,8 @@ class DataError(LugreSteeringError):
 
 class EffectError(LugreSteeringError):
     """An effect, shipped or a user's own, is not what the chain can take."""
+
+
+def reason(error: Exception) -> str:
+    """What an error says without number and file name, which errors of the system carry along."""
+    return getattr(error, "strerror", None) or str(error)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import import_table, load_map, read_table
+from lugre_steering.importing import write as importing_write
 from lugre_steering.importing.channels import outliers
 from lugre_steering.importing.map import READABLE_UNITS, Csv, to_si
 from lugre_steering.vehicle import load
@@ -320,6 +322,37 @@ def test_runs_of_channels_at_different_rates_stay_together(tmp_path: Path) -> No
     angles = [stamp for stamp, topic in sorted(logged(tmp_path / "bag")) if "left" in topic]
     assert len(found["/steering/pressure/main_a"]) == len(order) == 200
     assert order == angles[::5]
+
+
+def test_a_bag_is_the_same_however_much_of_it_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two clocks, one of them in bursts that lie inside one step of the other."""
+    slow, fast = np.arange(0.0, 50.0, 1.0), np.concatenate([np.arange(s, s + 0.2, 1e-3) for s in (3.5, 20.0)])
+    np.savez(tmp_path / "log.npz", t=slow, a=0.01 * slow, tp=fast, p=fast)
+    text = (
+        HEAD + "time: {column: t}\nchannels:\n  angle/left: {column: a, unit: rad}\n"
+        "  pressure/main_a: {column: p, unit: bar, time: {column: tp}}\n"
+    )
+    map_file, bags = write(tmp_path, "map.yaml", text), {}
+    for together in (1 << 14, 7, 1):
+        monkeypatch.setattr(importing_write, "TOGETHER", together)
+        import_table(tmp_path / "log.npz", map_file, tmp_path / f"bag_{together}")
+        with AnyReader([tmp_path / f"bag_{together}"], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+            bags[together] = [(connection.topic, log, bytes(raw)) for connection, log, raw in reader.messages()]
+    assert len(bags[1]) == slow.size + fast.size
+    assert bags[1] == bags[7] == bags[1 << 14]
+
+
+def test_messages_are_not_all_in_memory_at_once(tmp_path: Path) -> None:
+    count = 400_000
+    np.savez(tmp_path / "log.npz", t=0.01 * np.arange(count), a=np.sin(1e-3 * np.arange(count)))
+    map_file = write(tmp_path, "map.yaml", GOOD)
+    tracemalloc.start()
+    try:
+        import_table(tmp_path / "log.npz", map_file, tmp_path / "bag")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 16 * 8 * count  # a dozen numbers for each sample; as a message it takes forty
 
 
 def test_outliers_are_not_found_in_clean_data() -> None:

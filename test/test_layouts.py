@@ -12,6 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from jsonschema import validate
 from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import Bag
@@ -24,6 +25,54 @@ from lugre_steering.vehicle import load
 LAYOUTS = config_folder() / "layouts"
 VEHICLE = config_folder() / "test_vehicle.yaml"
 STORE = get_typestore(Stores.ROS2_JAZZY)
+TEXT, FLAG, NUMBER = {"type": "string"}, {"type": "boolean"}, {"type": "number"}
+
+
+def exactly(optional: Mapping[str, Any] | None = None, /, **required: Any) -> dict[str, Any]:
+    """A JSON schema of an object with these members and no others."""
+    members = {**required, **(optional or {})}
+    return {"type": "object", "properties": members, "required": list(required), "additionalProperties": False}
+
+
+CURVE = exactly(
+    {"color": {"type": "string", "pattern": "^#[0-9a-f]{6}$"}, "label": TEXT}, value=TEXT, enabled=FLAG,
+    timestampMethod={"enum": ["receiveTime", "headerStamp"]},
+)  # fmt: skip
+PANELS = {
+    "Plot": exactly(
+        {"followingViewWidth": NUMBER}, foxglovePanelTitle=TEXT, paths={"type": "array", "minItems": 1, "items": CURVE}, showLegend=FLAG,
+        legendDisplay={"enum": ["floating", "top", "left", "none"]}, showPlotValuesInLegend=FLAG, showXAxisLabels=FLAG,
+        showYAxisLabels=FLAG, isSynced=FLAG, xAxisVal={"enum": ["timestamp", "index", "custom", "currentCustom"]}, sidebarDimension=NUMBER,
+    ),
+    "DiagnosticSummary": exactly(
+        foxglovePanelTitle=TEXT, topicToRender=TEXT, minLevel={"enum": [0, 1, 2, 3]}, pinnedIds={"type": "array", "items": TEXT},
+        hardwareIdFilter=TEXT, sortByLevel=FLAG,
+    ),
+}  # fmt: skip
+"""Settings of a panel: PlotConfig, DiagnosticSummaryConfig and PANEL_TITLE_CONFIG_KEY of Foxglove Studio 1.48."""
+LAYOUT = exactly(
+    configById={
+        "type": "object", "patternProperties": {f"^{panel}!": schema for panel, schema in PANELS.items()}, "additionalProperties": False,
+    },
+    globalVariables={"type": "object"}, userNodes={"type": "object"}, playbackConfig=exactly(speed=NUMBER), layout={"type": "object"},
+)  # fmt: skip
+"""LayoutData of the same; no other schemas are published."""
+PARTS = {
+    "root": ((), ("tabbed_widget", "use_relative_time_offset", "Plugins", "previouslyLoaded_Datafiles", "previouslyLoaded_Streamer",
+                  "customMathEquations", "snippets")),
+    "tabbed_widget": (("parent", "name"), ("Tab", "currentTabIndex")),
+    "Tab": (("tab_name", "containers"), ("Container",)),
+    "Container": ((), ("DockSplitter",)),
+    "DockSplitter": (("orientation", "count", "sizes"), ("DockArea",)),
+    "DockArea": (("name",), ("plot",)),
+    "plot": (("mode", "style", "flip_x", "flip_y"), ("range", "limitY", "curve")),
+    "range": (("left", "right", "top", "bottom"), ()),
+    "curve": (("name", "color"), ()),
+    "currentTabIndex": (("index",), ()),
+    "use_relative_time_offset": (("enabled",), ()),
+    "previouslyLoaded_Streamer": (("name",), ()),
+}  # fmt: skip
+"""Elements of a layout of PlotJuggler 3, their attributes and what may stand in them, as xmlSaveState of its widgets writes them."""
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +98,7 @@ def fields(msgtype: str, prefix: str = "") -> Iterator[str]:
 
 def test_foxglove(topics: Mapping[str, str]) -> None:
     layout = json.loads((LAYOUTS / "foxglove.json").read_text())
+    validate(layout, LAYOUT)
     known = {f"{topic}.{path}" for topic, kind in topics.items() for path in fields(kind)}
     shown = [path["value"] for panel in layout["configById"].values() for path in panel.get("paths", [])]
     assert set(shown) <= known
@@ -72,6 +122,10 @@ def places(part: Any) -> Iterator[str]:
 def test_plotjuggler(topics: Mapping[str, str]) -> None:
     """It names the numbers of a JointState by joint, in place of their index."""
     root = ElementTree.parse(LAYOUTS / "plotjuggler.xml").getroot()
+    for part in root.iter():
+        attributes, inside = PARTS.get(part.tag, ((), ()))
+        assert set(part.attrib) == set(attributes), part.tag
+        assert {inner.tag for inner in part} <= set(inside), part.tag
     joints = [getattr(load(VEHICLE).topics, f"{side}_joint") for side in ("left", "right")]
     known = set()
     for topic, kind in topics.items():
@@ -83,6 +137,7 @@ def test_plotjuggler(topics: Mapping[str, str]) -> None:
     assert all(any(name.startswith(f"{topic}/") for name in shown) for topic in topics)
     assert root.tag == "root"
     (splitter,) = root.iter("DockSplitter")
+    assert splitter.attrib["orientation"] in ("|", "-")
     assert int(splitter.attrib["count"]) == len(splitter) == len(splitter.attrib["sizes"].split(";"))
 
 

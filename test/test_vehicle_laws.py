@@ -8,9 +8,11 @@ import copy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
+from lugre_steering.effects.law_entry import law_fields
 from lugre_steering.errors import VehicleFileError
 from lugre_steering.vehicle import from_mapping, load, save
 
@@ -51,6 +53,11 @@ def test_laws_are_written_and_read_again(tmp_path: Path) -> None:
         (LAW, {"values": {**LAW["values"], "high": 0.0}}, ("laws[0].values.high", "before, after, at, width")),
         (LAW, {"knots": [1.0, 2.0]}, ("laws[0].knots", "no knots")),
         (LAW, {"form": "power", "values": {"value": 1.0, "scale": 1e-3, "exponent": 1e4}}, ("laws[0].values", "finite")),
+        # Finite where it was seen, and not half as far again.
+        (LAW, {"form": "linear", "values": {"value": 0.0, "slope": 1.5e308}}, ("laws[0].values", "finite", "beyond")),
+        (LAW, {"range": [-1e308, 1e308]}, ("laws[0].range", "apart")),
+        (LAW, {"range": [0.0, 1e-308]}, ("laws[0].range", "apart")),
+        (TABLE, {"knots": [1e308, -1e308, 0.0]}, ("laws[0].knots", "finite")),
         (LAW, {"values": {**LAW["values"], "after": float("nan")}}, ("laws[0].values.after", "finite")),
         (TABLE, {"knots": [1.0]}, ("laws[0].knots", "at least two")),
         (TABLE, {"values": {"value": 1.0}}, ("laws[0].knots", "values")),
@@ -62,6 +69,22 @@ def test_a_mistake_in_a_law_is_refused_with_its_key(base: dict[str, Any], change
         made({**base, **change})
     for text in (FILE.name, *told):
         assert text in str(error.value)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize(
+    ("form", "values"),
+    [
+        ("step", {"before": 0.0, "after": 3.0, "at": 0.2, "width": 1e-308}),
+        ("bump", {"value": 0.0, "height": 3.0, "at": 0.2, "width": 1e-308}),
+        ("exponential", {"start": 0.0, "end": 3.0, "length": 1e-308}),
+    ],
+)
+def test_widths_of_nothing_make_jumps_without_a_word(form: str, values: dict[str, float]) -> None:
+    (law,) = made({**LAW, "form": form, "values": values}).laws
+    f = np.asarray(law_fields(law)["f"])
+    assert set(f) <= {0.0, 3.0}
+    assert f[0] == 0.0
 
 
 def test_too_many_laws_are_refused() -> None:

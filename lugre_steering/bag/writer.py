@@ -31,7 +31,7 @@ from rosbags.typesys.store import Typestore
 
 from lugre_steering.bag import mcap, mcap_records
 from lugre_steering.bag.messages import Bytes, Connection, Messages, windows
-from lugre_steering.errors import BagError
+from lugre_steering.errors import BagError, reason
 from lugre_steering.recording import IntArray
 
 VERSION = 9  # of metadata.yaml, ROS 2 Jazzy
@@ -139,8 +139,7 @@ class BagWriter:
             self._discard()
 
     def _unwritable(self, error: OSError | sqlite3.Error) -> BagError:
-        reason = error.strerror if isinstance(error, OSError) else None
-        return BagError(f"{self._final}: cannot be written ({reason or error})")
+        return BagError(f"{self._final}: cannot be written ({reason(error)})")
 
     def _discard(self) -> None:
         """Half a recording would stand in the way of the next attempt."""

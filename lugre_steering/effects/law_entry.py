@@ -15,6 +15,9 @@ from lugre_steering.effects.entry import Effect
 from lugre_steering.recording import Array
 from lugre_steering.schema import Reader, quantity, suggestion
 
+NARROWEST, WIDEST = 1e-12, 1e12
+"""How far apart the ends of a range may be, in any unit."""
+
 
 @dataclass(frozen=True)
 class LawEntry:
@@ -86,13 +89,23 @@ def check_law(entry: LawEntry, reader: Reader, key: str) -> None:
             raise reader.fail(f"{key}.{name}", value, suggestion(value, list(known)))
     if entry.memory != "none" and not entry.memory_size > 0.0:
         raise reader.fail(f"{key}.memory_size", entry.memory_size, "a number above 0 for a memory")
-    if len(entry.range) != 2 or not entry.range[0] < entry.range[1]:
-        raise reader.fail(f"{key}.range", list(entry.range), "two ascending numbers: where the coordinate was seen")
+    if len(entry.range) != 2 or not NARROWEST <= entry.range[1] - entry.range[0] <= WIDEST:
+        expected = f"two ascending numbers, {NARROWEST:g} to {WIDEST:g} apart: where the coordinate was seen"
+        raise reader.fail(f"{key}.range", list(entry.range), expected)
     if entry.form == laws.TABLE:
         if len(entry.knots) < 2 or entry.values:
             expected = "at least two values of f, equally spaced over the range, and no 'values'"
             raise reader.fail(f"{key}.knots", list(entry.knots), expected)
-        return
+    else:
+        _check_values(entry, reader, key)
+    if not np.isfinite(law_fields(entry)["f"]).all():
+        which = "knots" if entry.form == laws.TABLE else "values"
+        expected = "numbers with which the law is finite over its range, and as far beyond as it goes on"
+        raise reader.fail(f"{key}.{which}", getattr(entry, which), expected)
+
+
+def _check_values(entry: LawEntry, reader: Reader, key: str) -> None:
+    """Refuse values that the closed form of a law has not, or lacks."""
     if entry.knots:
         raise reader.fail(f"{key}.knots", list(entry.knots), f"no knots for a law of the form '{entry.form}'")
     names = laws.form_values(entry.form)
@@ -103,7 +116,3 @@ def check_law(entry: LawEntry, reader: Reader, key: str) -> None:
             raise reader.fail(f"{key}.values.{name}", number, "a number above 0")
     if missing := [name for name in names if name not in entry.values]:
         raise reader.fail(f"{key}.values", entry.values, f"values of {', '.join(missing)}")
-    with np.errstate(all="ignore"):
-        f = laws.sampled(entry.form, entry.values, (), *entry.range)
-    if not np.isfinite(f).all():
-        raise reader.fail(f"{key}.values", entry.values, "numbers with which the law is finite over its range")

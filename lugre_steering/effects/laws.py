@@ -214,7 +214,8 @@ def sampled(form: str, values: Mapping[str, float], knots: Sequence[float], low:
     places = np.linspace(low, high, KNOTS)
     if form == TABLE:
         return np.asarray(np.interp(places, np.linspace(low, high, len(knots)), knots))
-    return np.asarray(FORMS[form](places, **values), np.float64)
+    with np.errstate(all="ignore"):  # a width of nothing makes a jump; what is not finite is refused by ``check_law``
+        return np.asarray(FORMS[form](places, **values), np.float64)
 
 
 def reach(form: str, values: Mapping[str, float], low: float, high: float) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
-from lugre_steering.errors import EffectError
+from lugre_steering.errors import EffectError, reason
 from lugre_steering.expression import ExpressionError, parse
 from lugre_steering.files import read_text, write_text
 from lugre_steering.schema import Reader
@@ -99,8 +99,7 @@ def read_effects(file: Path) -> tuple[list[Effect], str]:
     try:
         content = read_text(file, yaml_text.LONGEST)
     except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise EffectError(f"{file}: cannot be read: {why}; expected a .py or .yaml file of effects") from error
+        raise EffectError(f"{file}: cannot be read: {reason(error)}; expected a .py or .yaml file of effects") from error
     sha256 = hashlib.sha256(content.encode()).hexdigest()
     if file.suffix == ".py":
         found = _of_module(_run(file, sha256), str(file))

@@ -15,9 +15,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from lugre_steering.errors import MapFileError
-from lugre_steering.importing.table import MAX_COLUMNS, MAX_DEPTH, MAX_NUMBERS, Gathering, Table, size_of
+from lugre_steering.importing.table import MAX_COLUMNS, MAX_DEPTH, Gathering, Table, most_numbers, size_of
 
-MAX_BYTES = 8 * MAX_NUMBERS
 _CHUNK = 1 << 16
 
 
@@ -30,7 +29,7 @@ def optional(file: Path, module: str, package: str) -> Any:
 
 
 def too_large(file: Path) -> MapFileError:
-    return MapFileError(f"{file}: unpacks to more than {MAX_BYTES / 1e9:.1f} GB; split it")
+    return MapFileError(f"{file}: unpacks to more than {8 * most_numbers(file)} bytes, which is too much for its size; split it")
 
 
 # ------------------------------------------------------------------ npz
@@ -38,7 +37,7 @@ def too_large(file: Path) -> MapFileError:
 
 def read_npz(file: Path) -> Table:
     """The arrays of a NumPy archive; objects (pickles) are never loaded."""
-    found = Gathering(file)
+    found, wanted = Gathering(file), []
     with zipfile.ZipFile(file) as archive:
         for member in archive.infolist():
             if member.filename.endswith(".npy"):
@@ -51,8 +50,10 @@ def read_npz(file: Path) -> Table:
                 if size_of(shape) * dtype.itemsize > member.file_size:
                     raise MapFileError(f"{file}: '{name}': declares {size_of(shape)} values, more than the file holds")
                 found.reserve(name, size_of(shape))
-                with archive.open(member) as stream:
-                    found.add(name, np.lib.format.read_array(stream, allow_pickle=False))
+                wanted.append((name, member))
+        for name, member in wanted:
+            with archive.open(member) as stream:
+                found.add(name, np.lib.format.read_array(stream, allow_pickle=False))
     return found.table()
 
 
@@ -74,7 +75,7 @@ def read_parquet(file: Path) -> Table:
         schema, metadata = source.schema_arrow, source.metadata
         if len(schema.names) > MAX_COLUMNS:
             raise MapFileError(f"{file}: has {len(schema.names)} columns, expected at most {MAX_COLUMNS}")
-        if sum(metadata.row_group(i).total_byte_size for i in range(metadata.num_row_groups)) > MAX_BYTES:
+        if sum(metadata.row_group(i).total_byte_size for i in range(metadata.num_row_groups)) > 8 * most_numbers(file):
             raise too_large(file)
         wanted = []
         for field in schema:
@@ -135,7 +136,7 @@ def read_mat(file: Path) -> Table:
 
 def _weigh_mat(file: Path, stream: BinaryIO, order: str) -> None:
     """Refuse what unpacks to too much: SciPy trusts the compressed variables of a file."""
-    total = 0
+    total, most = 0, 8 * most_numbers(file)
     while len(tag := stream.read(8)) == 8:
         kind, size = struct.unpack(f"{order}II", tag)
         if kind != 15:  # not compressed
@@ -144,10 +145,10 @@ def _weigh_mat(file: Path, stream: BinaryIO, order: str) -> None:
         unpacked = zlib.decompressobj()
         while size > 0 and (packed := stream.read(min(size, _CHUNK))):
             size -= len(packed)
-            while packed and total <= MAX_BYTES:
+            while packed and total <= most:
                 total += len(unpacked.decompress(packed, _CHUNK << 4))
                 packed = unpacked.unconsumed_tail
-            if total > MAX_BYTES:
+            if total > most:
                 raise too_large(file)
 
 

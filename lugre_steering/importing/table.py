@@ -18,6 +18,8 @@ from lugre_steering.recording import Array
 
 MAX_NUMBERS = 100_000_000
 """Numbers in one table (0.8 GB): what declares or unpacks to more is refused before it fills the memory."""
+FEW_NUMBERS, PACKED = 8_000_000, 50
+"""So many may come of any file; of more, a file holds the share of ``PACKED``, as no recording can be packed as small."""
 MAX_COLUMNS = 10_000
 MAX_DEPTH = 64
 """Nested structures."""
@@ -62,6 +64,11 @@ def listed(names: Mapping[str, Any]) -> str:
     return f"{shown} and {len(names) - 30} more" if len(names) > 30 else shown or "none"
 
 
+def most_numbers(file: Path) -> int:
+    """Numbers that a file may hold or unpack to."""
+    return min(MAX_NUMBERS, max(FEW_NUMBERS, PACKED * file.stat().st_size // 8))
+
+
 class Gathering:
     """Collects the numbers of nested data: structures by dots, the columns of a matrix as name[1], name[2], ..., as
     MATLAB counts. The longer side of a matrix is time."""
@@ -71,13 +78,15 @@ class Gathering:
         self.columns: dict[str, Array] = {}
         self.scalars: dict[str, float] = {}
         self.unusable: dict[str, str] = {}
-        self._count = 0
+        self._count, self._most = 0, most_numbers(file)
 
     def reserve(self, name: str, count: int) -> None:
         """Refuse what does not fit, before it is read."""
         self._count += count
-        if self._count > MAX_NUMBERS:
-            raise MapFileError(f"{self.file}: '{name}': holds {count} numbers, expected at most {MAX_NUMBERS} in one file")
+        if self._count > self._most:
+            raise MapFileError(
+                f"{self.file}: '{name}': brings the file to {self._count} numbers, expected at most {self._most} in one of this size"
+            )
 
     def refuse(self, name: str, what: str) -> None:
         self.unusable[name] = f"'{name}': holds {what}, expected numbers"
@@ -95,7 +104,7 @@ class Gathering:
         elif array.ndim > 2 or array.size == 0:
             self.refuse(name, f"an array of size {' x '.join(map(str, array.shape))}")
         elif array.ndim == 1 or 1 in array.shape:
-            self.columns[name] = array.reshape(-1).astype(np.float64)
+            self.columns[name] = array.reshape(-1).astype(np.float64, copy=False)
         else:
             along = array if array.shape[0] >= array.shape[1] else array.T
             self.columns |= {f"{name}[{i + 1}]": along[:, i].astype(np.float64) for i in range(along.shape[1])}

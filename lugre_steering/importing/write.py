@@ -27,6 +27,8 @@ from lugre_steering.recording import IntArray
 from lugre_steering.vehicle import Topics, TorqueSensor
 
 FRAME = "base_link"
+TOGETHER = 1 << 14
+"""Messages of a channel that are in memory at once; each takes far more than its numbers."""
 
 
 def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -> dict[str, Any]:
@@ -38,7 +40,6 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
     channels = read_channels(table, mapping)
     check_units(file, mapping, channels)
     stamps = {name: _stamps(file, map_file, mapping, channel) for name, channel in channels.items()}
-    messages = {name: _messages(channel, stamps[name]) for name, channel in channels.items()}
     logged = _log_times(mapping, channels, stamps)
     origin = provenance("import", {"table": hashed(file), "map": hashed(map_file), "storage": storage})
     marks = {"imported_from": file.name, "import_map": map_file.name, MADE: "\n".join(origin.lines())}
@@ -46,12 +47,11 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
         staged(out) as folder,
         BagWriter(folder, "sqlite3" if storage == "sqlite3" else "mcap", marks, final=out) as writer,
     ):
-        writer.write(
-            [
-                Part(writer.add_topic(topic, msgtype), logged[name], rows)
-                for name, (topic, msgtype, rows) in messages.items()
-            ]
-        )
+        numbers = {name: writer.add_topic(*_topic(name)) for name in channels}
+        for stretch in _stretches(logged):
+            writer.write([
+                Part(numbers[name], logged[name][part], _messages(channels[name], stamps[name], part)) for name, part in stretch.items()
+            ])
     summaries = [
         {**channel.summary(), "doubts": doubts(mapping, channel, channels.values())} for channel in channels.values()
     ]
@@ -122,18 +122,40 @@ def _log_times(mapping: ImportMap, channels: Mapping[str, Imported], stamps: Map
     return {name: clocks[keys[name]][channel.rows] for name, channel in channels.items()}
 
 
-def _messages(channel: Imported, stamp: IntArray) -> tuple[str, str, Bytes]:
-    """(topic, type, rows) of one channel."""
-    kind, _, rest = channel.name.partition("/")
+def _stretches(logged: Mapping[str, IntArray]) -> Iterator[dict[str, slice]]:
+    """Stretches of log time, in order, with at most ``TOGETHER`` messages of each channel."""
+    begin = dict.fromkeys(logged, 0)
+    while True:
+        beyond = [log[begin[name] + TOGETHER] for name, log in logged.items() if begin[name] + TOGETHER < log.size]
+        end = {name: int(np.searchsorted(log, min(beyond))) if beyond else log.size for name, log in logged.items()}
+        yield {name: slice(begin[name], end[name]) for name in logged}
+        if not beyond:
+            return
+        begin = end
+
+
+def _topic(channel: str) -> tuple[str, str]:
+    """Topic and type of a channel."""
+    kind, _, rest = channel.partition("/")
     topics = Topics()
     if kind == "angle":
-        rate = None if channel.rate is None else channel.rate[:, None]
-        joint = getattr(topics, f"{rest}_joint")
-        rows = cdr.encode_joint_state(stamp, FRAME, [joint], channel.value[:, None], rate)
-        return f"/{getattr(topics, rest)}", cdr.JOINT_STATE, rows
+        return f"/{getattr(topics, rest)}", cdr.JOINT_STATE
     if kind == "pressure":
-        rows = cdr.encode_fluid_pressure(stamp, FRAME, channel.value)
-        return f"/{topics.pressure_prefix}{rest}", cdr.FLUID_PRESSURE, rows
+        return f"/{topics.pressure_prefix}{rest}", cdr.FLUID_PRESSURE
     if kind == "measured_torque":
-        return f"/{TorqueSensor().topic}", cdr.WRENCH_STAMPED, cdr.encode_wrench(stamp, FRAME, channel.value)
-    return f"/{topics.ambient_temperature}", cdr.TEMPERATURE, cdr.encode_temperature(stamp, FRAME, channel.value)
+        return f"/{TorqueSensor().topic}", cdr.WRENCH_STAMPED
+    return f"/{topics.ambient_temperature}", cdr.TEMPERATURE
+
+
+def _messages(channel: Imported, stamps: IntArray, part: slice) -> Bytes:
+    """Some messages of a channel as rows (n, length)."""
+    kind, _, rest = channel.name.partition("/")
+    stamp, value = stamps[part], channel.value[part]
+    if kind == "angle":
+        rate = None if channel.rate is None else channel.rate[part, None]
+        return cdr.encode_joint_state(stamp, FRAME, [getattr(Topics(), f"{rest}_joint")], value[:, None], rate)
+    if kind == "pressure":
+        return cdr.encode_fluid_pressure(stamp, FRAME, value)
+    if kind == "measured_torque":
+        return cdr.encode_wrench(stamp, FRAME, value)
+    return cdr.encode_temperature(stamp, FRAME, value)

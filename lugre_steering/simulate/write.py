@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
-from lugre_steering.errors import BagError
+from lugre_steering.errors import BagError, reason
 from lugre_steering.files import new_folder
 from lugre_steering.provenance import MADE, Provenance
 from lugre_steering.recording import TRUTH, Array, IntArray, Kind
@@ -64,8 +64,7 @@ def write_bag(
     except WriterError as error:
         raise BagError(f"{folder}: {error}") from error
     except (OSError, sqlite3.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else None
-        raise BagError(f"{folder}: cannot be written ({reason or error})") from error
+        raise BagError(f"{folder}: cannot be written ({reason(error)})") from error
 
 
 _Topic = tuple[str, str, IntArray, Bytes]
