@@ -51,9 +51,10 @@ SPIKE_SAMPLES = 3
 """Longer excursions are not isolated samples, and may be physics."""
 FORGOTTEN = 5.0
 """Presliding lengths after which less than 1 % of a wrong bristle deflection is left."""
-WENT_ON, EDGE_SAMPLES, LONGEST_UNSEEN_S = 0.05, 10, 1.0
-"""Share of a presliding length by which the turn in a gap may miss that of the rates at its edges, samples that give those, and
-the longest gap [s] in which a track may have begun to turn, or stopped, but not turned to and fro."""
+WENT_ON, EDGE_SAMPLES, EDGE_S, LONGEST_UNSEEN_S = 0.05, 10, 0.3, 1.0
+"""Share of a presliding length by which the turn in a gap may miss that of the rates at its edges, samples that give those, or all of so
+many seconds where these are too noisy, and the longest gap [s] in which a track may have begun to turn, or stopped, but not turned to
+and fro."""
 PARKED = 0.02
 """Share of a presliding length that a track at rest may seem to move by angle noise."""
 LATE_S = 1.0
@@ -306,25 +307,30 @@ def _memory_lost(clean: Mapping[Channel, Signal], vehicle: Vehicle) -> Iterator[
 
 
 def _went_on(signal: Signal, last: int, presliding: float) -> bool:
-    """The track turned one way through the gap after sample ``last``, so friction is as if it had been seen.
+    """The track turned one way through the gap after sample ``last``, so friction is as if it had been seen."""
+    period = float(np.median(np.diff(signal.time_s)))
+    widths = {EDGE_SAMPLES, max(EDGE_SAMPLES, round(EDGE_S / period))}
+    return any(_turned_one_way(signal, last, width, period, WENT_ON * presliding) for width in widths)
 
-    It did where one change from the rate before to that after makes it turn as far as it has, or where it went on at one rate.
-    """
+
+def _turned_one_way(signal: Signal, last: int, width: int, period: float, slack: float) -> bool:
+    """Whether one change from the rate before a gap to that after makes the track turn as far as it has, within ``slack`` [rad], or it
+    went on at nearly one rate; ``width`` samples give the rates."""
     time, value = signal.time_s, signal.value
     gap = float(time[last + 1] - time[last])
-    ends = []
-    for part in (slice(max(last - EDGE_SAMPLES, 0), last + 1), slice(last + 1, last + 2 + EDGE_SAMPLES)):
-        if time[part].size < 3 or float(np.diff(time[part]).max()) > _gap_limit(float(np.median(np.diff(time)))):
-            return False
-        slope, offset = np.polyfit(time[part] - time[last], value[part], 1)
-        ends.append((float(slope), float(offset)))
+    first, end = max(last - width, 0), min(last + 2 + width, time.size)
+    others = np.flatnonzero(np.diff(time[first:end]) > _gap_limit(period)) + first
+    first, end = int(max(others[others < last] + 1, default=first)), int(min(others[others > last] + 1, default=end))
+    if min(last + 1 - first, end - last - 1) < 3:
+        return False
+    ends = [np.polyfit(time[part] - time[last], value[part], 1) for part in (slice(first, last + 1), slice(last + 1, end))]
     (before, from_), (after, back) = ends
-    turned, slack = back + after * gap - from_, WENT_ON * presliding
     if before * after < -((slack / gap) ** 2):
         return False
     least, most = sorted((before * gap, after * gap))
     never_stood = min(abs(least), abs(most)) > max(slack, 0.5 * max(abs(least), abs(most)))
-    return least - slack < turned < most + slack and (gap <= LONGEST_UNSEEN_S or never_stood)
+    one_way = least - slack < back + after * gap - from_ < most + slack
+    return bool(one_way and (gap <= LONGEST_UNSEEN_S or never_stood))
 
 
 def _parked(signal: Signal, start: float, end: float, presliding: float) -> bool:
