@@ -9,6 +9,7 @@ import time
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import WrenchStamped
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -92,6 +93,12 @@ class Outputs:
             command.data = self._fade_commands(now_ns)
             self._ramp.set(command.data)
             publisher.publish(command)
+
+    def await_arrival(self, patience_s: float) -> None:
+        """Until reliable listeners have the feed-forward published last, no longer than that: a publisher that goes takes along what
+        is still on its way."""
+        for _, publisher in filter(None, (self._feed_forward, self._commands)):
+            publisher.wait_for_all_acked(Duration(seconds=patience_s))
 
     def _wrench(self, frame: str) -> WrenchStamped:
         message = WrenchStamped()

@@ -31,6 +31,8 @@ from lugre_steering.watch.window import SampleRing, write_window
 
 LEAVE_S = 2.0
 """No longer does the last ramp to zero take: who stops the node waits a few seconds before he kills it."""
+ARRIVAL_S = 0.5
+"""So long, at most, the last zero on each topic is waited for."""
 TICK_S = 0.02
 
 
@@ -87,6 +89,7 @@ class Session:
         while not outputs.faded:
             time.sleep(TICK_S)
             outputs.fade(self._now_ns())
+        outputs.await_arrival(ARRIVAL_S)
 
     def change(self, settings: Settings) -> None:
         """Go on with other settings (those that are not fixed)."""

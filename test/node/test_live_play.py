@@ -100,7 +100,7 @@ def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
         assert node.stderr is not None
         while "ready, executor" not in node.stderr.readline():
             assert node.poll() is None
-        seen = subprocess.Popen([*command, "watch"], env=environment(), stdout=subprocess.PIPE, text=True)
+        seen = subprocess.Popen([*command, "watch", "--seconds", "300"], env=environment(), stdout=subprocess.PIPE, text=True)
         with World(outputs=["residual"]) as world:
             world.wait(lambda: world.node.count_subscribers(f"{NAME}/residual") == 2)
             begun = time.monotonic()
