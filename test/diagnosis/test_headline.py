@@ -130,6 +130,15 @@ def test_a_range_that_is_closer_than_its_stretch_is_told_instead() -> None:
     assert "mostly beyond 28.6 deg of steering angle" in headline.missing(done, [stop(where=where)], "", None, kept=True)
 
 
+def test_what_is_met_to_one_side_here_and_to_either_there_is_told_by_its_size() -> None:
+    sides = (("a", "|steering angle|", (0.5, 0.6)), ("b", "steering angle", (-0.6, -0.52)))
+    where = tuple(Place(bag, ((1.0, 99.0),), name, ends, "rad") for bag, name, ends in sides)
+    said = headline.missing(finished(), [stop(where=where)], "", None, kept=True)
+    assert "mostly beyond 28.6 deg of steering angle to either side" in said
+    apart = (where[0], Place("b", ((1.0, 99.0),), "steering rate", (0.1, 0.2), "rad/s"))
+    assert "beyond" not in headline.missing(finished(), [stop(where=apart)], "", None, kept=True)
+
+
 def test_nothing_is_told_to_begin_with_the_first_motion() -> None:
     parked = recording("a")
     parked.omega = np.where(parked.time < 60.0, 0.0, parked.omega)

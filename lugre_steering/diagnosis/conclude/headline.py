@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.counted import counted
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.result import Experiment, NamedEffect
+from lugre_steering.diagnosis.result import Experiment, NamedEffect, Place
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Mask
@@ -114,20 +114,36 @@ def _where(done: Finished, effect: NamedEffect) -> list[str]:
     recorded = sum(float(run.time[-1] - run.time[0]) for run in done.problem.runs)
     active = sum(end - start for place in effect.where for start, end in place.intervals_s) / recorded
     often = "all the time" if active > NEARLY_ALWAYS else f"{words.percent(active)} of the time"
-    (name, *others), ends = {place.coordinate for place in effect.where}, [end for place in effect.where for end in place.range]
-    low, high = min(_numbers(ends), default=math.nan), max(_numbers(ends), default=math.nan)
-    among = None if others or name in NOT_A_PLACE or not low < high else (name, low, high)
+    among = _range(effect.where)
     acts = {place.bag: (place.intervals_s[0][0], place.intervals_s[-1][1]) for place in effect.where if place.intervals_s}
     within, held, driven = _durations(done.problem.runs, acts, among)
     if within < LOCAL * held:
         return [f"{_stretches(done.problem.runs, acts)} ({often})"]
     if among is None or held > NEARLY_ALWAYS * driven:
         return [often]
+    name, low, high = among
     axis = words.coordinate_axis(done.problem.vehicle, name)
     from_, to = (words.number(axis.scale * end, 3) for end in (low, high))
     if name.startswith("|"):
         return [f"mostly beyond {from_} {axis.unit} of {axis.name.strip('|')} to either side ({often})"]
     return [f"at {words.with_article(axis.name)} of {from_} to {to} {axis.unit}".rstrip() + f" ({often})"]
+
+
+def _range(places: Sequence[Place]) -> tuple[str, float, float] | None:
+    """The coordinate by which all places are told, and its range over them; nothing where there is none.
+
+    What is met to one side in one recording and to either in another is told by its size.
+    """
+    names = {place.coordinate for place in places}
+    ends = [(low, high) for low, high in (place.range for place in places) if low is not None and high is not None]
+    if len(names) > 1:
+        names = {f"|{name.strip('|')}|" for name in names}
+        ends = [(max(low, -high, 0.0), max(-low, high)) for low, high in ends]
+    name = names.pop()
+    if names or name in NOT_A_PLACE or not ends:
+        return None
+    low, high = min(low for low, _ in ends), max(high for _, high in ends)
+    return (name, low, high) if low < high else None
 
 
 def _durations(
@@ -170,7 +186,3 @@ def _driven(run: Run) -> Mask:
     moving = np.flatnonzero(np.abs(run.omega).max(axis=0) > MOVING * run.angle_unit)
     index = np.arange(run.time.size)
     return (index >= moving[0]) & (index <= moving[-1]) if moving.size else np.ones(run.time.size, dtype=bool)
-
-
-def _numbers(ends: Sequence[float | None]) -> list[float]:
-    return [end for end in ends if end is not None]
