@@ -96,11 +96,13 @@ def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
     write_cycle(tmp_path / "run", 6.0)
     command = [sys.executable, "-m", "lugre_steering.cli"]
     node = subprocess.Popen([*command, "node", "--vehicle", VEHICLE], env=environment(), stderr=subprocess.PIPE, text=True)
+    processes = [node]
     try:
         assert node.stderr is not None
         while "ready, executor" not in node.stderr.readline():
             assert node.poll() is None
         seen = subprocess.Popen([*command, "watch", "--seconds", "300"], env=environment(), stdout=subprocess.PIPE, text=True)
+        processes.append(seen)
         with World(outputs=["residual"]) as world:
             world.wait(lambda: world.node.count_subscribers(f"{NAME}/residual") == 2)
             begun = time.monotonic()
@@ -113,9 +115,11 @@ def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
             world.wait(lambda: len(world.heard["residual"]) > 100)
         seen.send_signal(signal.SIGINT)
         shown, _ = seen.communicate(timeout=PATIENCE_S)
-    finally:
-        node.terminate()
-        node.communicate(timeout=PATIENCE_S)
+    finally:  # whatever happened, none stays to be counted by the next test
+        for process in processes:
+            if process.poll() is None:
+                process.terminate()
+                process.communicate(timeout=PATIENCE_S)
     for words in ("torque", "residual", "rubber left", "left_track_steer_joint", "health", "inputs"):
         assert words in shown, shown
     assert "nothing has come" not in shown
