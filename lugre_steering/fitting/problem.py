@@ -81,8 +81,9 @@ COOLING = SheetValue("cooling", ("cooling",), 0.15, -0.6, 0.6)
 KINGPIN = SheetValue("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
 GAIN = SheetValue("pressure_gain", (), 0.03, -0.3, 0.3)
 """Scales the torque that the pressures show, no field of the chain."""
-EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 50.0
-"""Rubber over air at the start of a bag beyond that of the vehicle file: standard deviation and range; 30 K after a drive."""
+EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 100.0
+"""Rubber over air at the start of a bag beyond that of the vehicle file: standard deviation and range; 30 K after a drive, 70 K within an
+hour of steering."""
 AIR_K, AIR_FAR_K, AIR_KNOWN_K = 15.0, 50.0, 1.0
 """Air against the vehicle file where none was recorded: standard deviation and range; standard deviation where it was."""
 TYPICAL = 1.0 / 3.0

@@ -217,6 +217,18 @@ def test_a_hot_start_is_weather() -> None:
         assert problem.temperatures(bag, found.x)[0] == pytest.approx(45.0, abs=12.0)
 
 
+def test_rubber_may_be_as_hot_as_an_hour_of_steering_makes_it() -> None:
+    """As it is where a piece of a long recording begins."""
+    assert VEHICLE.initial is not None
+    hot = VEHICLE.replace(initial=replace(VEHICLE.initial, rubber_temperature_degC=80.0))
+    problem = Problem(VEHICLE, [prepare(r, VEHICLE) for r in record(hot, QUICK, 6)], ())
+    found = fit(problem, problem.sensor_weight)
+    for bag in range(len(problem.runs)):
+        rubber, air = problem.temperatures(bag, found.x)
+        assert rubber == pytest.approx(80.0, abs=3.0)
+        assert air == pytest.approx(VEHICLE.initial.air_temperature_degC, abs=15.0)
+
+
 @pytest.mark.parametrize(("factor", "times"), [(10.0, 0.1), (0.1, 10.0), (3.0, 0.33)])
 def test_a_wrong_load_is_told_first(factor: float, times: float) -> None:
     result = diagnose_recordings(sound(), with_load(factor)).json
