@@ -351,15 +351,25 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
     assert all(item.in_place for item in found.found)
 
 
-def test_names_that_settle_with_time_are_doubted_by_all_that_they_do(problem: Problem) -> None:
-    """Others by what they took alone, a twenty-fifth of it."""
-    for one, settles in ((effect("line_loss_quadratic", c=3e5), False), (effect("pressure_lag", tau=0.05), True)):
-        torque = problem.predict_all(problem.start(), [one])
-        result = fit(with_torque(problem, torque), weight(problem), [one])
-        little, much = (compare.may_differ(problem, result, [gain]) for gain in (1e3, 1e6))
-        assert (little == much) == settles
-        does = float(np.sum(((torque - problem.predict_all(problem.start())) * weight(problem)) ** 2))
-        assert 0.0 < little <= (0.061 * does if settles else 40.0)
+@pytest.mark.parametrize("settles", [False, True])
+def test_names_are_doubted_by_what_they_took_as_far_as_their_laws_bend(problem: Problem, settles: bool) -> None:
+    """A twenty-fifth of it; and those that settle with time by all that they do, bent or not."""
+    one = effect("pressure_lag", tau=0.05) if settles else effect("line_loss_quadratic", c=3e5)
+    torque, base = (problem.predict_all(problem.start(), effects) for effects in ([one], []))
+    bent = with_torque(problem, torque).bent([0.3 * (torque - base)[:, None]])
+    result = fit(bent, weight(problem), [one])
+    of_bends = (np.arange(result.x.size) == problem.nuisances) * 0.5
+    little, much, straight = (
+        compare.may_differ(bent, replace(result, x=result.x + size * of_bends), 1, [gain]) for gain, size in ((1e3, 1), (1e9, 1), (1e9, 0))
+    )
+    does = float(np.sum(((torque - base) * weight(problem)) ** 2))
+    if settles:
+        assert 0.0 < straight <= 0.061 * does
+        assert little == much >= straight
+    else:
+        assert straight < 1e-6 * does
+        assert little == pytest.approx(40.0, abs=1.0)
+        assert 0.0 < much <= 20.0 * 0.15**2 * does
 
 
 def test_the_error_of_an_arm_counts_in_the_torque_as_measured(problem: Problem) -> None:

@@ -34,6 +34,9 @@ NAME_TAKEN, TAKEN_OF_SLOW = 0.04, 0.06
 """What FORM_TAKEN is of names, which have fewer freedoms of their own: the energy of an error of a fifth of their torque; and of those
 that settle with time, or follow the acceleration: how rubber, oil and sensors settle is known less well than how they act, and an
 acceleration only as smoothed as the angles ask for."""
+SHOWN = 20.0
+"""Times what the bends of names themselves do that their laws may be wrong by at most: of an error, places along a name's own coordinate
+take more than a twentieth."""
 ROUNDS, ALIKE = 3, 0.1
 """Most refits until doubt and size of the bends stay, the doubt within so much of itself."""
 SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -115,19 +118,21 @@ def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) ->
     return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + stands + own
 
 
-def may_differ(problem: Problem, result: Fit, gains: Sequence[float]) -> float:
-    """Energy that another form of the last names of ``result`` may make; ``gains``: what each of them took.
+def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]) -> float:
+    """Energy that another form of the ``older`` effects of ``result`` may make; ``gains``: what each of the last of these took.
 
-    Shares of these, as beside a name its own law may bend along its coordinate; and where time or acceleration is that, of what every
-    joint has too, of all that its torque does beyond a recalibration.
+    Shares of these, as beside a name its own law may bend along its coordinate, but no more than SHOWN by how far it does; and where time
+    or acceleration is that, of what every joint has too, of all that its torque does beyond a recalibration.
     """
-    first, found = len(result.effects) - len(gains), 0.0
-    for i, (candidate, _) in enumerate(result.effects):
+    first, slow, found = older - len(gains), 0.0, 0.0
+    for i, (candidate, _) in enumerate(result.effects[:older]):
         if _slow(candidate.effect):
-            found += TAKEN_OF_SLOW * beyond_calibration(problem, result, contribution(problem, result, i))
+            slow += TAKEN_OF_SLOW * beyond_calibration(problem, result, contribution(problem, result, i))
         elif i >= first:
             found += NAME_TAKEN * gains[i - first]
-    return found
+    own = slice(problem.nuisances - problem.shapes, problem.nuisances)
+    bent = problem.bends[:, problem.bends.shape[1] - problem.shapes :] @ result.x[own]
+    return slow + min(found, SHOWN * beyond_calibration(problem, result, bent))
 
 
 def _slow(effect: Effect) -> bool:

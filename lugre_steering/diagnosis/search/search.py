@@ -152,16 +152,17 @@ def _step(
 ) -> _Step | None:
     """The best of what is proposed beside ``current``, unless it takes far too little; ``names``: those that stand there."""
     there, best = clearest(weight, seen)
-    stands = may_differ(seen[0].problem, current, [item.gain for item in names])
+    older, gains = len(current.effects), [item.gain for item in names]
     instead = None if names else _in_place_of_form(seen, weight)
-    named = bool(best.effects[len(current.effects) :])
+    named = bool(best.effects[older:])
     step = None
+    stands = may_differ(there, best, older, gains)
     if named and _taken(there, weight, current, best) >= HOPELESS * needed(there, best, weight, stands):
         progress(f"a closer look at {best.effects[-1][0].label}")
         there, best, one = _closest([there] if names else worlds(there), weight, split, seen, current)
         whole = _everywhere(there, weight, best, names)
         one = replace(one, gain=one.gain + best.cost - whole.cost)
-        short = one.gain < needed(there, whole, weight, stands) or _as_far_as_it_may(whole, len(names) + 1)
+        short = one.gain < needed(there, whole, weight, may_differ(there, whole, older, gains)) or _as_far_as_it_may(whole, len(names) + 1)
         step = _Step(there, whole, one, short)
     if instead is not None and (step is None or step.short):
         step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
