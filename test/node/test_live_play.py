@@ -104,7 +104,7 @@ def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:
         seen = subprocess.Popen([*command, "watch", "--seconds", "300"], env=environment(), stdout=subprocess.PIPE, text=True)
         processes.append(seen)
         with World(outputs=["residual"]) as world:
-            world.wait(lambda: world.node.count_subscribers(f"{NAME}/residual") == 2)
+            world.wait(lambda: world.node.count_subscribers(f"{NAME}/residual") >= 2)
             begun = time.monotonic()
             bag = [*command, "play", tmp_path / "run", "--json"]
             played = subprocess.run(bag, env=environment(), capture_output=True, text=True, check=True)
