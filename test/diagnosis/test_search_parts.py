@@ -365,7 +365,7 @@ def test_names_are_doubted_by_what_they_took_as_far_as_their_laws_bend(problem: 
     does = float(np.sum(((torque - base) * weight(problem)) ** 2))
     if settles:
         assert 0.0 < straight <= 0.061 * does
-        assert little == much >= straight
+        assert 0.0 < little == much
     else:
         assert straight < 1e-6 * does
         assert little == pytest.approx(40.0, abs=1.0)
