@@ -71,13 +71,33 @@ def inspect_dead(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
 
 
 def inspect_angles(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """Findings about angles of sound units that are too noisy to follow a bristle, or one and the same twice."""
+    """Findings about angles of sound units that are too noisy to follow a bristle."""
     try:
         run = prepare(recording, vehicle)
     except DataError:
         return ()
     topics = {(c.kind, c.name): c.topic for c in vehicle.channels}
-    return (*_rough(recording, run, vehicle, topics), *_copied(run, vehicle, topics))
+    return tuple(_rough(recording, run, vehicle, topics))
+
+
+def inspect_copies(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """A finding where both angles are alike although the steering geometry makes them differ.
+
+    About the recording as it came: a copy that lags looks so noisy that nothing of it may be left to use.
+    """
+    ratio = _ratio(vehicle)
+    left, right = (recording.angle.get(side) for side in ("left", "right"))
+    if ratio is None or left is None or right is None or min(left.time_s.size, right.time_s.size) < 2:
+        return ()
+    apart = _rms(_other(left.value, ratio) - left.value)
+    if apart < APART_RAD or _rms(np.interp(left.time_s, right.time_s, right.value) - left.value) > COPIED * apart:
+        return ()
+    topics = {c.name: c.topic for c in vehicle.channels if c.kind is Kind.ANGLE}
+    statement = (
+        f"show one and the same angle, where the steering geometry makes the tracks differ by {np.degrees(apart):.1f} deg; one sensor is "
+        "missing, or read twice (with one sensor alone, say so: sensors.angle_from)"
+    )
+    return (_finding("copied_sensor", f"{topics['left']}, {topics['right']}", statement),)
 
 
 def _finding(name: str, topic: str, statement: str, intervals: Intervals = ()) -> Finding:
@@ -184,10 +204,18 @@ def _frozen(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]
 
 def _geometry(run: Run, vehicle: Vehicle) -> tuple[Array, Array, float] | None:
     """Left and right angle (n,) and b / L of a vehicle whose two sensors obey a steering geometry."""
-    if vehicle.axle is None or set(vehicle.sides) != {"left", "right"} or vehicle.sensors.angle_from is not None:
+    ratio = _ratio(vehicle)
+    if ratio is None:
         return None
     left, right = (run.theta[vehicle.sides.index(side)][run.valid] for side in ("left", "right"))
-    return left, right, vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
+    return left, right, ratio
+
+
+def _ratio(vehicle: Vehicle) -> float | None:
+    """b / L of a vehicle with two angle sensors that obey a steering geometry."""
+    if vehicle.axle is None or set(vehicle.sides) != {"left", "right"} or vehicle.sensors.angle_from is not None:
+        return None
+    return vehicle.axle.kingpin_distance_m / vehicle.axle.wheelbase_m
 
 
 def _other(left: Array, ratio: float) -> Array:
@@ -198,21 +226,6 @@ def _other(left: Array, ratio: float) -> Array:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
-
-
-def _copied(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:
-    """Both angles alike where the steering geometry makes them differ."""
-    both = _geometry(run, vehicle)
-    if both is None:
-        return
-    left, right, ratio = both
-    apart = _rms(_other(left, ratio) - left)
-    if apart > APART_RAD and _rms(right - left) < COPIED * apart:
-        topic = f"{topics[Kind.ANGLE, 'left']}, {topics[Kind.ANGLE, 'right']}"
-        yield _finding(
-            "copied_sensor", topic, "show one and the same angle, where the steering geometry makes the tracks differ by "
-            f"{np.degrees(apart):.1f} deg; one sensor is missing, or read twice (with one sensor alone, say so: sensors.angle_from)",
-        )  # fmt: skip
 
 
 def _zeros(run: Run, vehicle: Vehicle, topics: TopicNames) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from lugre_steering import units
 from lugre_steering.counted import counted
 from lugre_steering.data.dataset import GAP_S
-from lugre_steering.data.dead import HELD, inspect_angles, inspect_dead
+from lugre_steering.data.dead import HELD, inspect_angles, inspect_copies, inspect_dead
 from lugre_steering.data.pieces import in_pieces
 from lugre_steering.data.sensing import (
     FOURTH,
@@ -94,7 +94,7 @@ def inspect(recording: Recording, vehicle: Vehicle) -> Quality:
     usable = _with_signals(recording, clean)
     lost = tuple(_held_long(findings, looks))
     # What no sensor shows has no wiring to look at; angles in another unit have its noise too.
-    wrong = lost or _against_model(usable, vehicle)
+    wrong = lost or _against_model(usable, vehicle) or inspect_copies(recording, vehicle)
     if not wrong:
         findings += [finding for channel, look in looks.items() for finding in _sensor(channel, clean[channel], look, vehicle)]
     # One angle sensor for both tracks would say everything twice.

@@ -418,6 +418,17 @@ def test_dead_sensors_stop_the_diagnosis(fault: str) -> None:
     assert any(f["finding"] == finding and topic in f["topic"] for f in result["data_quality"])
 
 
+def test_a_copy_that_is_late_now_and_then_is_told_though_nothing_of_it_can_be_used() -> None:
+    recording = sound()[1]
+    left = recording.angle["left"]
+    count = left.time_s.size
+    late = (np.random.default_rng(3).random(count) < 0.5) & (np.arange(count) < 0.7 * count)
+    copy = Signal(left.time_s, left.value[np.maximum(np.arange(count) - late, 0)])
+    found = inspect(replace(recording, angle={"left": left, "right": copy}), VEHICLE).findings
+    assert {"friction_memory_lost", "copied_sensor"} <= {f.finding for f in found}
+    assert "copied_sensor" not in {f.finding for f in inspect(recording, VEHICLE).findings}
+
+
 @pytest.mark.parametrize("rate_Hz", [20.0, 50.0, 100.0, 500.0])
 def test_noise_is_told_as_that_of_one_sample(rate_Hz: float) -> None:
     """However many of them are averaged for the clock of the pressures: the spread of the noise that is added, counted by itself."""
