@@ -21,7 +21,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
-from lugre_steering.diagnosis.laws.rival import beside_form, in_place, keeps_names, leaves_names
+from lugre_steering.diagnosis.laws.rival import beside_form, in_place, in_place_of_one, keeps_names, leaves_names
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
@@ -213,6 +213,16 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
     _, _, again = beside_form(named(problem, viscous), beside)  # of which there is none here
     assert again.cost == pytest.approx(beside.fitted.cost, rel=0.02)
+    # Two laws that are both together explain no more than the name and one of them; of one law none can be spared.
+    room = Problem(problem.vehicle, problem.runs, more_laws=2)
+    loss = free_law(room, Cell("viscous_loss", Axis("none"), -1.0, 1.0, 1), 1, np.array([6e3]))
+    used = np.where(split(problem).fit, weight(problem), 0.0)
+    laws = fit(room, used, [loss, *beside.fitted.effects[1:]], beside.fitted.x[: room.nuisances])
+    swapped = in_place_of_one(named(problem, viscous), replace(beside, problem=room, fitted=laws, fit=laws, gains=(1.0, 1.0)), 1)
+    assert swapped is not None
+    assert swapped.names == 1
+    assert [law["title"] for law in described(swapped)] == [entry.title]
+    assert in_place_of_one(named(problem, viscous), alone, 1) is None
 
 
 def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> None:

@@ -61,11 +61,11 @@ def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
 
 def in_place_of_one(done: Finished, alone: FoundLaws, seed: int) -> FoundLaws | None:
     """The names in place of one of the laws ``alone``, with the others beside them, if that is no less evident: then what the names do not
-    explain is what another law is there for. None where no law can be spared."""
-    best, energy = None, np.inf
-    for index in range(len(alone.gains)):
+    explain is what another law is there for. None where no law can be spared, or where there is no other."""
+    best, energy, form = None, np.inf, beside_form(done, alone)
+    for index in range(len(alone.gains) if len(alone.gains) > 1 else 0):
         swapped = _swapped(done, alone, index, seed)
-        mine, laws, base = _energies(done, [beside_form(done, swapped), beside_form(done, alone)])
+        mine, laws, base = _energies(done, [beside_form(done, swapped), form])
         if mine < laws + MARGIN * (base - laws) and mine < energy and leaves_names(done, swapped):
             best, energy = swapped, mine
     return best
