@@ -108,6 +108,17 @@ def test_degrees_that_sweep_past_the_joint_are_no_return_of_its_angle(seed: int)
     assert np.abs(warm[0] - warm[1]).max() < 0.2
 
 
+@pytest.mark.parametrize("name", ["degrees", "degrees, from straight ahead", "two samples", "five samples, both", "a train of spikes"])
+def test_what_no_joint_does_heats_nothing_while_it_lasts(name: str) -> None:
+    """Neither the jump nor how the reading goes on from there: degrees sweep through the angles of the joint at 50 times its rate.
+
+    A first step of 0.1 rad, which the joint could make, is believed for a sample."""
+    _, rows = drive(FAULTS[name])
+    _, i, j = np.intersect1d(rows["stamp_ns"], clean()["stamp_ns"], return_indices=True)
+    hotter = rows["temperature"][i] - clean()["temperature"][j]
+    assert hotter.max() < 0.2
+
+
 def known_again(end_s: float, t: Array) -> Array:
     """When the joints have turned since ``end_s`` by as much as brings any two bristles together: 2 exp(-travel / length) < 0.05."""
     time = np.arange(end_s, 20.0, 0.01)

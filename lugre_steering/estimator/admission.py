@@ -11,7 +11,7 @@ import numpy as np
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import row
 from lugre_steering.chain.layout import STATE
-from lugre_steering.estimator.doubt import leapt, reachable
+from lugre_steering.estimator.doubt import leapt, reachable, runs
 from lugre_steering.estimator.layout import (
     ABSURD,
     BACKWARD,
@@ -31,8 +31,8 @@ HOTTEST_AIR_DEGC = 75.0
 CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
 
 
-REJECTED, ACCEPTED, JUMPED = range(3)
-"""What ``admit`` says of a sample."""
+REJECTED, ACCEPTED, JUMPED, RUNNING = range(4)
+"""What ``admit`` says of a sample; of an angle that jumps also if it goes on from there as no joint does."""
 _GOES_ON = -1
 """Nothing decides about the sample yet."""
 _SOUND = -1
@@ -198,8 +198,9 @@ def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
     if ch.head == 1:  # two agree against the first one
         _begin_side(core, ch.index)
         return ACCEPTED
+    seconds = (stamp_ns - ch.suspect_ns) * 1e-9
     ch.suspect_ns = 0
-    return JUMPED
+    return RUNNING if runs(core, ch.index, seconds, value - ch.suspect_value) else JUMPED
 
 
 @inner

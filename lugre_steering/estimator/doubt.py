@@ -21,7 +21,6 @@ import numpy as np
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
-from lugre_steering.estimator.layout import ANGLE_JUMP
 from lugre_steering.estimator.noise import learn_noise, noisy
 from lugre_steering.estimator.preview import departs
 from lugre_steering.estimator.unseen import AGREED_SHARE, FASTER, UNSEEN_SIGMA, farthest, lose_sight, part
@@ -335,14 +334,26 @@ def reachable(core, side, since_ns, stamp_ns, change):
 
 
 @inner
-def re_anchor(core, side, ch, stamp_ns, value):
+def runs(core, side, dt, change):
+    """Whether a reading changes by ``change`` [rad] in ``dt`` [s] as that of no joint does: degrees sweep like that."""
+    return dt > 0.0 and abs(change) > _leap_limit(core, side, dt)
+
+
+@inner
+def comes_back(core, side, stamp_ns, value):
+    """Whether an angle that jumped, with its last sample again, is now where the joint can have got to."""
+    g = core.guard[side]
+    return g.calm == 0.0 and not g.returned and reachable(core, side, g.shadow_ns, stamp_ns, value - g.shadow_angle)
+
+
+@inner
+def re_anchor(core, side, ch, stamp_ns, value, running):
     """The angle of a side jumps to ``value`` [rad], confirmed: no slip, no heat, unless the joint has really gone there.
 
-    That it has, after it was frozen, and where the shadow can have got to.
+    That it has, after it was frozen, and where the shadow can have got to; not if it is ``running`` on from an earlier jump.
     """
     g, c, out, motion = core.guard[side], core.config[0], core.output[side], core.motion[side]
     p, state, trial = row(core.parameters, side, BASELINE), row(core.state, side, STATE), row(core.scratch_state, 0, STATE)
-    ch.reasons[ANGLE_JUMP] += 1
     if g.shadow_ns == 0:
         g.shadow_unseen = g.unseen_ns != 0
     if g.shadow_ns == 0 and g.leap_ns == 0:
@@ -357,7 +368,7 @@ def re_anchor(core, side, ch, stamp_ns, value):
         begin_ns = g.shadow_ns
         if g.shadow_ns == 0:  # the leap before was the first jump
             g.shadow_ns, g.shadow_angle, begin_ns = g.leap_ns, g.leap_angle, g.leap_since_ns
-        g.returned = reachable(core, side, begin_ns, stamp_ns, value - g.shadow_angle)
+        g.returned = not running and reachable(core, side, begin_ns, stamp_ns, value - g.shadow_angle)
     g.calm = 0.0
     g.leap_ns = 0
     passed = (stamp_ns - g.shadow_ns) * 1e-9

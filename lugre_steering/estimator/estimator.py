@@ -20,7 +20,7 @@ from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
-from lugre_steering.estimator.admission import JUMPED, REJECTED, admit
+from lugre_steering.estimator.admission import REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD, watch_line
 from lugre_steering.estimator.known import known_range
 from lugre_steering.estimator.layout import (
@@ -94,7 +94,7 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
         ch = core.channels[k]
         ch.accepted += 1
         if ch.kind == Kind.ANGLE:
-            n_estimates = advance(core, k, stamp_ns[i], value[i], rate[i], verdict == JUMPED, estimates, n_estimates)
+            n_estimates = advance(core, k, stamp_ns[i], value[i], rate[i], verdict, estimates, n_estimates)
         elif ch.kind == Kind.AIR_TEMPERATURE:
             ch.last_ns = stamp_ns[i]
             for side in range(core.motion.size):

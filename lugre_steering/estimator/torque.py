@@ -11,20 +11,22 @@ from lugre_steering.chain.doors import call_step, row
 from lugre_steering.chain.lag import lag_weights
 from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.chain.rates import follow
-from lugre_steering.estimator.admission import restart
+from lugre_steering.estimator.admission import ACCEPTED, RUNNING, restart
 from lugre_steering.estimator.doubt import (
     LAW,
     LEAP_RATE_RAD_S,
     RANGE,
     TABLE,
     angle_doubts,
+    comes_back,
     re_anchor,
+    runs,
     standing_doubts,
     trust,
     watch,
     watch_leap,
 )
-from lugre_steering.estimator.layout import OVERRUN, UNPAIRED
+from lugre_steering.estimator.layout import ANGLE_JUMP, OVERRUN, UNPAIRED
 from lugre_steering.estimator.noise import lose_bristle, noise_of
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
@@ -152,10 +154,10 @@ def _outside(c, state, motion, saturated, beyond):
 
 
 @inner
-def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
+def advance(core, k, stamp_ns, value, rate, verdict, estimates, count):
     """One accepted angle sample: advance its side, and publish when the other side has the same stamp.
 
-    ``jumped``: a confirmed jump, which moves the angle but not the contact. (To hand the whole core on costs 0.1 us: steps
+    ``verdict`` of its admission: a confirmed jump moves the angle but not the contact. (To hand the whole core on costs 0.1 us: steps
     get what they need of it.)
     """
     c, ch = core.config[0], core.channels[k]
@@ -164,8 +166,14 @@ def advance(core, k, stamp_ns, value, rate, jumped, estimates, count):
     saturated, law_left = state.saturated, _law_left(core, side)
     dt = _elapsed(c, ch, state, stamp_ns)
     g = core.guard[side]
-    if jumped:
-        re_anchor(core, side, ch, stamp_ns, value)
+    jumps, running = verdict != ACCEPTED, verdict == RUNNING
+    if jumps:
+        ch.reasons[ANGLE_JUMP] += 1
+    elif g.shadow_ns != 0:
+        running = runs(core, side, dt, value - ch.last_value)
+        jumps = running or comes_back(core, side, stamp_ns, value)
+    if jumps:
+        re_anchor(core, side, ch, stamp_ns, value, running)
     else:
         rates = core.trust[side]
         rate = believed(rates, ch, c, dt, value, rate)

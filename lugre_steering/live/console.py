@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.impl.rcutils_logger import CallerId, RcutilsLogger
 
 REPEAT_S = 30.0
 GRACE_S = 3.0
@@ -20,6 +20,7 @@ class Console:
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
         self._told: dict[str, tuple[str, float]] = {}
+        CallerId()  # rclpy's first look for who logs goes through every loaded module: 40 ms, which no callback may wait for
 
     def tell(self, statuses: Iterable[DiagnosticStatus], since_start_s: float) -> None:
         """Say what is new in the statuses or has not been said for long; ``since_start_s`` [s] is the time."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 import threading
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,8 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._latency_window = latency_window
         self._began_ns = self._reported_ns = self._saved_ns = time.monotonic_ns()
         self._news_ns = 0
+        self._reporting: Iterator[DiagnosticStatus] | None = None
+        self._statuses: list[DiagnosticStatus] = []
         self._console = Console(self.get_logger())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Steady, so that health is reported while simulated time stands still.
@@ -192,8 +194,10 @@ class SteeringTorqueEstimator(LifecycleNode):
         news = now_ns - self._news_ns >= NEWS_S * 1e9 and session.untold
         if news:
             self._news_ns = now_ns
-        if news or waited_s >= REPORT_S:
+        if news:
             self._report(session, now_ns)
+        elif self._reporting is not None or waited_s >= REPORT_S:
+            self._go_on_reporting(session, now_ns)
         if session.alarm:
             session.alarm = False
             write = session.window("the residual is not what it was")
@@ -201,16 +205,34 @@ class SteeringTorqueEstimator(LifecycleNode):
                 threading.Thread(target=self.guarded(lambda: self._written(write())), daemon=True).start()
 
     def _report(self, session: Session, monotonic_ns: int) -> None:
-        session.choose_clock()
-        elapsed_s = (monotonic_ns - self._reported_ns) * 1e-9
-        self._reported_ns = monotonic_ns
-        statuses = session.statuses(monotonic_ns, elapsed_s)
-        self._diagnose(statuses)
-        self._console.tell(statuses, (monotonic_ns - self._began_ns) * 1e-9)
+        """The whole report at once, after the rest of one that is under way."""
+        if self._reporting is not None:
+            self._finish_reporting(session, monotonic_ns)
+        self._finish_reporting(session, monotonic_ns)
+
+    def _finish_reporting(self, session: Session, monotonic_ns: int) -> None:
+        while self._go_on_reporting(session, monotonic_ns):
+            pass
+
+    def _go_on_reporting(self, session: Session, monotonic_ns: int) -> bool:
+        """One more status of the report, the last time the report itself: no torque waits for all of it. Whether it goes on."""
+        if self._reporting is None:
+            session.choose_clock()
+            elapsed_s = (monotonic_ns - self._reported_ns) * 1e-9
+            self._reported_ns = monotonic_ns
+            self._reporting, self._statuses = session.statuses(monotonic_ns, elapsed_s), []
+        status = next(self._reporting, None)
+        if status is not None:
+            self._statuses.append(status)
+            return True
+        self._reporting = None
+        self._diagnose(self._statuses)
+        self._console.tell(self._statuses, (monotonic_ns - self._began_ns) * 1e-9)
         due = monotonic_ns - self._saved_ns >= self.settings.state_period_s * 1e9
         if due and (self._writer is None or not self._writer.is_alive()):
             self._writer = threading.Thread(target=self._to_write(), daemon=True)  # a disk may be slow
             self._writer.start()
+        return False
 
     def _diagnose(self, statuses: list[DiagnosticStatus]) -> None:
         message = DiagnosticArray(status=statuses)

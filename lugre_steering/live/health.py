@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -27,7 +27,7 @@ PERIOD_S = 0.5
 FAR_NS = 10_000_000_000
 """A clock that is wrong by more than that is another clock."""
 OTHER_CLOCK = "is use_sim_time to be set, or a bag played at another rate?"
-RECENT = 5000
+RECENT = 1000
 """Latencies that percentiles are taken of, so that they cost the same however many are kept."""
 
 
@@ -50,8 +50,9 @@ class Latencies:
         if not self.count:
             return [math.nan] * len(percent)
         kept = min(self.count, self.values.size, RECENT)
-        latest = self.values[np.arange(self.count - kept, self.count) % self.values.size]
-        return [float(value) * 1e-6 for value in np.percentile(latest, percent)]
+        latest = np.sort(self.values[np.arange(self.count - kept, self.count) % self.values.size])
+        places = np.array(percent) * (kept - 1) / 100.0  # np.percentile does the same, and takes five times as long
+        return [float(value) * 1e-6 for value in np.interp(places, np.arange(kept), latest)]
 
 
 class Health:
@@ -102,6 +103,7 @@ class Health:
         self._then_exceptions = 0
         self._then_withheld: Counter[str] = Counter()
         self._then_estimates = 0
+        self._pairs: dict[tuple[str, str], tuple[object, KeyValue]] = {}
 
     def set_timeouts(self, angle_timeout_s: float, pressure_timeout_s: float) -> None:
         self._timeouts_s = [angle_timeout_s if kind is Kind.ANGLE else pressure_timeout_s for kind in self._kinds]
@@ -170,20 +172,17 @@ class Health:
         elapsed_s: float,
         counters: Mapping[str, Mapping[str, int]],
         saturated_steps: int,
-    ) -> list[DiagnosticStatus]:
-        """The status messages of the last ``elapsed_s`` seconds; ``counters`` as the estimator keeps them."""
+    ) -> Iterator[DiagnosticStatus]:
+        """The status messages of the last ``elapsed_s`` seconds, each made when asked for; ``counters`` as the estimator keeps them."""
         self._period_s += elapsed_s
         if self._period_s >= PERIOD_S:
             self._take_levels()
-        statuses = [
-            self._inputs(now_ns, list(counters)),
-            self._rejected(counters),
-            self._latency(),
-            self._residual(saturated_steps),
-            self._outputs(monotonic_ns),
-        ]
+        yield self._inputs(now_ns, list(counters))
+        yield self._rejected(counters)
+        yield self._latency()
+        yield self._residual(saturated_steps)
+        yield self._outputs(monotonic_ns)
         self._then_arrivals = list(self.arrivals)
-        return statuses
 
     def _take_levels(self) -> None:
         """The rates and residual levels of the period that ends now."""
@@ -206,9 +205,17 @@ class Health:
         return residual, estimate, measured, count
 
     def _status(self, component: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
-        pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
+        pairs = [self._pair(component, key, value) for key, value in values.items()]
         name = f"{self._node}: {component}"
         return DiagnosticStatus(level=level, name=name, message=message, hardware_id=self._vehicle.name, values=pairs)
+
+    def _pair(self, component: str, key: str, value: object) -> KeyValue:
+        """A message is dear to make, and most of them say what they said before."""
+        said, pair = self._pairs.get((component, key), (None, None))
+        if pair is None or said != value:
+            pair = KeyValue(key=key, value=_text(value))
+            self._pairs[component, key] = value, pair
+        return pair
 
     def _inputs(self, now_ns: int, labels: Sequence[str]) -> DiagnosticStatus:
         level = OK

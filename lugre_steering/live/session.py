@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -148,7 +148,7 @@ class Session:
         """Whether there is something that the last report did not tell."""
         return self.news or self.alarm or self.health.untold(self._now_ns(), self.estimator.rejections)
 
-    def statuses(self, monotonic_ns: int, elapsed_s: float) -> list[DiagnosticStatus]:
+    def statuses(self, monotonic_ns: int, elapsed_s: float) -> Iterator[DiagnosticStatus]:
         self.news = False
         estimator, now_ns = self.estimator, self._now_ns()
         self.health.simulated, self.health.active = self.simulated, self.active
