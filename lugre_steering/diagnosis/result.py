@@ -160,7 +160,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left: whether it is structure, where, and the best formula over named, unit-carrying variables."""
+    """What is left: whether it is structure, where, and the formula of the law found for it."""
 
     structured: bool
     description: str

@@ -10,7 +10,7 @@ import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits, unlisted
+from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.statement import _gain, at_end, calibrations_at_bounds
 from lugre_steering.diagnosis.finished import Finished
@@ -35,7 +35,7 @@ def problem() -> Problem:
 
 def finished(problem: Problem, baseline: Fit, scores: tuple[Score, ...] = ()) -> Finished:
     noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(4).standard_normal((4, problem.valid.size)), 0.0)
-    found = Search(baseline, baseline, (), scores, (), None)
+    found = Search(baseline, baseline, (), scores, ())
     return Finished(problem, noise, split.split(problem), found)
 
 
@@ -114,7 +114,7 @@ def test_structure_is_located_in_a_recording_shorter_than_the_window(problem: Pr
     both = Problem(problem.vehicle, runs)
     residual = np.where(both.bag == 1, 10.0 * SIGMA, 0.0)
     done = finished(both, fit(both, weight(both)))
-    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual, None)
+    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual)
     assert entry.bag == "short"
     assert entry.intervals_s[0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
 
@@ -127,16 +127,6 @@ def test_held_out_errors_of_a_bag_are_those_of_the_fit_that_was_judged(problem: 
         own = rmse(problem, baseline, done.roles.held & (problem.bag == bag))
         assert trace.heldout_Nm == (own, own)
     assert {trace.heldout_Nm for trace in traces(done, other, other, None)} == {None}
-
-
-def test_each_recording_is_filtered_from_rest() -> None:
-    time = np.concatenate([0.01 * np.arange(400), 0.02 * np.arange(200)])
-    value = np.concatenate([np.ones(400), np.zeros(200)])
-    filtered = unlisted._low_pass(value, time, 1.0)
-    assert filtered[399] == pytest.approx(1.0 - np.exp(-4.0), abs=0.01)
-    assert np.all(filtered[400:] == 0.0)
-    ramp = unlisted._low_pass(np.ones(200), time[400:], 1.0)
-    assert ramp[49] == pytest.approx(1.0 - np.exp(-1.0), abs=0.01)
 
 
 @pytest.mark.parametrize(("doubt", "expected"), [(1.0, np.sqrt(1.0 / 9.0)), (200.0, np.sqrt(200.0 / 800.0))])

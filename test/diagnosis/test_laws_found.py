@@ -62,7 +62,7 @@ def white(problem: Problem) -> Noise:
 
 def named(problem: Problem, final: Fit) -> Finished:
     """A search that came to ``final``."""
-    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), (), None))
+    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), ()))
 
 
 def by_run(part: object) -> Array:
@@ -209,7 +209,9 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     assert [law["title"] for law in described(beside)] == [entry.title]
     assert not in_place(named(problem, viscous), alone, beside)  # far truer than the law alone
     assert leaves_names(named(problem, viscous), beside)
-    assert not keeps_names(named(problem, viscous), beside, alone)  # which nothing less would keep: the law alone is one part
+    assert keeps_names(named(problem, viscous), beside, alone)  # though it is two parts, and the law alone is one
+    as_true = replace(alone, problem=beside.problem, fitted=beside.fitted)
+    assert not keeps_names(named(problem, viscous), beside, as_true)
     assert beside.fit.effects[0][1]["sigma_2"] == pytest.approx(6e3, rel=0.1)
     _, _, again = beside_form(named(problem, viscous), beside)  # of which there is none here
     assert again.cost == pytest.approx(beside.fitted.cost, rel=0.02)

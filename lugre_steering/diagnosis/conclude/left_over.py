@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What remains after the final fit: whether it is structure worth a verdict, where it lives, and a formula for it."""
+"""What remains after the final fit: whether it is structure worth a verdict, and where it lives."""
 
 from __future__ import annotations
 
@@ -11,24 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis.conclude import unlisted
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.loudness import FORM_LEFT, beyond_calibration, form_energy, loudness
+from lugre_steering.diagnosis.loudness import beyond_calibration, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.compare import needed
-from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
-FORETELLS = 0.1
-"""Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
-TELLING = 0.5
-"""Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
-FORMULA = 0.02
-"""Share of the held-out energy that a formula must explain to be proposed."""
 MOSTLY = 0.3
 """Share of the largest from which a freedom of the friction law is told."""
 LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
@@ -47,8 +37,7 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     """Judge what ``final`` leaves of the measured torque; ``needs_form``: there is more than noise without the freedoms beside it."""
     residual = done.problem.measured - final.prediction
     excess, slow, loud = loudness(done.problem, done.noise, final)
-    pattern, gain = _pattern(done, final)
-    if not loud and not gain > FORETELLS:
+    if not loud:
         description = "what is left is within noise and the simulation's own error"
         if needs_form:
             form = _form(done, final)
@@ -62,29 +51,12 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     axes = [locate.coordinates(run, run.measured) for run in done.problem.runs]
     stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
     axis, share, _ = locate.telling_coordinate(stacked, residual, done.weight, done.noise.draws)
-    # A formula is of use only in what a model knows beforehand: its own torque, not the measured one.
-    parts = np.split(final.prediction, done.problem.edges[1:-1])
-    own = [locate.coordinates(run, part) for run, part in zip(done.problem.runs, parts, strict=True)]
-    known = {key: np.concatenate([bag[key] for bag in own]) for key in own[0]}
-    proposal = unlisted.propose(known, residual, done.fitted, done.held, units.is_linear(done.problem.vehicle))
-    shape = None
-    if pattern is not None and gain > (proposal.gain if proposal is not None else FORMULA):
-        proposal = unlisted.Formula(f"torque [N m] = {pattern.text}", gain)
-        # A pattern that explains most of it also says where it acts below the noise.
-        shape = pattern.torque if gain > TELLING or not loud else None
-    formula = None
-    if proposal is not None:
-        law = units.law(done.problem.vehicle, proposal.text)
-        formula = f"{law} (removes {words.percent(proposal.gain)} of the held-out residual energy)"
     more = max(excess, slow)  # the level of the noise may be overstated
     text = (
         f"{words.percent(more / (1.0 + more))} of what the model leaves over is more than noise, most of it along {axis} "
         f"({words.percent(share)} of the residual energy follows it)"
-        if loud
-        else f"a pattern outside the catalogue foretells {words.percent(gain)} of the held-out residual energy"
     )
-    where = _where(done, axes, axis, residual, shape)
-    return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
+    return LeftOver(Unexplained(True, text, None, tuple(_where(done, axes, axis, residual))), text, True)
 
 
 def _form(done: Finished, final: Fit) -> str:
@@ -105,42 +77,16 @@ def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> Le
     return LeftOver(replace(before.entry, description=f"{law}; {rest}", formula=formula), rest, True)
 
 
-def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
-    """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells.
-
-    It must take as much of what is fitted as a name: freedoms that explain all of that may still err on what is held out, where they
-    had no such places or ways, and a pattern make up for it.
-    """
-    pattern, baseline = done.found.pattern, done.found.baseline
-    if final.effects or pattern is None:
-        return None, 0.0
-    taken = cost(done.problem, baseline, done.fitted) - pattern.cost(done.problem, done.fitted)
-    if taken < needed(done.problem, baseline, done.fitted):
-        return None, 0.0
-    before = cost(done.problem, baseline, done.held)
-    after = pattern.cost(done.problem, done.held)
-    if before - after < FORM_LEFT * form_energy(done.problem, final, done.held):
-        return None, 0.0
-    return pattern, 1.0 - after / max(before, 1e-9)
-
-
-def _where(
-    done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array, shape: Array | None
-) -> list[Place]:
-    """Stretches and range of ``axis`` that hold it: where ``shape`` (n,) acts if given, else where the residual is loud."""
+def _where(done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array) -> list[Place]:
+    """Stretches and range of ``axis`` where the residual is loud."""
     problem = done.problem
     entries = []
     for bag, (run, values) in enumerate(zip(problem.runs, axes, strict=True)):
         part = slice(problem.edges[bag], problem.edges[bag + 1])
-        if shape is None:
-            width = int(np.clip(round(LOCATED_S / (run.time[1] - run.time[0])), 1, run.time.size))
-            smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
-            limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
-            spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
-            piece = residual[part] * (smooth > limit)
-        else:
-            spans, piece = locate.intervals(run.time, shape[part]), shape[part]
-        if spans:
-            between = locate.active_range(values[axis], piece)
+        width = int(np.clip(round(LOCATED_S / (run.time[1] - run.time[0])), 1, run.time.size))
+        smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
+        limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
+        if spans := locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0)):
+            between = locate.active_range(values[axis], residual[part] * (smooth > limit))
             entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATE_UNITS[axis])))
     return entries

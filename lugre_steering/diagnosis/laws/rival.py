@@ -53,10 +53,11 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
 
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
-    """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them there are no more parts than without
-    them, each name is needed, and held-out data are explained no worse."""
-    parts = beside.names + len(beside.gains)
-    return parts <= len(alone.gains) and beside.beyond(done.held) <= alone.beyond(done.held) and leaves_names(done, beside)
+    """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them each name is needed, and held-out data
+    are explained no worse by no more parts than without them, or far better."""
+    parts, rest, other = beside.names + len(beside.gains), beside.beyond(done.held), alone.beyond(done.held)
+    better = rest < TRUER * other or (rest <= other and parts <= len(alone.gains))
+    return better and leaves_names(done, beside)
 
 
 def in_place_of_one(done: Finished, alone: FoundLaws, seed: int) -> FoundLaws | None:
