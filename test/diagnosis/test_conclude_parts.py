@@ -35,7 +35,7 @@ def problem() -> Problem:
 
 def finished(problem: Problem, baseline: Fit, scores: tuple[Score, ...] = ()) -> Finished:
     noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(4).standard_normal((4, problem.valid.size)), 0.0)
-    found = Search(baseline, baseline, (), scores, ())
+    found = Search(baseline, baseline, (), scores, (), None)
     return Finished(problem, noise, split.split(problem), found)
 
 
@@ -114,7 +114,7 @@ def test_structure_is_located_in_a_recording_shorter_than_the_window(problem: Pr
     both = Problem(problem.vehicle, runs)
     residual = np.where(both.bag == 1, 10.0 * SIGMA, 0.0)
     done = finished(both, fit(both, weight(both)))
-    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual)
+    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual, None)
     assert entry.bag == "short"
     assert entry.intervals_s[0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
 

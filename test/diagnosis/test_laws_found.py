@@ -62,7 +62,7 @@ def white(problem: Problem) -> Noise:
 
 def named(problem: Problem, final: Fit) -> Finished:
     """A search that came to ``final``."""
-    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), ()))
+    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), (), None))
 
 
 def by_run(part: object) -> Array:

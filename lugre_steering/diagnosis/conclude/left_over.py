@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What remains after the final fit: whether it is structure worth a verdict, and where it lives."""
+"""What remains after the final fit: whether it is structure worth a verdict, where it lives, and the formula of a pattern for it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,20 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.loudness import beyond_calibration, loudness
+from lugre_steering.diagnosis.loudness import FORM_LEFT, beyond_calibration, form_energy, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search.compare import needed
+from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
+FORETELLS = 0.1
+"""Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
+TELLING = 0.5
+"""Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
 MOSTLY = 0.3
 """Share of the largest from which a freedom of the friction law is told."""
 LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
@@ -37,7 +44,8 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     """Judge what ``final`` leaves of the measured torque; ``needs_form``: there is more than noise without the freedoms beside it."""
     residual = done.problem.measured - final.prediction
     excess, slow, loud = loudness(done.problem, done.noise, final)
-    if not loud:
+    pattern, gain = _pattern(done, final)
+    if not loud and not gain > FORETELLS:
         description = "what is left is within noise and the simulation's own error"
         if needs_form:
             form = _form(done, final)
@@ -51,12 +59,21 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     axes = [locate.coordinates(run, run.measured) for run in done.problem.runs]
     stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
     axis, share, _ = locate.telling_coordinate(stacked, residual, done.weight, done.noise.draws)
+    shape, formula = None, None
+    if pattern is not None and gain > FORETELLS:
+        law = units.law(done.problem.vehicle, f"torque [N m] = {pattern.text}")
+        formula = f"{law} (removes {words.percent(gain)} of the held-out residual energy)"
+        # A pattern that explains most of it also says where it acts below the noise.
+        shape = pattern.torque if gain > TELLING or not loud else None
     more = max(excess, slow)  # the level of the noise may be overstated
     text = (
         f"{words.percent(more / (1.0 + more))} of what the model leaves over is more than noise, most of it along {axis} "
         f"({words.percent(share)} of the residual energy follows it)"
+        if loud
+        else f"a pattern outside the catalogue foretells {words.percent(gain)} of the held-out residual energy"
     )
-    return LeftOver(Unexplained(True, text, None, tuple(_where(done, axes, axis, residual))), text, True)
+    where = _where(done, axes, axis, residual, shape)
+    return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
 
 
 def _form(done: Finished, final: Fit) -> str:
@@ -77,16 +94,42 @@ def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> Le
     return LeftOver(replace(before.entry, description=f"{law}; {rest}", formula=formula), rest, True)
 
 
-def _where(done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array) -> list[Place]:
-    """Stretches and range of ``axis`` where the residual is loud."""
+def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
+    """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells.
+
+    It must take as much of what is fitted as a name: freedoms that explain all of that may still err on what is held out, where they
+    had no such places or ways, and a pattern make up for it.
+    """
+    pattern, baseline = done.found.pattern, done.found.baseline
+    if final.effects or pattern is None:
+        return None, 0.0
+    taken = cost(done.problem, baseline, done.fitted) - pattern.cost(done.problem, done.fitted)
+    if taken < needed(done.problem, baseline, done.fitted):
+        return None, 0.0
+    before = cost(done.problem, baseline, done.held)
+    after = pattern.cost(done.problem, done.held)
+    if before - after < FORM_LEFT * form_energy(done.problem, final, done.held):
+        return None, 0.0
+    return pattern, 1.0 - after / max(before, 1e-9)
+
+
+def _where(
+    done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array, shape: Array | None
+) -> list[Place]:
+    """Stretches and range of ``axis`` that hold it: where ``shape`` (n,) acts if given, else where the residual is loud."""
     problem = done.problem
     entries = []
     for bag, (run, values) in enumerate(zip(problem.runs, axes, strict=True)):
         part = slice(problem.edges[bag], problem.edges[bag + 1])
-        width = int(np.clip(round(LOCATED_S / (run.time[1] - run.time[0])), 1, run.time.size))
-        smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
-        limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
-        if spans := locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0)):
-            between = locate.active_range(values[axis], residual[part] * (smooth > limit))
+        if shape is None:
+            width = int(np.clip(round(LOCATED_S / (run.time[1] - run.time[0])), 1, run.time.size))
+            smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
+            limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
+            spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
+            piece = residual[part] * (smooth > limit)
+        else:
+            spans, piece = locate.intervals(run.time, shape[part]), shape[part]
+        if spans:
+            between = locate.active_range(values[axis], piece)
             entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATE_UNITS[axis])))
     return entries

@@ -67,12 +67,12 @@ def evidence(diagnosis: Diagnosis) -> str:
 
 
 def left(diagnosis: Diagnosis) -> str:
-    """What nothing listed explains, where it lives, and the formula of a law for it."""
+    """What nothing listed explains, where it lives, and a formula for it."""
     found = diagnosis.json["unexplained"]
     where = found["where"] if isinstance(found["where"], list) else []
     description = found["description"] or "Nothing beyond noise."
     formula = (
-        "<p>The law as a formula (a description, not a cause):</p>\n"
+        "<p>As a formula (a description, not a cause):</p>\n"
         f'<div class="formula">{text(found["formula"])}</div>\n'
         if found["formula"]
         else ""
