@@ -534,6 +534,22 @@ def test_of_one_claim_about_different_recordings_the_simpler_is_kept_unless_the_
     assert propose._one_of_each([much, whole, other], 1000.0) == [much, other]
 
 
+def test_of_one_claim_at_places_far_apart_the_better_leads_whichever_world_found_it(problem: Problem) -> None:
+    """A patch at 12 to 17 deg, sought from there and from the other side of the travel, where a fit stays."""
+    seen, patch = weight(problem), Candidate(CATALOGUE["surface_patch"], free=("change", "angle_low", "angle_high"))
+    truth = patch, {"change": -0.1, "angle_low": 0.21, "angle_high": 0.3}
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [truth]))
+    current, tried = fit(hidden, seen), []
+    for low, high, change in ((0.2, 0.28, -0.08), (-0.3, -0.2, 0.03)):
+        values = {"change": change, "angle_low": low, "angle_high": high}
+        one = fit(hidden, seen, [(patch, values)], current, linearisations=3)
+        tried.append(trial.Trial(Score(patch, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(3)), one, one.cost))
+    near, far = (propose.Proposal(hidden, current, (), [each]) for each in tried)
+    for worlds in ([near, far], [far, near]):
+        (best,) = propose.closer(hidden, seen, worlds).trials
+        assert best.fit.effects[-1][1]["angle_low"] == pytest.approx(0.21, abs=0.01)
+
+
 def test_an_event_in_one_block_is_seen_by_what_fits_and_by_what_judges(slower: Problem) -> None:
     """Recalibration that was fitted to the event would leave its error elsewhere, and it would be split by that."""
     torque = slower.predict_all(slower.start())

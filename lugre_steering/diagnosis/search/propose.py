@@ -67,16 +67,19 @@ def proposed(
 def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposal:
     """What leads in some rounds once more, with all parts of its laws, in one world."""
     current = fit(problem, weight, seen[0].current.effects, seen[0].current)
-    leading: dict[tuple[tuple[str, ...], tuple[int, ...] | None], Trial] = {}
+    leading = list[Trial]()
     for own in seen:
         best = own.before - own.trials[0].cost if own.trials else 0.0
-        found = [trial for trial in reversed(own.trials) if own.before - trial.cost > LEADING * best]
-        leading |= {(trial.candidate.claim, trial.candidate.bags): trial for trial in found}
-    trials, best = list[Trial](), current.cost
-    for trial in sorted(leading.values(), key=lambda each: each.cost):
+        leading += [trial for trial in own.trials if own.before - trial.cost > LEADING * best]
+    # Worlds may find one claim in places far from each other: from each of them.
+    fitted, best = dict[tuple[tuple[str, ...], tuple[int, ...] | None], Trial](), current.cost
+    for trial in sorted(leading, key=lambda each: each.cost):
         again = fit(problem, weight, trial.fit.effects, trial.fit, tolerance=TRIAL_TOLERANCE, worth=worth_of(current.cost, best))
-        trials.append(replace(trial, fit=again, cost=again.cost))
+        here = fitted.setdefault((trial.candidate.claim, trial.candidate.bags), replace(trial, fit=again, cost=again.cost))
+        if again.cost < here.cost:
+            fitted[trial.candidate.claim, trial.candidate.bags] = replace(trial, fit=again, cost=again.cost)
         best = min(best, again.cost)
+    trials = list(fitted.values())
     # Which law has the better simplest form says little about their whole forms.
     near, best = worth_of(current.cost, best), current.cost
     for i, trial in enumerate(trials):
