@@ -339,3 +339,18 @@ def test_help_calls_values_what_they_are_to_people() -> None:
     shown = CliRunner().invoke(cli.app, ["diagnose", "--help"], env={"COLUMNS": "80"}).stdout
     for option in ("--vehicle PATH", "--without TEXT", "--seed INTEGER", "--material NUMBER", "--effects PATH"):
         assert option in shown
+
+
+@pytest.mark.parametrize(
+    ("command", "usage", "argument"),
+    [
+        ("replay", "replay [OPTIONS] BAGS...", "BAGS...  rosbag2 folders"),
+        ("diagnose", "diagnose [OPTIONS] [BAGS...]", "BAGS...  rosbag2 folders"),
+        ("effects", "effects [OPTIONS] [ID]", "ID  explain this effect"),
+        ("config", "config [OPTIONS] [OPTION] [VALUE]", "OPTION  name of an option"),
+    ],
+)
+def test_help_calls_arguments_what_they_are_to_people(command: str, usage: str, argument: str) -> None:
+    shown = CliRunner().invoke(cli.app, [command, "--help"], env={"COLUMNS": "80"}).stdout
+    assert f"{usage}\n" in shown
+    assert argument in shown
