@@ -241,7 +241,15 @@ def test_numbers_stand_in_the_text(written: Written) -> None:
     text = Page(written.files[0].read_text(encoding="utf-8")).text.replace("\u00a0", " ")
     for number in ("96 %", "94 to 97 %", "93 %", "41 %", "22.918°", "0.3996 … 0.4004", "< 0.001", "321"):
         assert number in text, number
-    assert "soil_shear" in text
+    for name in ("soil_shear", "inertia of one track about its hinge", "track angle at which the stop begins"):
+        assert name in text, name
+
+
+def test_the_meaning_of_a_parameter_stands_alone() -> None:
+    """It is shown in the place of its name."""
+    for effect in CATALOGUE.values():
+        for parameter in effect.parameters:
+            assert parameter.meaning.split()[0] not in ("of", "between", "over", "while", "until", "positive:"), (effect.id, parameter.name)
 
 
 def test_page_is_small_enough_to_send(written: Written, vehicle: Vehicle) -> None:
@@ -477,6 +485,11 @@ def test_errors_have_the_digits_of_their_machine(value: float, beside: float, te
 )  # fmt: skip
 def test_numbers_are_readable(value: float | None, text: str) -> None:
     assert words.number(value) == text
+
+
+@pytest.mark.parametrize(("count", "text"), [(0, "0"), (3317, "3317"), (42_727, "42\u202f727"), (-1_000_000, "-1\u202f000\u202f000")])
+def test_counts_are_exact_in_the_groups_of_numbers(count: int, text: str) -> None:
+    assert words.whole(count) == text
 
 
 @pytest.mark.parametrize(
