@@ -661,6 +661,10 @@ def test_logarithmic_axes_carry_plain_numbers(tmp_path: Path) -> None:
     shown = [label.get_text() for labels in ("xticklabels", "yticklabels") for label in plt.getp(axes[0, 0], labels)]
     assert {"0.01", "1", "10", "1000"} <= set(shown)
     assert not [text for text in shown if "$" in text]
+    with figure(1, 1, "", tmp_path / "short.png") as axes:
+        axes[0, 0].plot([0.09, 0.5], [0.0, 1.0])
+        axes[0, 0].set(xscale="log")
+    assert {"0.2", "0.3", "0.4", "0.5"} <= {label.get_text() for label in axes[0, 0].get_xticklabels(which="minor")}
 
 
 # ----------------------------------------------------------------- the verdict on a terminal
