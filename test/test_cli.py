@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from outside import outside
 from rich.console import Console
 from rich.table import Table
 from rosbags.highlevel import AnyReader
@@ -37,7 +38,7 @@ pytestmark = pytest.mark.filterwarnings("error::UserWarning", "error::RuntimeWar
 
 ROOT = Path(__file__).resolve().parents[1]
 VEHICLE = ROOT / "config" / "test_vehicle.yaml"
-CONFORMANCE = ROOT.parent / "shared" / "conformance"
+CONFORMANCE = outside("conformance")
 ENVIRONMENT: Mapping[str, str] = os.environ | {
     "PYTHONPATH": str(Path(lugre_steering.__file__).parents[1]),
     "TERM": "xterm",
