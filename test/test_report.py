@@ -570,6 +570,19 @@ def test_browser_draws_every_plot_without_an_error_or_a_request(written: Written
 
 
 @needs_chromium
+def test_what_is_folded_on_a_screen_is_on_paper_too(written: Written, tmp_path: Path) -> None:
+    file = tmp_path / "printed.html"
+    asked = """<details><summary>2 more</summary><p>one</p><p>two</p></details><script>
+      function folded() { return document.querySelectorAll("details:not([open])").length; }
+      var told = [folded()];
+      ["beforeprint", "afterprint"].forEach(function (name) { window.dispatchEvent(new Event(name)); told.push(folded()); });
+      document.body.setAttribute("data-folded", told.map(Boolean).join(" "));
+    </script></body>"""
+    file.write_text(written.files[0].read_text(encoding="utf-8").replace("</body>", asked), encoding="utf-8")
+    assert 'data-folded="true false true"' in browse(file, tmp_path).dom
+
+
+@needs_chromium
 def test_browser_check_would_see_errors_and_requests(tmp_path: Path) -> None:
     """The check itself can fail: a page that throws and that loads something is caught."""
     file = tmp_path / "bad.html"
