@@ -375,7 +375,9 @@ def play(
     rate: Annotated[
         float, typer.Option(min=0.01, max=1000.0, help="times as fast as recorded; stamps keep their distances, and the node says so")
     ] = 1.0,
-    loop: Annotated[bool, typer.Option("--loop", help="again and again, until interrupted")] = False,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="again and again, until interrupted; the node warns where end and beginning do not meet")
+    ] = False,
     recorded_stamps: Annotated[bool, typer.Option("--recorded-stamps", help="leave the header stamps as they are")] = False,
     as_json: Json = False,
 ) -> None:

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 _UNIT = re.compile(r"(?<=\d) (?=(?:[kM]?N m|%|deg|rad|s|kN|N|mm)\b|%)")
 
 
-def counted(count: int, one: str, several: str = "") -> str:
+def counted(count: int, one: str, several: str = "", show: Callable[[int], str] = str) -> str:
     """'1 recording', '2 recordings'; ``one`` and ``several`` may go on: '1 message is lost', '2 messages are lost'."""
-    return f"{count} {one if count == 1 else several or one + 's'}"
+    return f"{show(count)} {one if count == 1 else several or one + 's'}"
 
 
 def unparted(text: str) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 import typer
+import typer.core
 
 from lugre_steering import defaults
 from lugre_steering.errors import ImplausibleWarning, LugreSteeringError
@@ -89,6 +90,27 @@ def _name_values(signature: inspect.Signature) -> None:
             info[0].metavar = named[0]
 
 
+def argument_name(parameter: Any) -> str:
+    """What an argument (not an option) of a command is called in help and guide: 'BAGS...'."""
+    return f"{(parameter.metavar or parameter.name).upper()}{'...' if parameter.nargs != 1 else ''}"
+
+
+class _Command(typer.core.TyperCommand):
+    """Its help calls arguments what they are to people: Typer's releases differ in it ('{bags}...', '<list[Path]>')."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        arguments = [each for each in self.get_params(ctx) if each.param_type_name == "argument"]
+        return ["[OPTIONS]", *(argument_name(each) if each.required else f"[{argument_name(each)}]" for each in arguments)]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        for title, kind in (("Arguments", "argument"), ("Options", "option")):
+            shown = [(each, each.get_help_record(ctx)) for each in self.get_params(ctx) if each.param_type_name == kind]
+            rows = [(argument_name(each) if kind == "argument" else record[0], record[1]) for each, record in shown if record]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
 @contextmanager
 def doubts_told_once() -> Iterator[None]:
     """Doubts about a vehicle file as one line each on stderr, however often it is read; other warnings as ever."""
@@ -134,7 +156,7 @@ def command(name: str | None = None) -> Callable[[F], F]:
         _name_values(whole)
         run.__signature__ = whole  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
-        app.command(name)(run)
+        app.command(name, cls=_Command)(run)
         return function
 
     return register

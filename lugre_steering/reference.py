@@ -24,6 +24,7 @@ from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.estimator.node_parameters import NODE_TABLE, OPTION_TABLE, NodeParameter
+from lugre_steering.program import argument_name
 from lugre_steering.schema import meanings_of, section_in, unit_of
 from lugre_steering.vehicle.plausible import KEYS
 from lugre_steering.vehicle.sections import Vehicle
@@ -161,7 +162,7 @@ def commands() -> str:
 def _option(parameter: Any) -> tuple[str, str]:
     names = ", ".join(f"`{name}`" for name in (*parameter.opts, *parameter.secondary_opts) if name.startswith("-"))
     required = " (required)" if parameter.required else ""
-    return names or f"`{parameter.name.upper()}`", f"{parameter.help or ''}{required}"
+    return names or f"`{argument_name(parameter)}`", f"{parameter.help or ''}{required}"
 
 
 TABLES: Mapping[str, Callable[[], str]] = {

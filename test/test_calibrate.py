@@ -3,6 +3,7 @@
 """Calibration: known truth recovered, intervals that hold it, what cannot be known said so, files and errors."""
 
 import dataclasses
+import io
 import json
 import math
 from dataclasses import replace
@@ -11,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from lugre_steering import vehicle as vehicle_file
@@ -18,6 +20,7 @@ from lugre_steering.bag import read_recording
 from lugre_steering.calibration import calibrate_recordings, coverage, identify
 from lugre_steering.calibration.calibrate import chosen
 from lugre_steering.calibration.estimate import _larger, estimate
+from lugre_steering.calibration.table import show_calibration
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.seen import seen_range
@@ -213,6 +216,19 @@ def test_the_picture_calls_what_was_fitted_by_its_title():
     axes = figure.Figure().subplots()
     _parameters(axes, [{**row, "key": key} for key in ("friction.coulomb", "rubber.heat_transfer_W_m2K")])
     assert [label.get_text() for label in axes.get_yticklabels()] == ["sliding friction", "heat transfer to the air"]
+
+
+def test_what_is_hardly_determined_is_told_by_its_title_and_once_on_a_terminal(commanded):
+    _, _, result = commanded
+    weak = {key.key: key.beginning for key in KEYS if any(r["key"] == key.key and r["prior_dominated"] for r in result["parameters"])}
+    assert weak
+    shown = io.StringIO()
+    show_calibration(Console(file=shown, width=80), result, "N m")
+    for key, title in weak.items():
+        assert f"{title} is hardly determined by these recordings" in result["statement"]
+        assert key not in result["statement"]
+        assert shown.getvalue().count(f"{key}: ") == 1
+        assert title not in shown.getvalue()
 
 
 def test_what_was_seen_of_a_linear_axis_is_told_in_metres_and_earlier_files_still_read():

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from outside import outside
 from rich.console import Console
 from rich.table import Table
 from rosbags.highlevel import AnyReader
@@ -29,13 +30,15 @@ from lugre_steering.bench.replay import write_cycle
 from lugre_steering.diagnosis.effect_card import show_effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report.words import number
+from lugre_steering.simulate.command import show_outcomes
+from lugre_steering.simulate.paper.outcome import Check, Outcome
 from lugre_steering.terminal import Prose, output, point
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning", "error::RuntimeWarning")  # a process would show them on stderr
 
 ROOT = Path(__file__).resolve().parents[1]
 VEHICLE = ROOT / "config" / "test_vehicle.yaml"
-CONFORMANCE = ROOT.parent / "shared" / "conformance"
+CONFORMANCE = outside("conformance")
 ENVIRONMENT: Mapping[str, str] = os.environ | {
     "PYTHONPATH": str(Path(lugre_steering.__file__).parents[1]),
     "TERM": "xterm",
@@ -322,6 +325,19 @@ def test_no_line_of_a_terminal_ends_between_a_number_and_its_unit() -> None:
         assert not [line for line in lines if re.search(r"\d$|N$", line.rstrip())], width
 
 
+@pytest.mark.parametrize("width", [60, 80, 93])
+def test_what_experiments_say_is_not_parted_inside_a_number(width: int, tmp_path: Path) -> None:
+    ours = "53\u202f045, 50\u202f372, 48\u202f084, 46\u202f197, 44\u202f604, 43\u202f238 N m at the first limit"
+    check = Check("the torque of each cycle is lower", "torque decreases", ours, True)
+    note = f"compared on arrival at the limits, the same angle in each cycle. The largest torque of each cycle also falls ({ours})."
+    outcome = Outcome("paper-cycles", "Six cycles", ("cycle",), ((1,),), (check,), (), {"friction level factor": 1.0191}, (note,))
+    with (terminal := Console(width=width)).capture() as shown:
+        show_outcomes(terminal, [outcome], tmp_path)
+    for torque in ours.split(" N m")[0].split(", "):
+        assert shown.get().count(torque) == 2, torque
+    assert shown.get().count("43\u202f238 N m") == 2
+
+
 def test_columns_stay_straight_where_letters_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="strict", write_through=True)
     monkeypatch.setattr(sys, "stdout", shown)
@@ -339,3 +355,18 @@ def test_help_calls_values_what_they_are_to_people() -> None:
     shown = CliRunner().invoke(cli.app, ["diagnose", "--help"], env={"COLUMNS": "80"}).stdout
     for option in ("--vehicle PATH", "--without TEXT", "--seed INTEGER", "--material NUMBER", "--effects PATH"):
         assert option in shown
+
+
+@pytest.mark.parametrize(
+    ("command", "usage", "argument"),
+    [
+        ("replay", "replay [OPTIONS] BAGS...", "BAGS...  rosbag2 folders"),
+        ("diagnose", "diagnose [OPTIONS] [BAGS...]", "BAGS...  rosbag2 folders"),
+        ("effects", "effects [OPTIONS] [ID]", "ID  explain this effect"),
+        ("config", "config [OPTIONS] [OPTION] [VALUE]", "OPTION  name of an option"),
+    ],
+)
+def test_help_calls_arguments_what_they_are_to_people(command: str, usage: str, argument: str) -> None:
+    shown = CliRunner().invoke(cli.app, [command, "--help"], env={"COLUMNS": "80"}).stdout
+    assert f"{usage}\n" in shown
+    assert argument in shown

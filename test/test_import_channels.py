@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from outside import outside
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -21,7 +22,7 @@ from lugre_steering.importing.channels import read_channels
 from lugre_steering.importing.read import read_table
 
 ROOT = Path(__file__).resolve().parents[1]
-REAL = Path(os.environ.get("LUGRE_STEERING_REAL", ROOT.parent / "shared" / "real"))
+REAL = Path(os.environ.get("LUGRE_STEERING_REAL", outside("real")))
 HEAD = "schema: lugre_steering/import/1\n"
 T = np.arange(0.0, 6.0, 0.01)
 

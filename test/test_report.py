@@ -241,7 +241,15 @@ def test_numbers_stand_in_the_text(written: Written) -> None:
     text = Page(written.files[0].read_text(encoding="utf-8")).text.replace("\u00a0", " ")
     for number in ("96 %", "94 to 97 %", "93 %", "41 %", "22.918°", "0.3996 … 0.4004", "< 0.001", "321"):
         assert number in text, number
-    assert "soil_shear" in text
+    for name in ("soil_shear", "inertia of one track about its hinge", "track angle at which the stop begins"):
+        assert name in text, name
+
+
+def test_the_meaning_of_a_parameter_stands_alone() -> None:
+    """It is shown in the place of its name."""
+    for effect in CATALOGUE.values():
+        for parameter in effect.parameters:
+            assert parameter.meaning.split()[0] not in ("of", "between", "over", "while", "until", "positive:"), (effect.id, parameter.name)
 
 
 def test_page_is_small_enough_to_send(written: Written, vehicle: Vehicle) -> None:
@@ -479,6 +487,11 @@ def test_numbers_are_readable(value: float | None, text: str) -> None:
     assert words.number(value) == text
 
 
+@pytest.mark.parametrize(("count", "text"), [(0, "0"), (3317, "3317"), (42_727, "42\u202f727"), (-1_000_000, "-1\u202f000\u202f000")])
+def test_counts_are_exact_in_the_groups_of_numbers(count: int, text: str) -> None:
+    assert words.whole(count) == text
+
+
 @pytest.mark.parametrize(
     ("share", "said"),
     [(0.0, "0 %"), (1e-6, "less than 0.1 %"), (0.0006, "0.1 %"), (0.084, "8.4 %"), (0.996, "100 %"), (-1e-6, "0 %"), (None, "-")],
@@ -554,6 +567,19 @@ def test_browser_draws_every_plot_without_an_error_or_a_request(written: Written
         assert '<path d="M' in seen.dom[at : seen.dom.index("</figure>", at)], name
     assert seen.dom.count('class="chart"') == len(specs(page)) == 3
     assert seen.dom.count("<script>alert") == 0
+
+
+@needs_chromium
+def test_what_is_folded_on_a_screen_is_on_paper_too(written: Written, tmp_path: Path) -> None:
+    file = tmp_path / "printed.html"
+    asked = """<details><summary>2 more</summary><p>one</p><p>two</p></details><script>
+      function folded() { return document.querySelectorAll("details:not([open])").length; }
+      var told = [folded()];
+      ["beforeprint", "afterprint"].forEach(function (name) { window.dispatchEvent(new Event(name)); told.push(folded()); });
+      document.body.setAttribute("data-folded", told.map(Boolean).join(" "));
+    </script></body>"""
+    file.write_text(written.files[0].read_text(encoding="utf-8").replace("</body>", asked), encoding="utf-8")
+    assert 'data-folded="true false true"' in browse(file, tmp_path).dom
 
 
 @needs_chromium
@@ -648,6 +674,10 @@ def test_logarithmic_axes_carry_plain_numbers(tmp_path: Path) -> None:
     shown = [label.get_text() for labels in ("xticklabels", "yticklabels") for label in plt.getp(axes[0, 0], labels)]
     assert {"0.01", "1", "10", "1000"} <= set(shown)
     assert not [text for text in shown if "$" in text]
+    with figure(1, 1, "", tmp_path / "short.png") as axes:
+        axes[0, 0].plot([0.09, 0.5], [0.0, 1.0])
+        axes[0, 0].set(xscale="log")
+    assert {"0.2", "0.3", "0.4", "0.5"} <= {label.get_text() for label in axes[0, 0].get_xticklabels(which="minor")}
 
 
 # ----------------------------------------------------------------- the verdict on a terminal

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from lugre_steering.bag.find import SKIPPED
 from lugre_steering.errors import DataError
+from lugre_steering.fitting.keys import KEYS
 from lugre_steering.report import words
 from lugre_steering.terminal import point
 
@@ -44,9 +45,10 @@ def show_calibration(console: Console, result: Mapping[str, Any], unit: str) -> 
     for row in result["parameters"]:
         if remark := _remark(row):
             console.print(point(f"{row['key']}: {remark}"))
-    said = {row["key"] for row in result["parameters"] if _remark(row)}
+    remarked = {row["key"] for row in result["parameters"] if _remark(row)}
+    told = tuple(key.beginning for key in KEYS if key.key in remarked)
     for sentence in words.sentences(result["statement"]):
-        if sentence.split(" ")[0] not in said:
+        if not sentence.startswith(told):
             console.print(point(sentence))
     if result["picture_note"]:
         console.print(result["picture_note"])
@@ -59,7 +61,7 @@ def _per_bag(result: Mapping[str, Any], unit: str) -> Table:
         table.add_column(column, justify="right", no_wrap=True)
     for row in result["per_bag"]:
         errors = ("-" if row[key] is None else words.tenths(row[key]) for key in ("sheet", "calibrated"))
-        table.add_row(row["bag"], f"{row['duration_s']:.1f}", str(row["samples"]), *errors)
+        table.add_row(row["bag"], f"{row['duration_s']:.1f}", words.whole(row["samples"]), *errors)
     return table
 
 

@@ -166,7 +166,7 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
     with output_folder(out), figure(3 if along else 2, 1, caption, file, row_inches=2.2, made=origin) as axes:
         top, middle = axes[0, 0], axes[1, 0]
         top.plot(run.time, best.without * torque.scale, **MEASURED, label="without")
-        top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label=f"with {effect.id}")
+        top.plot(run.time, (best.without + best.difference) * torque.scale, **IMPROVED, label="with the effect")
         middle.plot(run.time, best.difference * change.scale, color=SERIES[0], label="difference")
         middle.plot(run.time, best.visible * change.scale, color=SERIES[1], linewidth=0.9, label="after recalibration")
         for ax, title, unit in ((top, "torque", torque.unit), (middle, "what the effect changes", change.unit)):

@@ -25,7 +25,7 @@ EFFECT = Effect(
     trace="slow change of the level with time",
     coordinate="time",
     parameters=(
-        Parameter("rate", "K/s", "of the air temperature", 0.05, -1.0, 1.0),
+        Parameter("rate", "K/s", "rate of the air temperature", 0.05, -1.0, 1.0),
     ),
     hooks={"air": air},
     rivals=("carcass_heat_sink",),

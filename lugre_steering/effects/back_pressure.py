@@ -27,7 +27,7 @@ EFFECT = Effect(
     trace="opposes motion, vanishes at rest",
     coordinate="direction",
     parameters=(
-        Parameter("torque", "N m", "of the vehicle", 300.0, 0.0, 2e4),
+        Parameter("torque", "N m", "torque of the vehicle", 300.0, 0.0, 2e4),
         Parameter("flow", "s/rad", "growth with the return flow", 3.0, 0.0, 100.0, optional=True),
         Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.05, optional=True),
     ),

@@ -27,8 +27,8 @@ EFFECT = Effect(
     trace="friction recovers in pauses, the decline bends",
     coordinate="rubber temperature",
     parameters=(
-        Parameter("conductance", "W/K", "between tread and carcass", 200.0, 0.0, 1e5),
-        Parameter("capacity", "J/K", "of the carcass node", 2e4, 500.0, 1e7, (5000.0, 2e4, 1e5)),
+        Parameter("conductance", "W/K", "heat conductance between tread and carcass", 200.0, 0.0, 1e5),
+        Parameter("capacity", "J/K", "heat capacity of the carcass node", 2e4, 500.0, 1e7, (5000.0, 2e4, 1e5)),
     ),
     hooks={"heat_out": heat_out},
     rivals=("flash_temperature", "heat_partition", "stress_relaxation", "wear_polishing"),

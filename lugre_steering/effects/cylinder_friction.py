@@ -41,9 +41,9 @@ EFFECT = Effect(
     trace="step at each reversal, grows with pressure",
     coordinate="direction",
     parameters=(
-        Parameter("coulomb", "N m", "of the vehicle, direction dependent", 300.0, 0.0, 3e4),
-        Parameter("load_share", "1", "share of the torque", 0.01, 0.0, 0.4),
-        Parameter("viscous", "N m s/rad", "of one track", 1000.0, 0.0, 2e5, optional=True),
+        Parameter("coulomb", "N m", "friction of the vehicle against the motion", 300.0, 0.0, 3e4),
+        Parameter("load_share", "1", "friction as a share of the torque", 0.01, 0.0, 0.4),
+        Parameter("viscous", "N m s/rad", "viscous friction of one track", 1000.0, 0.0, 2e5, optional=True),
         Parameter("holding", "1", "share kept at standstill by the seals", 0.5, 0.0, 1.0, (0.0, 1.0)),
         Parameter("breakaway", "1", "raise at low rate (Stribeck)", 0.3, 0.0, 3.0, optional=True),
         Parameter("rate_scale", "rad/s", "rate over which the sign changes", 0.01, 0.0, 0.05, optional=True),

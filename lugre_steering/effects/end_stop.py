@@ -65,7 +65,7 @@ EFFECT = Effect(
         ),
         Parameter("cubic_stiffness", "N m/rad^3", "how it stiffens, k3, of one track", 1e7, 0.0, 1e10, optional=True),
         Parameter("loss", "1", "share of the torque lost on unloading", 0.2, 0.0, 0.95, optional=True),
-        Parameter("damping", "N m s/rad", "while the stop is driven in", 1e4, 0.0, 1e6, optional=True),
+        Parameter("damping", "N m s/rad", "damping while the stop is driven in", 1e4, 0.0, 1e6, optional=True),
         Parameter("shift", "rad", "later engagement of negative angles", 0.01, -0.3, 0.3, optional=True),
     ),
     hooks={"torque": torque},

@@ -38,7 +38,7 @@ EFFECT = Effect(
     coordinate="friction power",
     parameters=(
         Parameter("resistance", "K/W", "temperature rise per friction power of one track", 0.001, 0.0, 0.1),
-        Parameter("time_constant", "s", "of the flash", 0.5, 0.05, 20.0, (0.3, 3.0)),
+        Parameter("time_constant", "s", "time constant of the flash", 0.5, 0.05, 20.0, (0.3, 3.0)),
         Parameter(
             "saturation_power", "W", "power beyond which it grows with the root (large Peclet number)",
             500.0, 10.0, 1e7, (100.0, 1e5),

@@ -27,8 +27,8 @@ EFFECT = Effect(
     trace="the mean of both sweep branches is a function of the angle",
     coordinate="steering angle",
     parameters=(
-        Parameter("amplitude", "N m", "of one track", 500.0, -5e4, 5e4),
-        Parameter("second_harmonic", "N m", "of one track", 300.0, -5e4, 5e4, optional=True),
+        Parameter("amplitude", "N m", "amplitude of one track", 500.0, -5e4, 5e4),
+        Parameter("second_harmonic", "N m", "second harmonic of one track", 300.0, -5e4, 5e4, optional=True),
         Parameter("even", "N m", "caster part of one track", 300.0, -5e4, 5e4, optional=True),
     ),
     hooks={"torque": torque},

@@ -24,7 +24,7 @@ EFFECT = Effect(
     trace="odd in the rate, zero at rest",
     coordinate="steering rate",
     parameters=(
-        Parameter("b", "N m s/rad", "of one track", 5000.0, 0.0, 5e5),
+        Parameter("b", "N m s/rad", "loss per rate, of one track", 5000.0, 0.0, 5e5),
     ),
     hooks={"loss": loss},
     rivals=("line_loss_quadratic", "viscous_friction"),

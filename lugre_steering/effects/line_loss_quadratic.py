@@ -24,7 +24,7 @@ EFFECT = Effect(
     trace="odd and quadratic in the rate, zero at rest",
     coordinate="steering rate",
     parameters=(
-        Parameter("c", "N m s2/rad2", "of one track", 5e4, 0.0, 1e7),
+        Parameter("c", "N m s2/rad2", "loss per squared rate, of one track", 5e4, 0.0, 1e7),
     ),
     hooks={"loss": loss},
     rivals=("viscous_friction",),

@@ -24,8 +24,8 @@ EFFECT = Effect(
     trace="multiplies the torque by an even function of the angle",
     coordinate="steering angle",
     parameters=(
-        Parameter("linear", "1/rad", "odd part", 0.05, -2.0, 2.0),
-        Parameter("quadratic", "1/rad^2", "even part", 0.1, -5.0, 5.0),
+        Parameter("linear", "1/rad", "odd part of the arm error", 0.05, -2.0, 2.0),
+        Parameter("quadratic", "1/rad^2", "even part of the arm error", 0.1, -5.0, 5.0),
     ),
     hooks={"arm": arm},
     needs=("hydraulics",),

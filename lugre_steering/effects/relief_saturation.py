@@ -48,9 +48,9 @@ EFFECT = Effect(
     trace="a torque ceiling",
     coordinate="torque",
     parameters=(
-        Parameter("ceiling", "N m", "of the vehicle", 1000.0, 1000.0, 1e7, example=35_000.0),
-        Parameter("arm_slope", "1/rad", "of the cylinder arms toward the push", 0.05, -2.0, 2.0, optional=True),
-        Parameter("arm_curvature", "1/rad^2", "of the cylinder arms", 0.1, -5.0, 5.0, optional=True),
+        Parameter("ceiling", "N m", "highest torque of the vehicle", 1000.0, 1000.0, 1e7, example=35_000.0),
+        Parameter("arm_slope", "1/rad", "slope of the cylinder arms toward the push", 0.05, -2.0, 2.0, optional=True),
+        Parameter("arm_curvature", "1/rad^2", "curvature of the cylinder arms", 0.1, -5.0, 5.0, optional=True),
     ),
     hooks={"limit": limit},
     needs=("hydraulics",),

@@ -24,7 +24,7 @@ EFFECT = Effect(
     trace="constant, at rest too",
     coordinate="none (constant)",
     parameters=(
-        Parameter("torque", "N m", "of the vehicle", 200.0, -3e4, 3e4),
+        Parameter("torque", "N m", "torque of the vehicle", 200.0, -3e4, 3e4),
     ),
     hooks={"torque": bias},
     joint_title="Constant offset",

@@ -31,9 +31,9 @@ EFFECT = Effect(
     trace="rises only into fresh ground",
     coordinate="steering angle",
     parameters=(
-        Parameter("torque", "N m", "of one track at fresh ground", 1000.0, 0.0, 1e5),
-        Parameter("span", "rad", "over which the berm is compressed", 0.05, 0.005, 0.5, (0.03, 0.1, 0.25)),
-        Parameter("growth", "1/rad", "of the berm with its distance", 1.0, 0.0, 20.0, optional=True),
+        Parameter("torque", "N m", "torque of one track at fresh ground", 1000.0, 0.0, 1e5),
+        Parameter("span", "rad", "way over which the berm is compressed", 0.05, 0.005, 0.5, (0.03, 0.1, 0.25)),
+        Parameter("growth", "1/rad", "growth of the berm with its distance", 1.0, 0.0, 20.0, optional=True),
     ),
     hooks={"torque": berm},
     memory={"left": 0.0, "right": 0.0},  # farthest push to either side [rad]

@@ -37,7 +37,7 @@ EFFECT = Effect(
     coordinate="dwell",
     parameters=(
         Parameter("rate", "1", "relative gain per e-fold of age", 0.01, 0.0, 0.3),
-        Parameter("dwell", "s", "time constant t_c", 1.0, 0.01, 100.0, (0.1, 1.0)),
+        Parameter("dwell", "s", "time constant t_c of the ageing", 1.0, 0.01, 100.0, (0.1, 1.0)),
         Parameter("slip_scale", "rad", "slip that renews the contacts", 0.1, 0.005, 2.0, (0.02, 0.06, 0.2)),
     ),
     joint_title="Static friction grows with the time at rest",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     trace="proportional to dM/dt, both signs",
     coordinate="torque rate",
     parameters=(
-        Parameter("delay", "s", "positive: pressures stamped late", 0.01, -0.5, 0.5),
+        Parameter("delay", "s", "how late the pressures are stamped", 0.01, -0.5, 0.5),
     ),
     hooks={"delay": late},
     rivals=("yaw_inertia",),

@@ -30,9 +30,9 @@ EFFECT = Effect(
     trace="exponential decay in holds",
     coordinate="dwell",
     parameters=(
-        Parameter("share", "1", "of the torque lost in the end", 0.05, 0.0, 1.0),
-        Parameter("time_constant", "s", "of the leak", 5.0, 0.2, 500.0, (1.0, 4.0, 15.0)),
-        Parameter("refill_time", "s", "until the torque is back in motion", 0.1, 0.0, 2.0, optional=True),
+        Parameter("share", "1", "share of the torque lost in the end", 0.05, 0.0, 1.0),
+        Parameter("time_constant", "s", "time constant of the leak", 5.0, 0.2, 500.0, (1.0, 4.0, 15.0)),
+        Parameter("refill_time", "s", "time until the torque is back in motion", 0.1, 0.0, 2.0, optional=True),
     ),
     hooks={"limit": limit},
     memory={"leaked": 0.0},  # how far trapped oil has leaked away, 0 ... 1

@@ -24,7 +24,7 @@ EFFECT = Effect(
     trace="starts, stops and shakes",
     coordinate="steering acceleration",
     parameters=(
-        Parameter("inertia", "kg m2", "of one track about its hinge", 200.0, 0.0, 1e5),
+        Parameter("inertia", "kg m2", "inertia of one track about its hinge", 200.0, 0.0, 1e5),
     ),
     hooks={"torque": torque},
     joint_title="Inertia of the moving parts",

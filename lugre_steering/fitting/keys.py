@@ -20,6 +20,11 @@ class Key:
     unit: str
     read: Callable[[Vehicle], float | None]
 
+    @property
+    def beginning(self) -> str:
+        """The title as a sentence begins with it."""
+        return self.title[:1].upper() + self.title[1:]
+
 
 def _of(section: str, name: str) -> Callable[[Vehicle], float | None]:
     return lambda vehicle: getattr(getattr(vehicle, section), name, None)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lugre_steering.counted import counted
+from lugre_steering.report import words
 from lugre_steering.terminal import point
 
 
@@ -24,7 +25,7 @@ def show_import(console: Console, result: Mapping[str, Any]) -> None:
         rate = "-" if channel["rate_Hz"] is None else f"{channel['rate_Hz']:.4g} Hz"
         time = f"{channel['from_s']:.4g} ... {channel['to_s']:.4g} s"
         value = f"{channel['lowest']:.4g} ... {channel['highest']:.4g} {channel['unit']}"
-        table.add_row(channel["channel"], str(channel["samples"]), rate, time, value)
+        table.add_row(channel["channel"], words.whole(channel["samples"]), rate, time, value)
     console.print(table)
     for channel in result["channels"]:
         for note in _notes(channel):

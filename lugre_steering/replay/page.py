@@ -7,6 +7,7 @@ Its size does not grow with the recording: curves go through the smallest and th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from lugre_steering.counted import counted
@@ -45,7 +46,7 @@ def write_page(bag: ReplayedBag, vehicle: Vehicle, motion: Curves, check: Curves
 
 
 def _head(bag: ReplayedBag, vehicle: Vehicle) -> str:
-    came = f"{counted(bag.estimates, 'torque')} from {counted(bag.messages, 'message')}"
+    came = f"{counted(bag.estimates, 'torque', show=words.whole)} from {counted(bag.messages, 'message', show=words.whole)}"
     numbers, fit = [("recorded", f"{bag.duration_s:.1f} s", came)], bag.fit
     if fit is None:
         said = str(bag.fit_note)
@@ -74,11 +75,15 @@ def _findings(bag: ReplayedBag) -> str:
 
 def _samples(bag: ReplayedBag) -> str:
     rows = [
-        [text(name.replace("_", " ")), code(counts.topic) if counts.topic else "not recorded", str(counts.used),
-         *(text(", ".join(f"{n} {reason.replace('_', ' ')}" for reason, n in some.items())) for some in (counts.rejected, counts.noted))]
+        [text(name.replace("_", " ")), code(counts.topic) if counts.topic else "not recorded", words.whole(counts.used),
+         *(text(_listed(some)) for some in (counts.rejected, counts.noted))]
         for name, counts in bag.samples.items()
     ]  # fmt: skip
     return table(["input", "topic", "used", "rejected", "noted"], rows, numeric=(2,))
+
+
+def _listed(reasons: Mapping[str, int]) -> str:
+    return ", ".join(f"{words.whole(n)} {words.named(reason)}" for reason, n in reasons.items())
 
 
 def _chart(vehicle: Vehicle, motion: Curves, check: Curves) -> Chart:

@@ -28,10 +28,10 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     for bag, path in zip(summary["bags"], shown, strict=True):
         # Of several recordings of one name, where each lies and what its results are called.
         label = f"{path} -> {bag['name']}" if "/" in path or bag_name(Path(bag["bag"])) != bag["name"] else bag["name"]
-        table.add_row(label, f"{bag['duration_s']:.1f}", str(bag["estimates"]), *_fit(bag["fit"]))
+        table.add_row(label, f"{bag['duration_s']:.1f}", words.whole(bag["estimates"]), *_fit(bag["fit"]))
     if len(summary["bags"]) > 1:
         seconds, torques = (sum(bag[key] for bag in summary["bags"]) for key in ("duration_s", "estimates"))
-        table.add_row("all", f"{seconds:.1f}", str(torques), *_fit(summary["overall"]))
+        table.add_row("all", f"{seconds:.1f}", words.whole(torques), *_fit(summary["overall"]))
     console.print(table)
     for line in _remarks(summary):
         console.print(line, highlight=False, soft_wrap=True)

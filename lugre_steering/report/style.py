@@ -106,7 +106,9 @@ def figure(
         yield fig.subplots(rows, columns, squeeze=False)
         for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_scale() == "log"):
             axis.set_major_formatter("{x:g}")  # the usual one writes mathematics, which is not parsed here
-            axis.set_minor_formatter("")
+            low, high = sorted(axis.get_view_interval())
+            decades = math.floor(math.log10(high)) - math.ceil(math.log10(low)) + 1
+            axis.set_minor_formatter("" if decades > 1 else "{x:g}")  # one number alone is no scale
         for text in fig.findobj(Text):
             text.set_text(words(text.get_text()))
         fig.tight_layout(rect=(0.0, below / height, 1.0, 1.0))

@@ -82,6 +82,11 @@ def number(value: float | None, digits: int = 4) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def whole(count: int) -> str:
+    """A count, exact, in groups of three digits where :func:`number` has them too."""
+    return f"{count:,}".replace(",", "\u202f") if abs(count) >= 10_000 else str(count)
+
+
 def tenths(value: float, sign: str = "", beside: float = 0.0) -> str:
     """One decimal, as columns of errors have it, or three digits of what is below ten, or of the larger one ``beside`` it; ``sign``
     "+": always with its sign."""

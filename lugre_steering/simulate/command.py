@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from lugre_steering import units
 from lugre_steering import vehicle as vehicle_file
@@ -36,7 +35,7 @@ from lugre_steering.simulate.paper.outcome import Outcome
 from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.write import STORAGES, write_bag
-from lugre_steering.terminal import Prose
+from lugre_steering.terminal import Prose, point
 from lugre_steering.vehicle import Vehicle
 
 SCHEMA = "lugre_steering/experiment/1"
@@ -196,9 +195,9 @@ def show_outcomes(console: Console, outcomes: Sequence[Outcome], out: Path) -> N
         console.print(outcome_table(outcome))
     console.print(checks_table(outcomes))
     fitted = ", ".join(f"{name} = {value:.5g}" for name, value in outcomes[0].calibrated.items())
-    console.print(f"Calibrated to the four published extremes: {fitted}")
+    console.print(Prose(f"Calibrated to the four published extremes: {fitted}"))
     for outcome in outcomes:
         for note in outcome.notes:
-            console.print(Text.assemble((outcome.name, "bold"), f" differs or assumes: {note}"))
+            console.print(point(f"{outcome.name} differs or assumes: {note}"))
     passed = sum(check.passed for outcome in outcomes for check in outcome.checks)
     console.print(f"{passed} of {sum(len(o.checks) for o in outcomes)} statements pass; tables and figures in {out}")

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from outside import outside
 from remembering import remembered
 
 from lugre_steering import vehicle as vehicle_file
@@ -49,7 +50,7 @@ VEHICLE = vehicle_file.load(SHEET_FILE)
 SHEET = load_sheet(SHEET_FILE)
 LINES = ("main_a", "main_b", "aux_a", "aux_b")
 BAGS = Path(__file__).parents[2] / "bags"
-CONFORMANCE = Path(__file__).resolve().parents[3] / "shared" / "conformance"
+CONFORMANCE = outside("conformance")
 LEFT, RIGHT = "steering/left/joint_state", "steering/right/joint_state"
 AIR = "steering/ambient_temperature"
 PRESSURE = {line: f"steering/pressure/{line}" for line in LINES}

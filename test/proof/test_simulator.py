@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from outside import outside
 from remembering import remembered
 from rosbags.highlevel import AnyReader
 from scipy.integrate import solve_ivp
@@ -371,20 +372,20 @@ def test_bad_input_is_refused_with_a_reason(tmp_path: Path) -> None:
         load_sheet(tmp_path / "half.yaml")
 
 
-SHARED = ROOT.parent / "shared" / "conformance"
+CONFORMANCE = outside("conformance")
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the reference recording is not here")
+@pytest.mark.skipif(not CONFORMANCE.is_dir(), reason="the reference recording is not here")
 def test_nominal_vehicle_reproduces_the_reference_simulation(sheet: Sheet) -> None:
     """An independent simulation of the same sheet, by others: torque within 0.1 % of its peak, 0.05 K."""
-    with AnyReader([SHARED / "baseline_clean"]) as reader:
+    with AnyReader([CONFORMANCE / "baseline_clean"]) as reader:
         sides = []
         for side in ("left", "right"):
             wanted = [c for c in reader.connections if c.topic == f"/steering/{side}/joint_state"]
             messages = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(wanted)]
             stamps = np.array([m.header.stamp.sec - 1_790_000_000 + m.header.stamp.nanosec * 1e-9 for m in messages])
             sides.append(CubicSpline(stamps, [m.position[0] for m in messages]))
-    expected = np.genfromtxt(SHARED / "expected.csv", delimiter=",", names=True)
+    expected = np.genfromtxt(CONFORMANCE / "expected.csv", delimiter=",", names=True)
     time = np.arange(0.0, expected["t_s"][-1] + 1e-3, 1e-3)
     cells = patches(sheet, np.random.default_rng(0))
     tracks = [run_track(s(time), 1e-3, sheet.nominal, rubber_table(15.0), cells, HiddenContact()) for s in sides]

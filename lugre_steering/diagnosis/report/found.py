@@ -10,7 +10,7 @@ from typing import Any
 
 from lugre_steering import units
 from lugre_steering.diagnosis.report import laws, plots
-from lugre_steering.diagnosis.report.names import called, chance, place
+from lugre_steering.diagnosis.report.names import called, chance, parameter_called, place
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
@@ -86,9 +86,7 @@ def _effect(diagnosis: Diagnosis, effect: Mapping[str, Any], charts: Charts) -> 
 
 
 def _parameters(diagnosis: Diagnosis, effect: Mapping[str, Any]) -> str:
-    vehicle, entry = diagnosis.vehicle, CATALOGUE[effect["id"]]
-    meaning = {p.name: p.meaning for p in entry.parameters}
-    per_line = entry.parameters[0].meaning if entry.per_line and entry.parameters else ""
+    vehicle = diagnosis.vehicle
     angular = "" if units.is_linear(vehicle) else "in degrees"
     header = ["parameter", "fitted", "95 % interval", "unit", angular]
     rows = []
@@ -96,8 +94,7 @@ def _parameters(diagnosis: Diagnosis, effect: Mapping[str, Any]) -> str:
         unit, ends = units.label(vehicle, parameter["unit"]), parameter["ci95"]
         value, between = words.estimate(parameter["value"], ends)
         degrees = _degrees(parameter["value"], ends) if unit == "rad" else ""
-        said = f'{text(meaning.get(name, per_line))} <code class="id">{text(name)}</code>'
-        row = [said, value, between, "" if unit == "1" else text(unit), degrees]
+        row = [parameter_called(effect["id"], name), value, between, "" if unit == "1" else text(unit), degrees]
         rows.append([cell for cell, title in zip(row, header, strict=True) if title])
     return table([title for title in header if title], rows, numeric=(1, 2, 4) if angular else (1, 2))
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from lugre_steering import units
 from lugre_steering.counted import counted
 from lugre_steering.diagnosis.report import plots
-from lugre_steering.diagnosis.report.names import called, place
+from lugre_steering.diagnosis.report.names import called, parameter_called, place
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.report import words
 from lugre_steering.report.markup import Row, bar, code, pairs, table, text
@@ -109,8 +109,8 @@ def limits(diagnosis: Diagnosis) -> str:
     for name, limit in found.items():
         unit = units.label(diagnosis.vehicle, limit["unit"])
         size = "hidden at any size" if limit["smallest"] is None else words.number(limit["smallest"], 3)
-        said = called(diagnosis, name)
-        rows.append([said, text(limit["parameter"].replace("_", " ")), size, text(unit) if unit != "1" and limit["smallest"] else ""])
+        parameter = parameter_called(name, limit["parameter"])
+        rows.append([called(diagnosis, name), parameter, size, text(unit) if unit != "1" and limit["smallest"] else ""])
     made = table(["effect", "parameter", "smallest that would have shown", "unit"], rows, numeric=(2,))
     if len(rows) > EVIDENCE_SHOWN:
         opened = " open" if diagnosis.json["verdict"] == "consistent" else ""

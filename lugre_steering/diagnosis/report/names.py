@@ -26,6 +26,16 @@ def called(diagnosis: Diagnosis, name: str, within: bool = False) -> str:
     return f"{text(inside(title) if within else title)} {small}"
 
 
+def parameter_called(effect: str, name: str) -> str:
+    """What a parameter of an effect means, and small behind it the name by which files know it: the line, where each line has one."""
+    small = f'<code class="id">{text(name)}</code>'
+    if effect not in CATALOGUE:
+        return small
+    parameters, per_line = CATALOGUE[effect].parameters, CATALOGUE[effect].per_line
+    meaning = next((p.meaning for p in parameters if p.name == name), parameters[0].meaning if per_line else "")
+    return f"{text(meaning)} {small}"
+
+
 def place(diagnosis: Diagnosis, entry: Mapping[str, Any]) -> list[str]:
     """Bag, stretches, and range of the coordinate (if one was found), as HTML."""
     along = "-"

@@ -189,4 +189,11 @@
 
   var specs = JSON.parse(document.getElementById("charts").textContent);
   Object.keys(specs).forEach(function (id) { new Chart(document.getElementById(id), specs[id]); });
+
+  var closed = [];  // what is folded on a screen is on paper too
+  window.addEventListener("beforeprint", function () {
+    closed = Array.from(document.querySelectorAll("details:not([open])"));
+    closed.forEach(function (details) { details.open = true; });
+  });
+  window.addEventListener("afterprint", function () { closed.forEach(function (details) { details.open = false; }); });
 })();

@@ -17,6 +17,7 @@ from lugre_steering.files import COMMENT_MARK, comments, write_text
 from lugre_steering.provenance import Provenance
 from lugre_steering.report import words
 from lugre_steering.simulate.paper.outcome import Outcome
+from lugre_steering.terminal import Prose
 
 
 def draw_outcome(outcome: Outcome, file: Path, made: Provenance | None = None) -> None:
@@ -84,7 +85,7 @@ def checks_table(outcomes: Sequence[Outcome]) -> Table:
     for outcome in outcomes:
         for check in outcome.checks:
             verdict = Text("pass", "green") if check.passed else Text("FAIL", "red")
-            table.add_row(outcome.name.removeprefix("paper-"), check.claim, check.published, check.ours, verdict)
+            table.add_row(outcome.name.removeprefix("paper-"), check.claim, check.published, Prose(check.ours), verdict)
     return table
 
 
