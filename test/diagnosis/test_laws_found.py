@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from typer.testing import CliRunner
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.laws import rival
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
@@ -189,6 +191,19 @@ def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | 
     assert found is not None
     viscous = named(problem, fitted(problem, effect("viscous_friction", sigma_2=1e3)))
     assert in_place(viscous, found, None) == (beyond is not None)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_names_win_a_draw_unless_they_are_more(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A law that takes a twentieth more than one name does not stand in its place, but in that of two."""
+    problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * (run.theta > 0.1), axis=0)))
+    assert found is not None
+    monkeypatch.setattr(rival, "_energies", lambda *_: [95.0, 100.0, 200.0])
+    viscous = named(problem, fitted(problem, effect("viscous_friction", sigma_2=1e3)))
+    names = (SimpleNamespace(given=False),) * count
+    done = replace(viscous, found=replace(viscous.found, found=names))
+    assert len(found.gains) == 1
+    assert in_place(done, found, None) == (count > 1)
 
 
 def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:

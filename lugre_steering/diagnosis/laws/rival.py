@@ -84,10 +84,10 @@ def _swapped(done: Finished, alone: FoundLaws, index: int, seed: int) -> FoundLa
 
 
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:
-    """A name wins a draw."""
-    there = done.compared
+    """Names win a draw, unless they are more in number: several may fill in for one thing."""
+    there, count = done.compared, sum(not item.given for item in done.found.found)
     mine, names, base = _energies(done, [beside_form(done, laws), (there.problem, there.fitted, there.found.final)])
-    return mine < names - MARGIN * (base - names)
+    return mine < names - MARGIN * (base - names) * (count <= len(laws.gains))
 
 
 def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> list[float]:
