@@ -258,8 +258,8 @@ class SteeringTorqueEstimator(LifecycleNode):
 
     def _mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Write the window up to now, for diagnose."""
-        write = self.session.window("marked") if self.session is not None else None
         try:
+            write = self.session.window("marked") if self.session is not None else None
             if write is None:
                 raise DataError("parameter 'watch_folder' names no folder for windows, or the node is not configured")
             response.success, response.message = True, str(write())

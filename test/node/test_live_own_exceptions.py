@@ -1,0 +1,170 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Exceptions where rclpy would swallow them, end a service or the node: in transitions, services and files. The node in this process."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+import rclpy
+from live_harness import DOMAIN, PATIENCE_S, VEHICLE
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from lugre_steering.errors import DataError
+from lugre_steering.estimator.state_file import read_state
+from lugre_steering.live import estimator_node, run
+from lugre_steering.live.estimator_node import SteeringTorqueEstimator
+from lugre_steering.recording import Kind
+from lugre_steering.vehicle import load
+from lugre_steering.watch.window import read_window
+
+ANGLE = 0.1
+
+
+def failing(*_: object, **__: object) -> Any:
+    raise MemoryError("made to fail")
+
+
+def arguments(folder: Path) -> list[str]:
+    """Of a node with a folder for its windows and one for its state."""
+    for name in ("windows", "state"):
+        (folder / name).mkdir()
+    given = {"vehicle_file": VEHICLE, "watch_folder": folder / "windows", "state_file": folder / "state" / "s.json", "state_period_s": 3600.0}
+    return ["--ros-args", *(word for name, value in given.items() for word in ("-p", f"{name}:={value}"))]
+
+
+@pytest.fixture
+def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SteeringTorqueEstimator]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    rclpy.init(args=arguments(tmp_path), domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield SteeringTorqueEstimator()
+    finally:
+        rclpy.try_shutdown()
+
+
+def spin_until(node: SteeringTorqueEstimator, condition: Callable[[], bool]) -> None:
+    executor, end = SingleThreadedExecutor(), time.monotonic() + PATIENCE_S
+    executor.add_node(node)
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+
+
+def steer(node: SteeringTorqueEstimator) -> None:
+    """Some samples of each angle, so that there is something to keep."""
+    session = node.session
+    assert session is not None
+    angles = [channel for channel in session.vehicle.channels if channel.kind is Kind.ANGLE]
+    publishers = [node.create_publisher(JointState, channel.topic, qos_profile_sensor_data) for channel in angles]
+
+    def heard() -> bool:
+        for channel, publisher in zip(angles, publishers, strict=True):
+            message = JointState(name=[channel.joint], position=[ANGLE])
+            message.header.stamp = node.get_clock().now().to_msg()
+            publisher.publish(message)
+        return all(session.estimator.latest_ns[f"angle/{channel.name}"] for channel in angles)
+
+    spin_until(node, heard)
+
+
+def ask(node: SteeringTorqueEstimator, service: str) -> Trigger.Response:
+    future = node.create_client(Trigger, f"~/{service}").call_async(Trigger.Request())
+    spin_until(node, future.done)
+    return future.result()
+
+
+def test_after_an_exception_in_a_transition_the_node_can_be_configured_anew(
+    node: SteeringTorqueEstimator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as broken:
+        broken.setattr(estimator_node, "Session", failing)
+        with pytest.raises(DataError, match="MemoryError: made to fail"):
+            node.start()
+    assert node.session is None
+    assert ask(node, "reload").message.startswith(f"{VEHICLE}: the node is not configured")
+    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    assert node.session is not None
+    assert node.session.active
+
+
+def test_a_service_answers_whatever_happens(node: SteeringTorqueEstimator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    node.start()
+    assert node.session is not None
+    estimator = node.session.estimator
+    with monkeypatch.context() as broken:
+        broken.setattr(estimator_node, "load", failing)
+        broken.setattr(node.session, "window", failing)
+        for number, service in enumerate(("reload", "mark"), 1):
+            answer = ask(node, service)
+            assert (answer.success, answer.message) == (False, "MemoryError: made to fail")
+            assert node.session.health.exceptions == number
+    assert node.session.estimator is estimator  # all or nothing
+    shutil.rmtree(tmp_path / "windows")
+    answer = ask(node, "mark")
+    assert not answer.success
+    assert "No such file" in answer.message
+    assert ask(node, "reload").success
+
+
+def test_an_alarm_writes_the_window_and_says_what_reads_it(
+    node: SteeringTorqueEstimator, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    node.start()
+    steer(node)
+    assert node.session is not None
+    node.session.alarm = True
+    spin_until(node, lambda: "diagnose --window" in capfd.readouterr().err)
+    (file,) = (tmp_path / "windows").iterdir()
+    assert set(read_window(file, node.session.vehicle.channels).recording.angle["left"].value) == {ANGLE}
+    assert not node.session.alarm
+
+
+def test_a_state_that_cannot_be_written_is_told_and_the_node_goes_on(
+    node: SteeringTorqueEstimator, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    node.start()
+    steer(node)
+    shutil.rmtree(tmp_path / "state")
+    node.save()
+    assert "s.json: state cannot be written: " in capfd.readouterr().err
+    assert not node.last_exception
+
+
+def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTorqueEstimator) -> None:
+    node.start()
+    before = node.settings
+    (result,) = node.set_parameters([Parameter("when_stale", value="perhaps")])
+    assert not result.successful
+    assert "expected one of silent, zero" in result.reason
+    assert node.settings == before
+
+
+def test_a_context_that_others_shut_down_costs_no_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def spin(node: SteeringTorqueEstimator, *_: object) -> bool:
+        steer(node)
+        rclpy.shutdown()
+        return True
+
+    monkeypatch.setattr(run, "spin", spin)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    assert run.run(["estimator", *arguments(tmp_path)]) == 0
+    memory = read_state(tmp_path / "state" / "s.json", load(VEHICLE), time.time_ns(), 60.0)
+    assert [memory["sides"][side]["angle"] for side in ("left", "right")] == [ANGLE, ANGLE]
