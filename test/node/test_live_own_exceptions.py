@@ -43,7 +43,7 @@ def arguments(folder: Path) -> list[str]:
     """Of a node with a folder for its windows and one for its state."""
     for name in ("windows", "state"):
         (folder / name).mkdir()
-    given = {"vehicle_file": VEHICLE, "watch_folder": folder / "windows", "state_file": folder / "state" / "s.json", "state_period_s": 3600.0}
+    given = {"vehicle_file": VEHICLE, "watch_folder": folder / "windows", "state_file": folder / "state" / "s.json"}
     return ["--ros-args", *(word for name, value in given.items() for word in ("-p", f"{name}:={value}"))]
 
 
