@@ -15,6 +15,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import EffectEntry, TorqueSensor, Vehicle, load
+from lugre_steering.vehicle.model import baseline_parameters
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
 T0 = 1_790_000_000_000_000_000
@@ -338,6 +339,20 @@ def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:
     assert sum(math.isnan(total) for total in totals) == 1
     assert estimator.restarts == 1
     assert max(abs(total) for total in totals[-100:]) > 1000.0
+
+
+def test_a_torque_that_is_no_number_is_no_feed_forward_either() -> None:
+    """Limits of value and rate had made one of it, on the way to the largest that they allow."""
+    estimator, rows = Estimator(VEHICLE), []
+    for i, m in enumerate(messages(3.0)):
+        if i == 600:
+            estimator._state["z"][0] = math.nan
+        rows += [row.copy() for row in estimator.push(*m)[0]]
+    bad = next(k for k, row in enumerate(rows) if math.isnan(row["total"]))
+    before, during, after = (float(row["feed_forward"][0]) for row in rows[bad - 1 : bad + 2])
+    assert math.isnan(during)
+    fastest = 1.0 * float(baseline_parameters(VEHICLE)["sigma_0"])  # 1 rad/s, as nothing else is asked for [N m/s]
+    assert abs(after - before) <= 1.001 * fastest * 0.01
 
 
 @pytest.mark.parametrize("first", [3.0, -1.0])
