@@ -9,12 +9,14 @@ Python. Tests that count processes, compilations or time fail in this form.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import numba
 import numpy as np
+import pytest
 
 from lugre_steering.chain import compiled, doors, hydraulics, step
 from lugre_steering.chain.compose import Composition
@@ -22,6 +24,22 @@ from lugre_steering.chain.layout import LINE
 
 if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise RuntimeError("expected NUMBA_DISABLE_JIT=1 in the environment")
+
+
+CASES = 2
+"""Of each parametrised test so many are run: the cases of one differ in numbers more than in lines."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the further cases of each test."""
+    met = Counter[str]()
+    kept, left_out = [], []
+    for item in items:
+        name = item.nodeid.partition("[")[0]
+        met[name] += 1
+        (kept if met[name] <= CASES else left_out).append(item)
+    items[:] = kept
+    config.hook.pytest_deselected(items=left_out)
 
 
 class Row:
