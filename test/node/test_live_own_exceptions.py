@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from geometry_msgs.msg import WrenchStamped
 from live_harness import DOMAIN, PATIENCE_S, VEHICLE
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -66,8 +68,8 @@ def spin_until(node: SteeringTorqueEstimator, condition: Callable[[], bool]) -> 
     executor.shutdown()
 
 
-def steer(node: SteeringTorqueEstimator) -> None:
-    """Some samples of each angle, so that there is something to keep."""
+def steer(node: SteeringTorqueEstimator, until: Callable[[], bool] = lambda: True) -> None:
+    """Some samples of each angle, so that there is something to keep, and on until something has come."""
     session = node.session
     assert session is not None
     angles = [channel for channel in session.vehicle.channels if channel.kind is Kind.ANGLE]
@@ -78,7 +80,7 @@ def steer(node: SteeringTorqueEstimator) -> None:
             message = JointState(name=[channel.joint], position=[ANGLE])
             message.header.stamp = node.get_clock().now().to_msg()
             publisher.publish(message)
-        return all(session.estimator.latest_ns[f"angle/{channel.name}"] for channel in angles)
+        return all(session.estimator.latest_ns[f"angle/{channel.name}"] for channel in angles) and until()
 
     spin_until(node, heard)
 
@@ -145,6 +147,21 @@ def test_a_state_that_cannot_be_written_is_told_and_the_node_goes_on(
     node.save()
     assert "s.json: state cannot be written: " in capfd.readouterr().err
     assert not node.last_exception
+
+
+def test_a_torque_that_is_no_number_is_withheld_and_told(node: SteeringTorqueEstimator) -> None:
+    node.start()
+    heard: list[float] = []
+    node.create_subscription(WrenchStamped, "~/torque", lambda message: heard.append(message.wrench.torque.z), qos_profile_sensor_data)
+    steer(node, until=lambda: bool(heard))
+    session = node.session
+    assert session is not None
+    session.estimator._state["z"][0] = math.nan
+    steer(node, until=lambda: bool(session.health.withheld))
+    published = len(heard)
+    steer(node, until=lambda: len(heard) > published + 3)  # and it begins anew
+    assert session.health.withheld == {"torque is not a finite number": 1}
+    assert all(map(math.isfinite, heard))
 
 
 def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTorqueEstimator) -> None:
