@@ -115,16 +115,16 @@ def _doors(composition: Composition) -> doors.Doors:
     return doors.Doors(*3 * (_opened.index(composition),))
 
 
-def _call_step(door: Any, p: Any, s: Any, *others: Any) -> None:
+def _call_step(door: Any, p: Any, s: Any, rubber: Any, out: Any, *numbers: Any) -> None:
     made = _opened[int(door)]
-    made.step(_as(p, made.parameters), _as(s, made.state), *others)
+    doors._step_door([_as(p, made.parameters)], [_as(s, made.state)], rubber, len(rubber), [out], *numbers)
 
 
 def _call_number(door: Any, row: Any, number: Any) -> Any:
     made = _opened[int(door)]
     if row.dtype == LINE:
-        return made.line_error(_as(row, made.lines), number)
-    return made.arm_factor(_as(row, made.parameters), number)
+        return doors._line_error_door([_as(row, made.lines)], number)
+    return doors._arm_factor_door([_as(row, made.parameters)], number)
 
 
 def _tabled(value: Any) -> Any:
@@ -150,6 +150,7 @@ def _entered(function: Callable[..., Any]) -> Callable[..., Any]:
 
 vars(hydraulics.moment_arm)["py_func"] = hydraulics.moment_arm
 vars(compiled)["_power_of_two"] = lambda shifted: math.ldexp(1.0, int(shifted - compiled._ROUND))
+vars(doors).update(carray=lambda pointer, _: pointer)  # a list of one record, or the table itself
 vars(doors).update(row=_row, call_step=_call_step, call_number=_call_number, doors=_doors)
 vars(step).update(_run=_entered(step._run), _torques=_entered(step._torques))
 
