@@ -125,6 +125,14 @@ def test_a_residual_as_large_as_the_torque_is_told(estimate: float, residual: fl
     assert ("as large as the torque" in status.message) == (level == WARN)
 
 
+def test_a_model_that_no_longer_matches_is_told_with_the_time_since() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 10)
+    health.mismatch_s = 12.3
+    status = next(s for s in health.statuses(1, 1, 1.0, {}, 0) if s.name.endswith("residual"))
+    assert status.level == WARN
+    assert "since 12 s the residual is not what it was: the model no longer matches; diagnose" in status.message
+
+
 def test_every_rejection_is_counted_by_channel_and_reason() -> None:
     vehicle = load(VEHICLE)
     ms = 1_000_000

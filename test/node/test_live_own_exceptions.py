@@ -25,8 +25,10 @@ from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from lugre_steering.errors import DataError
+from lugre_steering.estimator.node_parameters import ParameterError
 from lugre_steering.estimator.state_file import read_state
 from lugre_steering.live import estimator_node, run
 from lugre_steering.live.estimator_node import SteeringTorqueEstimator
@@ -162,6 +164,51 @@ def test_a_torque_that_is_no_number_is_withheld_and_told(node: SteeringTorqueEst
     steer(node, until=lambda: len(heard) > published + 3)  # and it begins anew
     assert session.health.withheld == {"torque is not a finite number": 1}
     assert all(map(math.isfinite, heard))
+
+
+def test_a_feed_forward_that_is_no_number_is_withheld_and_told_while_the_torque_goes_on(node: SteeringTorqueEstimator) -> None:
+    node.start()
+    torques: list[float] = []
+    fed: list[float] = []
+    node.create_subscription(WrenchStamped, "~/torque", lambda message: torques.append(message.wrench.torque.z), qos_profile_sensor_data)
+    node.create_subscription(JointState, "~/feed_forward", lambda message: fed.extend(message.effort), qos_profile_sensor_data)
+    steer(node, until=lambda: bool(torques) and bool(fed))
+    session = node.session
+    assert session is not None
+    session.estimator._core.config["horizon"] = math.nan
+    steer(node, until=lambda: bool(session.health.withheld))
+    published = len(torques)
+    steer(node, until=lambda: len(torques) > published + 3)
+    assert set(session.health.withheld) == {"estimate is not a finite number"}
+    assert all(map(math.isfinite, (*torques, *fed)))
+
+
+def test_plans_of_rubbish_and_a_flood_of_them_are_told_and_cost_nothing(node: SteeringTorqueEstimator) -> None:
+    node.start()
+    assert node.session is not None
+    unused = node.session.health.unused
+    publisher = node.create_publisher(JointTrajectory, "steering/command", 10)
+
+    def sent(plan: bytes | JointTrajectory, reason: str) -> bool:
+        publisher.publish(plan)
+        return bool(unused[f"steering/command: {reason}"])
+
+    spin_until(node, lambda: sent(b"\0\1\0\0" + b"\xff" * 60, "malformed"))
+    points = [JointTrajectoryPoint(positions=[ANGLE, ANGLE]) for _ in range(1000)]
+    flood = JointTrajectory(joint_names=["left_track_steer_joint", "right_track_steer_joint"], points=points)
+    spin_until(node, lambda: sent(flood, "too many to read them all"))
+    assert not node.session.health.exceptions
+
+
+def test_a_folder_for_windows_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    given = ["--ros-args", "-p", f"vehicle_file:={VEHICLE}", "-p", "watch_folder:=/nowhere"]
+    rclpy.init(args=given, domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with pytest.raises(ParameterError, match="parameter 'watch_folder': got '/nowhere', expected a folder that is there"):
+            SteeringTorqueEstimator()
+    finally:
+        rclpy.try_shutdown()
 
 
 def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTorqueEstimator) -> None:
