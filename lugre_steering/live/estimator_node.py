@@ -103,14 +103,14 @@ class SteeringTorqueEstimator(LifecycleNode):
         return vehicle
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        if self.session is not None:
-            self.session.activate()
+        assert self.session is not None  # it is configured
+        self.session.activate()
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Outputs to zero and silent; the state goes on."""
-        if self.session is not None:
-            self.session.deactivate()
+        assert self.session is not None
+        self.session.deactivate()
         self.save()
         return super().on_deactivate(state)
 

@@ -28,7 +28,6 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from lugre_steering.errors import DataError
-from lugre_steering.estimator.node_parameters import ParameterError
 from lugre_steering.estimator.state_file import read_state
 from lugre_steering.live import estimator_node, run
 from lugre_steering.live.estimator_node import SteeringTorqueEstimator
@@ -55,9 +54,11 @@ def arguments(folder: Path) -> list[str]:
 def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SteeringTorqueEstimator]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     rclpy.init(args=arguments(tmp_path), domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
+    made = SteeringTorqueEstimator()
     try:
-        yield SteeringTorqueEstimator()
+        yield made
     finally:
+        made.destroy_node()  # else other tests would find one more node of the name
         rclpy.try_shutdown()
 
 
@@ -200,17 +201,6 @@ def test_plans_of_rubbish_and_a_flood_of_them_are_told_and_cost_nothing(node: St
     assert not node.session.health.exceptions
 
 
-def test_a_folder_for_windows_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    given = ["--ros-args", "-p", f"vehicle_file:={VEHICLE}", "-p", "watch_folder:=/nowhere"]
-    rclpy.init(args=given, domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        with pytest.raises(ParameterError, match="parameter 'watch_folder': got '/nowhere', expected a folder that is there"):
-            SteeringTorqueEstimator()
-    finally:
-        rclpy.try_shutdown()
-
-
 def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTorqueEstimator) -> None:
     node.start()
     before = node.settings
@@ -220,9 +210,20 @@ def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTo
     assert node.settings == before
 
 
+def test_a_shutdown_by_a_lifecycle_manager_keeps_the_state(node: SteeringTorqueEstimator, tmp_path: Path) -> None:
+    node.start()
+    steer(node)
+    assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
+    assert node.session is None
+    memory = read_state(tmp_path / "state" / "s.json", load(VEHICLE), time.time_ns(), 60.0)
+    assert [memory["sides"][side]["angle"] for side in ("left", "right")] == [ANGLE, ANGLE]
+    assert list((tmp_path / "state").iterdir()) == [tmp_path / "state" / "s.json"]  # and lets go of it
+
+
 def test_a_context_that_others_shut_down_costs_no_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def spin(node: SteeringTorqueEstimator, *_: object) -> bool:
         steer(node)
+        node.destroy_node()
         rclpy.shutdown()
         return True
 
