@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import math
 import shutil
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -233,3 +235,31 @@ def test_a_context_that_others_shut_down_costs_no_state(tmp_path: Path, monkeypa
     assert run.run(["estimator", *arguments(tmp_path)]) == 0
     memory = read_state(tmp_path / "state" / "s.json", load(VEHICLE), time.time_ns(), 60.0)
     assert [memory["sides"][side]["angle"] for side in ("left", "right")] == [ANGLE, ANGLE]
+
+
+@pytest.mark.parametrize("executor", ["events", "single"])
+def test_a_context_that_ends_while_it_spins_ends_the_node(executor: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    real, nodes = run.spin, []
+
+    def spin(node: SteeringTorqueEstimator, *given: Any) -> bool:
+        nodes.append(node)
+        threading.Timer(0.3, rclpy.shutdown).start()
+        return real(node, *given)
+
+    monkeypatch.setattr(run, "spin", spin)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    try:
+        assert run.run(["estimator", *arguments(tmp_path), "-p", f"executor:={executor}"]) == 0
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        nodes[0].destroy_node()
+
+
+def test_arguments_that_are_none_are_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run.run(["estimator", "--ros-args", "-p", "no value"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("estimator: ")
+    assert said.count("\n") == 1
