@@ -61,6 +61,7 @@ setup(
         "test": [
             *DOCS,
             "pandas>=2.0",
+            "coverage>=7.10",
             "pytest>=7.4",
             "pytest-rerunfailures>=15.0",
             "pytest-xdist>=3.7",

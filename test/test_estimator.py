@@ -15,8 +15,10 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator import WAITING_RING, Estimator, Options
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import EffectEntry, TorqueSensor, Vehicle, load
+from lugre_steering.vehicle.model import baseline_parameters
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
+JOINT = load(Path(__file__).resolve().parents[1] / "config" / "single_joint_example.yaml")
 T0 = 1_790_000_000_000_000_000
 MS = 1_000_000
 LEFT, RIGHT, MAIN_A, MAIN_B, AUX_A, AUX_B, AIR = range(7)
@@ -340,6 +342,20 @@ def test_a_torque_that_is_no_number_starts_the_estimator_anew() -> None:
     assert max(abs(total) for total in totals[-100:]) > 1000.0
 
 
+def test_a_torque_that_is_no_number_is_no_feed_forward_either() -> None:
+    """Limits of value and rate had made one of it, on the way to the largest that they allow."""
+    estimator, rows = Estimator(VEHICLE), []
+    for i, m in enumerate(messages(3.0)):
+        if i == 600:
+            estimator._state["z"][0] = math.nan
+        rows += [row.copy() for row in estimator.push(*m)[0]]
+    bad = next(k for k, row in enumerate(rows) if math.isnan(row["total"]))
+    before, during, after = (float(row["feed_forward"][0]) for row in rows[bad - 1 : bad + 2])
+    assert math.isnan(during)
+    fastest = 1.0 * float(baseline_parameters(VEHICLE)["sigma_0"])  # 1 rad/s, as nothing else is asked for [N m/s]
+    assert abs(after - before) <= 1.001 * fastest * 0.01
+
+
 @pytest.mark.parametrize("first", [3.0, -1.0])
 def test_a_bad_first_angle_is_not_held_for_ever(first: float) -> None:
     """Then the vehicle stands: as soon as two samples contradict the first one, it never happened."""
@@ -562,6 +578,39 @@ def test_single_side_with_torque_sensor() -> None:
     i = (r["stamp_ns"] - T0) // (10 * MS)
     assert r["measured_torque"] == pytest.approx(100.0 + i - 0.4)
     assert r["residual"] == pytest.approx(r["measured_torque"] - estimates["total"][i])
+
+
+def test_chambers_at_tank_pressure_add_nothing() -> None:
+    """The torque of all chambers is that of the caps, the rods at the tank, and that of the rods, the caps at the tank."""
+    assert VEHICLE.hydraulics is not None
+    cylinders, measured = VEHICLE.hydraulics.cylinders, []
+    for tank in ({}, {"rod": "tank"}, {"cap": "tank"}):
+        at_tank = {name: dataclasses.replace(cylinder, **tank) for name, cylinder in cylinders.items()}
+        vehicle = VEHICLE.replace(hydraulics=dataclasses.replace(VEHICLE.hydraulics, cylinders=at_tank))
+        measured.append(feed(messages(1.0), vehicle)[2]["measured_torque"])
+    both, caps, rods = measured
+    np.testing.assert_allclose(caps + rods, both, rtol=0.0, atol=1e-9 * np.abs(caps).max())
+    assert np.abs(rods).max() > 3e3
+
+
+def test_an_angle_without_noise_is_taken_as_it_is() -> None:
+    exact = VEHICLE.replace(sensors=dataclasses.replace(VEHICLE.sensors, angle_noise_deg=0.0, angle_resolution_deg=0.0))
+    stops = [(k, s, round(v, 2) if k in (LEFT, RIGHT) else v) for k, s, v in messages(3.0)]  # stands and steps by turns
+    _, estimates, _ = feed(stops, exact)
+    assert len(set(estimates["theta"][:, 0])) > 20
+    np.testing.assert_allclose(estimates["theta"][:, 0], [v for k, _, v in stops if k == LEFT], atol=1e-12)
+
+
+def test_rubber_begins_as_warm_as_told() -> None:
+    estimator = Estimator(VEHICLE)
+    estimator.begin_at(60.0)
+    assert estimator.push(LEFT, T0, 0.0)[0].size == 0
+    assert estimator.push(RIGHT, T0, 0.0)[0]["temperature"][0] == pytest.approx([60.0, 60.0])
+    for degC in (-80.1, 150.1, math.nan):
+        with pytest.raises(DataError, match="expected -80 to 150 degC"):
+            estimator.begin_at(degC)
+    with pytest.raises(DataError, match="this vehicle has no rubber"):
+        Estimator(JOINT).begin_at(20.0)
 
 
 def test_air_temperature_is_taken_over() -> None:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from lugre_steering.bench.neighbour import Strokes
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
+from lugre_steering.estimator.estimator import PLAN_POINTS
+from lugre_steering.estimator.plan import planned_angles
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
 from lugre_steering.vehicle.model import baseline_parameters
@@ -535,6 +538,42 @@ def test_limits_of_value_and_rate_hold() -> None:
     released = np.array([row["feed_forward"] for row in rows])
     assert np.abs(released).max() == 9e3
     assert np.abs(np.diff(released, axis=0)).max() <= 20e3 * 0.01 * (1.0 + 1e-9)
+
+
+def test_motion_that_the_calibration_has_not_seen_is_told() -> None:
+    """10 deg and a tenth; the drive has 17 deg."""
+    estimator, rows = Estimator(VEHICLE.replace(provenance={"calibration": {"seen": {"angle_deg": 10.0}}})), []
+    for i in range(900):
+        for side in (0, 1):
+            rows += [row.copy() for row in estimator.push(side, T0 + i * PERIOD_NS, 0.3 * math.sin(0.7 * 0.01 * i))[0]]
+    told = np.array(["outside the range of the calibration" in doubts(row) for row in rows])
+    farther = np.abs([row["theta"][0] for row in rows]) > math.radians(11.0)
+    np.testing.assert_array_equal(told, farther)
+    assert 300 < told.sum() < 700
+
+
+@pytest.mark.parametrize("heldout", [800.0, {"nominal": 1e5, "calibrated": 800.0}])
+def test_a_residual_of_five_times_the_calibrations_is_implausible_for_as_long_as_it_lasts(heldout: object) -> None:
+    """800 N m held out; of 24 kN m, 3.2 and 4.8 are no residual that would be told without that."""
+    vehicle = VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor(), provenance={"heldout_rmse_Nm": heldout})
+    estimator, told = Estimator(vehicle), []
+    for i in range(1500):
+        stamp_ns = T0 + i * PERIOD_NS
+        for side in (0, 1):
+            for row in estimator.push(side, stamp_ns, 0.3 * math.sin(0.7 * 0.01 * i))[0]:
+                told.append("residual implausible" in doubts(row))
+                off = 0.0 if i < 500 else 6.0 * 800.0 if 700 <= i < 900 else 4.0 * 800.0
+                estimator.push(2, stamp_ns, float(row["predicted"]) + off)
+    assert not any(told[:700])
+    assert all(told[750:900])
+    assert not any(told[1000:])
+
+
+def test_a_plan_of_more_points_than_are_kept_is_not_even_read() -> None:
+    joints = ["left", "right"]
+    message = SimpleNamespace(joint_names=joints, points=[None] * (PLAN_POINTS + 1))
+    with pytest.raises(DataError, match=f"more than {PLAN_POINTS} points"):
+        planned_angles(message, joints, T0)  # type: ignore[arg-type]
 
 
 def parked(options: Options) -> Estimator:

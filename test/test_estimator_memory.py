@@ -19,7 +19,7 @@ import pytest
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.state_file import Ownership, read_state, write_state
-from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.vehicle import EffectEntry, Vehicle, load
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
 T0 = 1_790_000_000_000_000_000
@@ -98,6 +98,9 @@ def test_a_state_of_another_model_is_refused_and_nothing_changed() -> None:
     estimator, fresh = Estimator(VEHICLE), Estimator(VEHICLE)
     steer(estimator, 0, 100)
     memory = json.loads(json.dumps(estimator.memory))
+    memory["sides"]["right"]["state"]["z"] = math.nan
+    with pytest.raises(DataError, match="z is not a finite number"):
+        fresh.resume(memory)
     memory["sides"]["right"]["state"].pop("z")
     with pytest.raises(DataError, match="other quantities: z"):
         fresh.resume(memory)
@@ -120,6 +123,19 @@ def test_another_file_of_the_same_vehicle_takes_over_without_a_gap() -> None:
     # After a long way the past of the bristle is forgotten.
     assert float(rows[-1]["total"]) == pytest.approx(float(expected[-1]["total"]), rel=1e-2)
     assert new.counters["angle/left"]["accepted"] == 1500
+
+
+def test_physics_that_another_file_adds_begins_as_at_the_start_of_a_recording() -> None:
+    """Its memory is not zero then: a stop is loading, a carcass as warm as the rubber was."""
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 500)
+    stop = EffectEntry("end_stop", {"engage_angle": 0.6, "stiffness": 1e5})
+    carcass = EffectEntry("carcass_heat_sink", {"conductance": 50.0, "capacity": 5e4})
+    state = estimator.continued(VEHICLE.replace(effects=(stop, carcass))).memory["sides"]["left"]["state"]
+    assert VEHICLE.initial is not None
+    assert state["end_stop_loading"] == 1.0
+    assert state["carcass_heat_sink_carcass_temperature"] == VEHICLE.initial.rubber_temperature_degC
+    assert state["temperature"] == estimator.memory["sides"]["left"]["state"]["temperature"] > VEHICLE.initial.rubber_temperature_degC
 
 
 def with_stiffness(vehicle: Vehicle, factor: float) -> Vehicle:
@@ -179,6 +195,17 @@ def test_a_state_file_is_of_one_node_at_a_time(tmp_path: Path) -> None:
     first.release()
     assert list(tmp_path.iterdir()) == []
     assert "cannot be written" in first.take(tmp_path / "missing" / "state.json", 60.0)  # at once
+    os.mkfifo(tmp_path / ".laid_out.json.lock")
+    assert "is not a lock file of ours" in first.take(tmp_path / "laid_out.json", 60.0)  # as well
+
+
+def test_a_state_that_cannot_take_its_place_leaves_nothing_behind(tmp_path: Path) -> None:
+    estimator = Estimator(VEHICLE)
+    steer(estimator, 0, 10)
+    (tmp_path / "state.json").mkdir()
+    with pytest.raises(IsADirectoryError):
+        write_state(tmp_path / "state.json", VEHICLE, estimator.memory)
+    assert list(tmp_path.iterdir()) == [tmp_path / "state.json"]
 
 
 def test_a_killed_node_lets_go_of_its_state_file_and_one_that_leaves_is_waited_for(tmp_path: Path) -> None:

@@ -220,10 +220,8 @@ def quantities_of(hook: str) -> dict[str, str]:
     if hook not in _STEPWISE:
         return dict(HOOKS[hook].given)
     known: dict[str, str] = {}
-    for name in _STEPWISE:
+    for name in _STEPWISE[: _STEPWISE.index(hook) + 1]:
         known |= HOOKS[name].given
-        if name == hook:
-            break
     return known
 
 

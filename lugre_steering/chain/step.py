@@ -90,11 +90,8 @@ def new_state(p: Records, tracks: int = 1) -> Records:
 
 
 def has_effects(p: Records) -> bool:
-    """Whether any effect parameter of the records differs from neutral."""
-    numbers = p.view(np.float64)
-    if p.size == 1:  # as in fits, which ask tens of thousands of times
-        return bool(np.count_nonzero(numbers[len(BASELINE_FIELDS) :]))
-    return bool(numbers.reshape(p.size, -1)[:, len(BASELINE_FIELDS) :].any())
+    """Whether any effect parameter of a record (1,) differs from neutral."""
+    return bool(np.count_nonzero(p.view(np.float64)[len(BASELINE_FIELDS) :]))
 
 
 def _bare(p: Records) -> Records:

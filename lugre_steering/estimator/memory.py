@@ -89,7 +89,8 @@ def hand_over(old: Core, old_composition: Composition, new: Core, composition: C
                 target[field] = source[field]
             elif field in composition.starts:  # physics that is new begins as at the start of a recording
                 start = composition.starts[field]
-                target[field] = parameters[start] if isinstance(start, str) else start
+                # Of bounds there are two for each side.
+                target[field] = np.repeat(parameters[start], target.size // parameters.size) if isinstance(start, str) else start
     for field in _ONGOING:
         new.config[field] = old.config[field]
 

@@ -29,10 +29,11 @@ def release(core, e):
     elif e.doubts != 0:
         c.weight = 0.0
     for side in range(core.motion.size):
-        wanted = max(-c.limit, min(c.limit, c.weight * e.feed_forward[side]))
-        if not first and math.isfinite(wanted):
-            reach, last = c.rate_limit * dt, core.released[side]
-            wanted = max(last - reach, min(last + reach, wanted))
-        if math.isfinite(wanted):
+        wanted = c.weight * e.feed_forward[side]
+        if math.isfinite(wanted):  # of NaN, limits would make the largest torque that they allow
+            wanted = max(-c.limit, min(c.limit, wanted))
+            if not first:
+                reach, last = c.rate_limit * dt, core.released[side]
+                wanted = max(last - reach, min(last + reach, wanted))
             core.released[side] = wanted
         e.feed_forward[side] = wanted

@@ -103,14 +103,14 @@ class SteeringTorqueEstimator(LifecycleNode):
         return vehicle
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        if self.session is not None:
-            self.session.activate()
+        assert self.session is not None  # it is configured
+        self.session.activate()
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Outputs to zero and silent; the state goes on."""
-        if self.session is not None:
-            self.session.deactivate()
+        assert self.session is not None
+        self.session.deactivate()
         self.save()
         return super().on_deactivate(state)
 
@@ -258,8 +258,8 @@ class SteeringTorqueEstimator(LifecycleNode):
 
     def _mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Write the window up to now, for diagnose."""
-        write = self.session.window("marked") if self.session is not None else None
         try:
+            write = self.session.window("marked") if self.session is not None else None
             if write is None:
                 raise DataError("parameter 'watch_folder' names no folder for windows, or the node is not configured")
             response.success, response.message = True, str(write())

@@ -125,6 +125,14 @@ def test_a_residual_as_large_as_the_torque_is_told(estimate: float, residual: fl
     assert ("as large as the torque" in status.message) == (level == WARN)
 
 
+def test_a_model_that_no_longer_matches_is_told_with_the_time_since() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 10)
+    health.mismatch_s = 12.3
+    status = next(s for s in health.statuses(1, 1, 1.0, {}, 0) if s.name.endswith("residual"))
+    assert status.level == WARN
+    assert "since 12 s the residual is not what it was: the model no longer matches; diagnose" in status.message
+
+
 def test_every_rejection_is_counted_by_channel_and_reason() -> None:
     vehicle = load(VEHICLE)
     ms = 1_000_000
@@ -312,7 +320,7 @@ def test_commands_do_not_jump_when_the_torque_does(tmp_path: Path, cause: str) -
 
 def outputs_of(health: Health) -> tuple[bytes, str]:
     """Level and message of the next report, a second after the one before."""
-    status = health.statuses(0, 0, 1.0, {}, 0)[-1]
+    status = list(health.statuses(0, 0, 1.0, {}, 0))[-1]
     return status.level, status.message
 
 
@@ -344,7 +352,7 @@ def residual_after(seconds: int, measured_over_estimate: float, estimate: float)
         for i in range(100):
             torque = estimate * math.sin(0.1 * i)
             health.add_residual((measured_over_estimate - 1.0) * torque, measured_over_estimate * torque)
-        status = health.statuses(0, 0, 1.0, {}, 0)[3]
+        status = list(health.statuses(0, 0, 1.0, {}, 0))[3]
     return status.level, status.message
 
 
@@ -382,10 +390,10 @@ def test_other_joints_are_a_mistake_only_where_no_wanted_joint_comes() -> None:
     health = Health(load(VEHICLE), 0.2, 0.5, 16)
     health.set_topics(["/joint_states"] * 2 + ["/pressure"] * 5)
     health.foreign["/joint_states"] += 5
-    assert health.statuses(0, 0, 1.0, {}, 0)[1].level == WARN
+    assert list(health.statuses(0, 0, 1.0, {}, 0))[1].level == WARN
     health.arrivals[0] += 1
     health.foreign["/joint_states"] += 5
-    status = health.statuses(0, 0, 1.0, {}, 0)[1]
+    status = list(health.statuses(0, 0, 1.0, {}, 0))[1]
     assert status.level == OK
     assert {pair.key: pair.value for pair in status.values} == {"/joint_states without a wanted joint": "10"}
 

@@ -9,16 +9,21 @@ import json
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
+import bag_making as make
 import numpy as np
 import pytest
 from rich.console import Console
+from rosbags.typesys import get_types_from_msg
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
+from lugre_steering.errors import BagError
 from lugre_steering.node import arguments_of
+from lugre_steering.recording import NODE
 from lugre_steering.watch.seen import Arrived
 from lugre_steering.watch.view import BARS, spark, view
 
@@ -85,6 +90,58 @@ def test_stamps_are_moved_and_nothing_else() -> None:
     unset = raw[:4] + bytes(8) + raw[12:]
     assert moved(unset, 200_000_000) == unset
     assert moved(raw[:8], 5) == raw[:8]
+    assert moved(raw, 10**18 * 3) == raw  # no stamp can say that
+
+
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ROS in this process, heard by nobody else."""
+    pytest.importorskip("rclpy")
+    from live_harness import DOMAIN
+
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+
+def pressures(*log_s: float, topic: str = "/steering/pressure/main_a") -> list[make.Message]:
+    return [(topic, make.FLUID_PRESSURE, make.T0 + round(t * 1e9), make.pressure(make.T0 + round(t * 1e9), 1e6)) for t in log_s]
+
+
+@pytest.mark.usefixtures("alone")
+def test_what_is_not_played_is_told_with_the_reason(tmp_path: Path) -> None:
+    from lugre_steering.live.play import play
+
+    unknown = get_types_from_msg("int32 value", "made_up_msgs/msg/Thing")
+    make.TYPES.register(unknown)
+    others = [*pressures(0.0, topic=f"/{NODE}/residual"), ("/thing", "made_up_msgs/msg/Thing", make.T0, b"\0\1\0\0\0\0\0\0")]
+    bag = make.write(tmp_path / "run", [*others, *pressures(0.1, 0.2)])
+    played = play(bag, rate=10.0, wait_s=0.0)
+    assert played.messages == {"/steering/pressure/main_a": 2}
+    left_out = {f"/{NODE}/residual": "an output of the estimator", "/thing": "type made_up_msgs/msg/Thing is not installed"}
+    assert (played.left_out, played.rounds) == (left_out, 1)
+    with pytest.raises(BagError, match=r"no topic to publish .*an output of the estimator; /thing: type .* is not installed"):
+        play(make.write(tmp_path / "others", others), wait_s=0.0)
+
+
+@pytest.mark.usefixtures("alone")
+def test_a_loop_and_a_long_pause_end_when_they_are_to(tmp_path: Path) -> None:
+    import rclpy
+
+    from lugre_steering.live.play import play
+
+    rounds = iter(range(3))
+
+    def interrupted(*_: object) -> None:
+        if next(rounds) == 2:
+            raise KeyboardInterrupt
+
+    played = play(make.write(tmp_path / "run", pressures(0.0, 0.01)), loop=True, recorded_stamps=True, wait_s=0.0, progress=interrupted)
+    assert (played.rounds, played.messages.total()) == (3, 6)
+    timer, begin = threading.Timer(0.3, rclpy.try_shutdown), time.monotonic()
+    timer.start()
+    played = play(make.write(tmp_path / "pause", pressures(0.0, 100.0)), wait_s=0.0)
+    assert time.monotonic() - begin < 60.0
+    assert played.messages.total() == 1
 
 
 def test_a_bag_is_played_to_the_node_and_watched(tmp_path: Path) -> None:

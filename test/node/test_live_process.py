@@ -41,6 +41,7 @@ def start_refused(*ros_args: str) -> str:
         ("max_gap_s:=1", ("max_gap_s", "1", "decimal point")),
         ("executor:=multi", ("executor", "multi", "events, single")),
         ("use_sim_time:=3", ("use_sim_time", "3", "BOOL")),
+        ("watch_folder:=/nowhere", ("watch_folder", "/nowhere", "a folder that is there")),
     ],
 )
 def test_bad_parameters_are_refused(argument: str, said: tuple[str, ...]) -> None:
