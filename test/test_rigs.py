@@ -257,7 +257,7 @@ def test_the_diagnosis_of_a_linear_axis_speaks_of_one(tmp_path: Path) -> None:
     assert "heldout_rmse_Nm" in done.json["baseline"]  # keys are those of the contract
     write_report(done, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    body = re.sub(r"<script.*?</script>|<style.*?</style>|<code>.*?</code>", "", page, flags=re.DOTALL)
+    body = re.sub(r"<script.*?</script>|<style.*?</style>|<code[^>]*>.*?</code>", "", page, flags=re.DOTALL)
     text = html.unescape(re.sub(r"<[^>]*>", " ", body)).replace("\u00a0", " ")
     assert not re.search(FOREIGN, text, re.IGNORECASE), re.search(FOREIGN, text, re.IGNORECASE)
 

@@ -331,12 +331,12 @@ def statement(
             f"The residual ({number(rmse.calibrated, 3)} N m) is above the noise ({number(rmse.noise_floor, 3)} N m): physics "
             "beyond the baseline; run diagnose before trusting these values."
         )
-    titles = {key.key: key.beginning for key in KEYS}
+    titles = {key.key: key.beginning for key in KEYS}  # the rest are values of effects
     for row in rows:
         if row.at_bound:
-            text.append(f"{titles[row.key]} stopped at the {row.at_bound} end of its range.")
+            text.append(f"{titles.get(row.key, row.key)} stopped at the {row.at_bound} end of its range.")
         if row.prior_dominated:
-            text.append(f"{titles[row.key]} is hardly determined by these recordings; drive '{row.advice}'.")
+            text.append(f"{titles.get(row.key, row.key)} is hardly determined by these recordings; drive '{row.advice}'.")
     said = {row.name for row in rows if row.prior_dominated}
     text += [f"{c.statement[0].upper()}{c.statement[1:]}." for c in weak if not set(c.parts) <= said]
     for value in assumed:
