@@ -69,7 +69,7 @@ def test_heat_is_aged_by_the_cooling_law() -> None:
     assert float(hour[0]["total"]) == pytest.approx(float(last["total"]), rel=0.15)  # stiffer, as it is colder
 
 
-@pytest.mark.parametrize("spoil", ["cut", "flip", "other vehicle", "old", "ahead", "not JSON", "missing"])
+@pytest.mark.parametrize("spoil", ["cut", "flip", "other vehicle", "old", "ahead", "not JSON", "missing", "no stamp"])
 def test_a_state_that_is_of_no_use_is_refused(tmp_path: Path, spoil: str) -> None:
     file, vehicle, now_ns = tmp_path / "state.json", VEHICLE, T0 + 2 * SECOND
     estimator = Estimator(VEHICLE)
@@ -90,6 +90,10 @@ def test_a_state_that_is_of_no_use_is_refused(tmp_path: Path, spoil: str) -> Non
         file.write_bytes(b"\xff\x00[[[")
     elif spoil == "missing":
         file.unlink()
+    elif spoil == "no stamp":
+        memory = estimator.memory
+        memory["sides"]["left"]["stamp_ns"] = 10**400
+        write_state(file, VEHICLE, memory)
     with pytest.raises(DataError):
         read_state(file, vehicle, now_ns, 3600.0)
 

@@ -93,7 +93,9 @@ def read_state(file: Path, vehicle: Vehicle, now_ns: int, max_age_s: float) -> M
             content: Any = json.loads(stream.read(LARGEST_BYTES))
         found = content.pop("sha256")
         sound = content["schema"] == SCHEMA and found == _digest(content)
-        last_ns = max(side["stamp_ns"] for side in content["memory"]["sides"].values())
+        stamps_ns = [side["stamp_ns"] for side in content["memory"]["sides"].values()]
+        sound = sound and all(abs(stamp_ns) < 2**63 for stamp_ns in stamps_ns)
+        last_ns = max(stamps_ns)
     except OSError as error:
         raise DataError(f"{file}: cannot be read ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
