@@ -102,7 +102,7 @@ def read_effects(file: Path) -> tuple[list[Effect], str]:
         raise EffectError(f"{file}: cannot be read: {reason(error)}; expected a .py or .yaml file of effects") from error
     sha256 = hashlib.sha256(content.encode()).hexdigest()
     if file.suffix == ".py":
-        found = _of_module(_run(file, sha256), str(file))
+        found = _of_module(_run(file, content, sha256), str(file))
     elif file.suffix in (".yaml", ".yml"):
         found = _of_yaml(file)
     else:
@@ -110,16 +110,18 @@ def read_effects(file: Path) -> tuple[list[Effect], str]:
     return found, sha256
 
 
-def _run(file: Path, sha256: str) -> ModuleType:
-    """The module of a user's file, under a name that tells its content: compiled code that is kept looks for it by that name."""
+def _run(file: Path, content: str, sha256: str) -> ModuleType:
+    """The module of a user's file, under a name that tells its content: compiled code that is kept looks for it by that name.
+
+    What runs is the text whose hash is told: Python's loader would take an older compiled copy for one edited within the second.
+    """
     spec = importlib.util.spec_from_file_location(f"lugre_steering_own_{file.stem}_{sha256[:16]}", file)
     assert spec is not None
-    assert spec.loader is not None
     if spec.name in sys.modules:
         return sys.modules[spec.name]
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        exec(compile(content, str(file), "exec", dont_inherit=True), vars(module))
     except Exception as error:  # whatever a user's own Python raises
         del sys.modules[spec.name]
         raise EffectError(f"{file}: cannot be run: {type(error).__name__}: {error}") from error
