@@ -629,6 +629,34 @@ def test_a_plan_that_the_vehicle_leaves_or_that_has_run_out_is_told() -> None:
     assert not [row for side in (0, 1) for row in estimator.push(side, T0 + 300 * PERIOD_NS, 0.1)[0] if doubts(row)]
 
 
+def test_a_refused_command_takes_the_feed_forward_to_zero() -> None:
+    """What was meant last is not known: with a plan in force until the next one that can be read, without one for half a second."""
+    estimator = parked(Options(feed_forward_horizon_s=0.2))
+    told: dict[int, tuple[list[str], float]] = {}
+
+    def drive(samples: range) -> None:
+        for i in samples:
+            for side in (0, 1):
+                for row in estimator.push(side, T0 + i * PERIOD_NS, 0.1)[0]:
+                    told[i - 99] = doubts(row), abs(float(row["feed_forward"][0]))
+
+    estimator.refuse_plan()
+    drive(range(100, 160))
+    assert told[40][0] == ["command refused"]
+    assert told[52][0] == []
+    ahead = T0 + 160 * PERIOD_NS + np.array([0, 3 * SECOND, 5 * SECOND], np.int64)
+    estimator.set_plan(ahead, np.array([[0.1, 0.1, 0.5]] * 2))
+    drive(range(160, 470))
+    assert told[370][0] == []
+    assert told[370][1] > 1e3  # for the turn that is planned
+    estimator.refuse_plan()
+    drive(range(470, 550))
+    assert told[420] == (["command refused"], 0.0)
+    estimator.set_plan(*plan_of([], []))
+    drive(range(550, 552))
+    assert told[452][0] == []
+
+
 def test_the_inertia_of_a_plan_counts() -> None:
     """A track of 500 kg m2 more that the plan accelerates by 2 rad/s2 needs 1 kN m more."""
     wanted = []

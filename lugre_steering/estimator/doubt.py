@@ -63,6 +63,8 @@ PRESSURE_MEMORY_S = 1.0
 RESIDUAL_MEMORY_S = 2.0
 SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.35
 """A residual as large as the torque, where that is at least this share of the static friction, needs no long look."""
+REFUSED_S = 0.5
+"""A command that could not be used, with no plan in force, is forgotten after this."""
 BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
 REPEATING, REPEATS_MEMORY = 0.1, 50.0
@@ -72,9 +74,10 @@ DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
     "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
+    "command refused",
 )  # fmt: skip
 (
-    JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY,
+    JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED,
 ) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
 INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY
@@ -475,6 +478,10 @@ def standing_doubts(core, stamp_ns):
     for i in range(core.motion.size, core.channels.size):
         if core.channels[i].kind == Kind.PRESSURE and line_frozen(core.channels[i]):
             found |= LINE
+    if c.horizon > 0.0 and c.plan_refused_ns != 0:
+        # What is wanted now is not known: an earlier plan is not what was meant last.
+        if c.plan_size > 0 or stamp_ns - c.plan_refused_ns < REFUSED_S * 1e9:
+            found |= REFUSED
     if c.horizon > 0.0 and c.plan_size > 0:
         if stamp_ns >= core.plan_ns[c.plan_size - 1]:
             found |= PLAN_OUT

@@ -176,7 +176,7 @@ class Estimator:
     def set_plan(self, stamp_ns: IntArray, theta: Array) -> None:
         """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan.
 
-        ``DataError`` if it is none, is faster than an angle may be, or begins too far from the present one; the former plan stays.
+        ``DataError`` if it is none, is faster than an angle may be, or begins too far from the present one: see ``refuse_plan``.
         Without points there is no plan any more.
         """
         if theta.shape != (len(self.vehicle.sides), stamp_ns.size):
@@ -194,7 +194,15 @@ class Estimator:
             raise DataError(f"more than {self.options.plan_tolerance_rad:g} rad from the present angle")
         self._core.plan_ns[: stamp_ns.size] = stamp_ns
         self._core.plan_theta[:, : stamp_ns.size] = theta
-        self._core.config[0]["plan_size"] = stamp_ns.size
+        self._core.config[0]["plan_size"], self._core.config[0]["plan_refused_ns"] = stamp_ns.size, 0
+
+    def refuse_plan(self) -> None:
+        """A command came that is no plan: what is wanted is not known until the next one, and the feed-forward goes to zero.
+
+        Without a plan in force it follows the present motion again half a second later.
+        """
+        newest_ns = max(int(self._core.channels[i]["last_ns"]) for i in range(len(self.vehicle.sides)))
+        self._core.config[0]["plan_refused_ns"] = max(1, newest_ns)
 
     def _away(self, stamp_ns: IntArray, theta: Array) -> bool:
         """Whether a plan, at the newest angle's stamp or where it begins later, cannot be gone to from there."""

@@ -53,8 +53,10 @@ class Inputs:
         guarded: Callable[[Callable[..., None]], Callable[..., None]],
         push: Push,
         set_plan: Callable[[Callable[[int], tuple[IntArray, Array]]], None],
+        refuse_plan: Callable[[], None],
     ) -> None:
-        self._node, self._channels, self._health, self._push, self._set_plan = node, vehicle.channels, health, push, set_plan
+        self._node, self._channels, self._health, self._push = node, vehicle.channels, health, push
+        self._set_plan, self._refuse_plan = set_plan, refuse_plan
         self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
         self._frames: dict[int, str] = {}  # of the first message of each channel
         self._spent_s, self._spent_at = 0.0, 0.0  # time that plans have taken of late, and when that was so (monotonic)
@@ -171,3 +173,4 @@ class Inputs:
 
     def _refuse(self, reason: str) -> None:
         self._health.unused[f"{COMMAND}: {reason}"] += 1
+        self._refuse_plan()

@@ -64,7 +64,9 @@ class Session:
         self.news = False  # the doubts have changed since the last report, or the node has been switched on or off
         self._now_ns: Callable[[], int] = time.time_ns
         self.choose_clock()
-        self._inputs = Inputs(node, vehicle, settings.input_depth, self.health, guarded, self._push, self._set_plan)
+        self._inputs = Inputs(
+            node, vehicle, settings.input_depth, self.health, guarded, self._push, self._set_plan, self._refuse_plan
+        )
 
     def close(self) -> None:
         """Leave the topics."""
@@ -161,6 +163,9 @@ class Session:
     def _set_plan(self, plan: Callable[[int], tuple[IntArray, Array]]) -> None:
         latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
         self.estimator.set_plan(*plan(latest_ns))
+
+    def _refuse_plan(self) -> None:
+        self.estimator.refuse_plan()
 
     def _push(self, channel: int, stamp_ns: int, value: float, rate: float) -> None:
         # Arrival is the begin of the callback: the time of reception that rclpy offers (MessageInfo) makes

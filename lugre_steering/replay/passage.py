@@ -258,19 +258,18 @@ class Passage:
 
     def _plan(self, raw: bytes) -> None:
         latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
-        if len(raw) > PLAN_BYTES:
-            self._commands[f"more than {PLAN_BYTES} bytes"] += 1
-            return
         try:
-            message = _types().deserialize_cdr(raw, TRAJECTORY)
-        except Exception:  # flipped bytes may raise anything
-            self._commands["malformed"] += 1
-            return
-        try:
+            if len(raw) > PLAN_BYTES:
+                raise DataError(f"more than {PLAN_BYTES} bytes")
+            try:
+                message = _types().deserialize_cdr(raw, TRAJECTORY)
+            except Exception as error:  # flipped bytes may raise anything
+                raise DataError("malformed") from error
             self.estimator.set_plan(*planned_angles(message, self._joints, latest_ns))
             self._commands["accepted"] += 1
         except DataError as error:
             self._commands[str(error)] += 1
+            self.estimator.refuse_plan()
 
     def _learn(self, block: Block, estimates: Records, residuals: Records) -> None:
         """Statistics and curves."""

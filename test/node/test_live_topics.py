@@ -228,11 +228,13 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
     early = trajectory(joints, 0, [(1.0, [0.1, 0.1])])  # from now on, when there is no now yet
     good = trajectory(joints, T0 + SECOND // 2, [(0.0, [0.0, 0.0]), (1.5, [0.2, 0.3])])
     estimator = Estimator(vehicle, options)
-    still = [Sample(channel, T0 + i * 10_000_000, 0.0) for i in range(100) for channel in (0, 1)]
+    still = [Sample(channel, T0 + i * 10_000_000, 0.0) for i in range(120) for channel in (0, 1)]
     estimates = direct(estimator, still[:50])[0]
     points_ns = [T0 + SECOND // 2, T0 + 2 * SECOND]
     estimator.set_plan(np.array(points_ns, np.int64), np.array([[0.0, 0.3], [0.0, 0.2]]))
-    estimates += direct(estimator, still[50:])[0]
+    estimates += direct(estimator, still[50:100])[0]
+    estimator.refuse_plan()
+    estimates += direct(estimator, still[100:160])[0]
     with LiveNode("-p", "feed_forward_horizon_s:=0.3"), World(vehicle) as world:
 
         def refused() -> dict[str, int]:
@@ -244,16 +246,22 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
         world.play(still[:50])
         world.wait(lambda: len(world.heard["torque"]) == 25)
         world.command.publish(good)
+        world.play(still[50:100])
+        world.wait(lambda: len(world.heard["torque"]) == 50)
         for message in bad:  # one by one: a node that is given little time leaves out what comes at once
             before = len(refused())
             world.command.publish(message)
             world.wait(lambda before=before: len(refused()) > before)
-        world.play(still[50:])
+        world.play(still[100:160])
         assert_topics_equal(world, estimates, [])
         effort = column(world.heard["feed_forward"], "effort")
         torque = column(world.heard["estimate"], "effort")
         # While the vehicle stands, its torque stays; the planned turn needs torque, in the direction of the turn.
         assert np.all(np.abs(effort[:25] - torque[:25]) < 1e-6)
-        assert np.all(effort[60:] > torque[60:] + 1000.0)
+        assert np.all(effort[35:50] > torque[35:50] + 1000.0)
+        assert np.all(effort[75:] == 0.0)  # what was meant last could not be read
         assert to_ns(good.header.stamp) == points_ns[0]
         assert list(refused().values()) == [1] * 5
+        world.wait(lambda: "feed-forward to zero: command refused" in world.statuses("outputs")[-1].message)
+        world.command.publish(good)
+        assert world.play(still[160:], until=lambda: world.heard["feed_forward"][-1].effort[0] > 1000.0)
