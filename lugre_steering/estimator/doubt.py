@@ -478,10 +478,10 @@ def standing_doubts(core, stamp_ns):
     for i in range(core.motion.size, core.channels.size):
         if core.channels[i].kind == Kind.PRESSURE and line_frozen(core.channels[i]):
             found |= LINE
-    if c.horizon > 0.0 and c.plan_refused_ns != 0:
-        # What is wanted now is not known: an earlier plan is not what was meant last.
-        if c.plan_size > 0 or stamp_ns - c.plan_refused_ns < REFUSED_S * 1e9:
-            found |= REFUSED
+    # What is wanted now is not known: an earlier plan is not what was meant last.
+    refused = c.plan_refused_ns != 0 and (c.plan_size > 0 or stamp_ns - c.plan_refused_ns < REFUSED_S * 1e9)
+    if c.horizon > 0.0 and refused:
+        found |= REFUSED
     if c.horizon > 0.0 and c.plan_size > 0:
         if stamp_ns >= core.plan_ns[c.plan_size - 1]:
             found |= PLAN_OUT

@@ -23,9 +23,9 @@ _HANDED_OVER = (
     "motion", "trust", "guard", "output", "waiting", "pending", "line_ns", "line_value", "plan_ns", "plan_theta", "released",
 )  # fmt: skip
 _ONGOING = (
-    "start_ns", "lagged", "lag_input", "lagged_ns", "pending_first", "pending_count", "plan_size", "plan_refused_ns", "swing_ns", "swing_from",
-    "residual_ns", "agreed_ns", "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now",
-    "beyond", "released_ns", "weight", "message",
+    "start_ns", "lagged", "lag_input", "lagged_ns", "pending_first", "pending_count", "plan_size", "plan_refused_ns", "swing_ns",
+    "swing_from", "residual_ns", "agreed_ns", "residual_square", "measured_square", "estimate_square", "residual_now",
+    "measured_now", "estimate_now", "beyond", "released_ns", "weight", "message",
 )  # fmt: skip
 
 

@@ -73,7 +73,10 @@ SENSING: dict[str, dict[str, Size]] = {
     "moment_arm_error": {"a": Size(0.05, 0.12, amount=True, either=True), "b": Size(0.1, 0.3, amount=True, either=True)},
 }
 CATALOGUE: dict[str, dict[str, Size]] = {**ANGLE, **CONTACT, **PARALLEL, **LOSSES, **SENSING}
-IN_SERVICE = {"an end stop": "end_stop", "another pavement": "surface_patch", "cylinder friction": "cylinder_friction"}
+IN_SERVICE = {
+    "an end stop": "end_stop", "another pavement": "surface_patch", "cylinder friction": "cylinder_friction",
+    "a stuck valve": "trapped_pressure",
+}  # fmt: skip
 """What happens to a machine in service."""
 ZONED: dict[str, dict[str, Size]] = {
     "end_stop": {"threshold": Size(1.02, 1.06, limit=True)},
