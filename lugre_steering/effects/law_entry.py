@@ -38,7 +38,7 @@ class LawEntry:
     memory: str = "none"
     """What stands between the coordinate and f."""
     memory_size: float = quantity(0.0, 1e12, default=0.0)
-    """Of a lag: seconds; of a play or relay: half its width in the unit of the coordinate."""
+    """Of a lag or of what rings (its period): seconds; of a play or relay: half its width in the unit of the coordinate."""
     title: str | None = None
     """What the law says of itself."""
     intervals: dict[str, tuple[float, ...]] = field(default_factory=dict)

@@ -35,13 +35,16 @@ COORDINATES = {
 }  # fmt: skip
 """What f may depend on, with its unit; angle, slip and work are those of one track. The opposing torque is that against the motion,
 less than zero where it drives."""
-MEMORIES = {"none": "", "lag": "s", "play": "", "relay": ""}
+MEMORIES = {"none": "", "lag": "s", "play": "", "relay": "", "ring": "s"}
 """What stands between the coordinate and f: nothing, a first-order lag of so many seconds, a play or a relay of a half width in
-the unit of the coordinate."""
+the unit of the coordinate; or how far beyond the coordinate a lightly damped mode of a period of so many seconds swings, excited by it."""
+RING_DAMPING = 0.03
+"""Damping ratio of a mode that rings."""
 CELL = ("channel", "coordinate", "memory", "memory_size", "low", "per_unit", "seen_low", "seen_high")
 LEAST_STIFFENING = -0.9
 
 _LEVEL, _STIFFNESS, _TORQUE, _COULOMB, _LOAD, _VISCOUS, _TURBULENT, _GAIN, _INERTIA, _LAG = (float(i + 1) for i in range(10))
+_RING = float(list(MEMORIES).index("ring"))
 
 
 @law
@@ -81,6 +84,20 @@ def remembered(kind, size, kept, now, dt):
 
 
 @law
+def rung(period, beyond, speed, change, dt):
+    """Deflection of a mode beyond the static one and its rate, a step later; the force (in the unit of the deflection) has just changed.
+
+    x'' + 2 d w x' + w^2 (x - force) = 0 with w = 2 pi / period, d = RING_DAMPING; exact for a force that stays.
+    """
+    w = 2.0 * math.pi / period
+    decay, turn = RING_DAMPING * w * dt, math.sqrt(1.0 - RING_DAMPING**2) * w
+    beyond -= change
+    kept, turned = math.exp(-decay) * math.cos(turn * dt), math.exp(-decay) * math.sin(turn * dt) / turn
+    pull = w * w * beyond + RING_DAMPING * w * speed
+    return kept * beyond + turned * (speed + RING_DAMPING * w * beyond), kept * speed - turned * pull
+
+
+@law
 def looked_up(f, position):
     """f at a position counted in knots: linear between them, held beyond."""
     last = f.size - 1
@@ -94,7 +111,7 @@ def looked_up(f, position):
 
 @law
 def tangent(
-    cell, f, size, value, kept, since, slip, work, outside, theta, omega, direction, d_theta, dwell, time, temperature,
+    cell, f, size, value, kept, speed, before, since, slip, work, outside, theta, omega, direction, d_theta, dwell, time, temperature,
     air_temperature, last_torque, dt,
 ):  # fmt: skip
     """Memories and the value of f at this step; and what it adds to the stiffness, if that is its channel."""
@@ -104,11 +121,16 @@ def tangent(
     heading = direction if d_theta == 0.0 else math.copysign(1.0, d_theta)
     since = since + moved if heading == direction else moved
     now = coordinate(cell[1], theta, omega, heading, since, last_torque, slip, work, dwell, time, temperature, air_temperature)
-    kept = remembered(cell[2], cell[3], kept, now, dt)
+    if cell[2] == _RING:
+        if before != 0.0:  # what is there at the start has always been there
+            kept, speed = rung(cell[3], kept, speed, now - before, dt)
+        before = now
+    else:
+        kept = remembered(cell[2], cell[3], kept, now, dt)
     position = (kept - cell[4]) * cell[5]
     outside += 0.0 if cell[6] <= kept <= cell[7] else 1.0
     value = size * looked_up(f, position)
-    return (max(value, LEAST_STIFFENING) if cell[0] == _STIFFNESS else 0.0), value, kept, since, slip, work, outside
+    return (max(value, LEAST_STIFFENING) if cell[0] == _STIFFNESS else 0.0), value, kept, speed, before, since, slip, work, outside
 
 
 @law
@@ -148,7 +170,7 @@ def limit(cell, value, torque, last_torque, dt):
 
 
 _HOOKS: dict[str, Callable[..., object]] = {"tangent": tangent, "level": level, "torque": torque, "loss": loss, "limit": limit}
-_MEMORY = dict.fromkeys(("value", "kept", "since", "slip", "work", "outside"), 0.0)
+_MEMORY = dict.fromkeys(("value", "kept", "speed", "before", "since", "slip", "work", "outside"), 0.0)
 _SIZE = Parameter("size", "1", "of the law as it was found", 1.0, 0.0, 10.0)
 Form = Callable[..., Array]
 

@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.late import fitted_to_all
-from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, left_over
+from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws
 from lugre_steering.diagnosis.conclude.stands import Stands, standing
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
@@ -84,7 +84,7 @@ def _modelled(done: Finished, stands: Stands) -> _Modelled:
         return _Modelled(done, final, whole, bent, [], "", stands.left)
     beside, laws = replace(done, problem=lawful.problem), described(lawful, stands.nearest)
     law = sentence(laws, done.torque)
-    left = beside_laws(stands.left, left_over(beside, lawful.fitted), law, formula(laws, done.problem.vehicle))
+    left = beside_laws(beside, stands.left, lawful.fitted, lawful.names, law, formula(laws, done.problem.vehicle))
     return _Modelled(beside, lawful.fitted, lawful.fit, bent, laws, law, left)
 
 

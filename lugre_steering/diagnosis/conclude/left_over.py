@@ -1,31 +1,23 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What remains after the final fit: whether it is structure worth a verdict, where it lives, and the formula of a pattern for it."""
+"""What remains after the final fit: whether it is structure worth a verdict, and where it lives."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.loudness import FORM_LEFT, beyond_calibration, form_energy, loudness
+from lugre_steering.diagnosis.loudness import beyond_calibration, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.compare import needed
-from lugre_steering.diagnosis.search.foreign import Pattern
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.trial import cost
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
-FORETELLS = 0.1
-"""Share of the held-out energy that a pattern outside the catalogue must explain to be a verdict, however little is left over."""
-TELLING = 0.5
-"""Share of the held-out energy that a pattern outside the catalogue must explain for its own places to be told."""
 MOSTLY = 0.3
 """Share of the largest from which a freedom of the friction law is told."""
 LOCATED_S, LOCATED_SIGMA, LOCATED_SHARE = 0.5, 2.0, 0.2
@@ -44,8 +36,7 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     """Judge what ``final`` leaves of the measured torque; ``needs_form``: there is more than noise without the freedoms beside it."""
     residual = done.problem.measured - final.prediction
     excess, slow, loud = loudness(done.problem, done.noise, final)
-    pattern, gain = _pattern(done, final)
-    if not loud and not gain > FORETELLS:
+    if not loud:
         description = "what is left is within noise and the simulation's own error"
         if needs_form:
             form = _form(done, final)
@@ -59,21 +50,13 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     axes = [locate.coordinates(run, run.measured) for run in done.problem.runs]
     stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
     axis, share, _ = locate.telling_coordinate(stacked, residual, done.weight, done.noise.draws)
-    shape, formula = None, None
-    if pattern is not None and gain > FORETELLS:
-        law = units.law(done.problem.vehicle, f"torque [N m] = {pattern.text}")
-        formula = f"{law} (removes {words.percent(gain)} of the held-out residual energy)"
-        # A pattern that explains most of it also says where it acts below the noise.
-        shape = pattern.torque if gain > TELLING or not loud else None
     more = max(excess, slow)  # the level of the noise may be overstated
     text = (
         f"{words.percent(more / (1.0 + more))} of what the model leaves over is more than noise, most of it along {axis} "
         f"({words.percent(share)} of the residual energy follows it)"
-        if loud
-        else f"a pattern outside the catalogue foretells {words.percent(gain)} of the held-out residual energy"
     )
-    where = _where(done, axes, axis, residual, shape)
-    return LeftOver(Unexplained(True, text, formula, tuple(where)), text, True)
+    where = _where(done, axes, axis, residual, None)
+    return LeftOver(Unexplained(True, text, None, tuple(where)), text, True)
 
 
 def _form(done: Finished, final: Fit) -> str:
@@ -88,29 +71,18 @@ def _form(done: Finished, final: Fit) -> str:
     return " and ".join(words for words in sorted(energy, key=lambda words: -energy[words]) if energy[words] > MOSTLY * most)
 
 
-def beside_laws(before: LeftOver, after: LeftOver, law: str, formula: str) -> LeftOver:
-    """Unlisted structure ``before`` once a law is found for it, said in ``law`` and ``formula``; ``after``: what is left beside the law."""
+def beside_laws(done: Finished, before: LeftOver, fitted: Fit, names: int, law: str, formula: str) -> LeftOver:
+    """Unlisted structure ``before`` once laws are found for it, after ``names`` effects of the fit, said in ``law`` and ``formula``; where
+    nothing told of it, they say where it lives."""
+    after, where = left_over(done, fitted), before.entry.where
     rest = f"beside the law, {after.text or after.entry.description}"
-    return LeftOver(replace(before.entry, description=f"{law}; {rest}", formula=formula), rest, True)
-
-
-def _pattern(done: Finished, final: Fit) -> tuple[Pattern | None, float]:
-    """The pattern outside the catalogue where nothing is named, and the share of the held-out energy it foretells.
-
-    It must take as much of what is fitted as a name: freedoms that explain all of that may still err on what is held out, where they
-    had no such places or ways, and a pattern make up for it.
-    """
-    pattern, baseline = done.found.pattern, done.found.baseline
-    if final.effects or pattern is None:
-        return None, 0.0
-    taken = cost(done.problem, baseline, done.fitted) - pattern.cost(done.problem, done.fitted)
-    if taken < needed(done.problem, baseline, done.fitted):
-        return None, 0.0
-    before = cost(done.problem, baseline, done.held)
-    after = pattern.cost(done.problem, done.held)
-    if before - after < FORM_LEFT * form_energy(done.problem, final, done.held):
-        return None, 0.0
-    return pattern, 1.0 - after / max(before, 1e-9)
+    if not before.structured:
+        axes = [locate.coordinates(run, run.measured) for run in done.problem.runs]
+        shape: Array = np.sum([locate.contribution(done.problem, fitted, i) for i in range(names, len(fitted.effects))], axis=0)
+        stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
+        axis, _, _ = locate.telling_coordinate(stacked, shape, done.weight, done.noise.draws)
+        where = tuple(_where(done, axes, axis, shape, shape))
+    return LeftOver(Unexplained(True, f"{law}; {rest}", formula, where), rest, True)
 
 
 def _where(

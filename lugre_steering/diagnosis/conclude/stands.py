@@ -16,7 +16,14 @@ from lugre_steering.diagnosis.conclude.late import begun_late, timed_by_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws, find
-from lugre_steering.diagnosis.laws.rival import in_place, in_place_of_one, keeps_names, leaves_names, room_for_laws
+from lugre_steering.diagnosis.laws.rival import (
+    evident,
+    in_place,
+    in_place_of_one,
+    keeps_names,
+    leaves_names,
+    room_for_laws,
+)
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.fit import fit
@@ -113,11 +120,13 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
     """What remains of the names beside laws for what they leave over."""
     found, (named, clock, judged, _) = done.found, tested
     left = _left(done, named or clock is not None)
-    if not left.structured and not (named and done.needs_form):
-        return Stands(named, clock, None, judged, left)
     rivals = not named or room_for_laws(done)
-    alone = find(done, found.baseline, seed, progress) if rivals else None
+    if not left.structured and (clock is not None or not (rivals or done.needs_form)):
+        return Stands(named, clock, None, judged, left)
+    alone = find(done, found.baseline, seed, progress, freely=not left.structured) if rivals else None
     if not named:
+        if alone is not None and not left.structured and not evident(done, alone):
+            alone = None
         return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
     beside = find(done, done.freely, seed, progress) if left.structured else None
     if alone is not None and in_place(done, alone, beside):

@@ -26,8 +26,12 @@ TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
 PLAYS = (0.05, 0.15)
 """Half widths of play and relay that are tried, as shares of the travel."""
+RINGS_HZ, RINGS, RING_STEPS = (0.3, 8.0), 32, 10.0
+"""Lowest and highest frequency of a mode, how many are tried, and samples that a period must have."""
 NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
 """Sizes of a memory that are tried once one has shown, times its own."""
+NEARER_RING = tuple(np.linspace(0.94, 1.06, 13))
+"""The same of what rings, which does so at its own period only."""
 SMALL = {"conservative_torque": 1.0, "coulomb_friction": 1.0, "load_friction": 1e-3, "lag": 1e-3}
 SMALLEST = 1e-4
 """Sizes of the unit laws by which channels are traced, and share of the torque amplitude for the others."""
@@ -39,6 +43,8 @@ FORM = "opposing_torque"
 """What the stiffness of another friction law depends on, which its freedoms have; no law of its own is sought there."""
 REMEMBERING = ("friction_level", "conservative_torque", "gain")
 """Channels whose laws may remember beside names, whose work a remembered loss or inertia would take over; where none stands all may."""
+RINGING = ("conservative_torque",)
+"""Channels of what rings."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +108,9 @@ class Traces:
                 continue
             first, last = np.quantile(np.concatenate(values, axis=None), (RARE, 1.0 - RARE))
             often = (float(first), float(last)) if last - first > SEEN * (high - low) else (low, high)
-            signs = axis.memory == "relay" or axis == Axis("direction")
-            pieces = 1 if axis.coordinate == "none" else HATS if signs else PIECES
-            for channel in self.signals if axis.memory == "none" else self.remembering:
+            few = axis.memory in ("relay", "ring") or axis == Axis("direction")
+            pieces = 1 if axis.coordinate == "none" else HATS if few else PIECES
+            for channel in RINGING if axis.memory == "ring" else self.signals if axis.memory == "none" else self.remembering:
                 yield Cell(channel, axis, low, high, pieces, often=often)
                 if axis == Axis("angle") and channel in TOOTHED:
                     yield Cell(channel, axis, low, high, FINE, often=often)
@@ -130,12 +136,16 @@ def axes_of(problem: Problem) -> list[Axis]:
         plain += [Axis("rubber_temperature"), Axis("air_temperature")]
     lagged = [Axis(name, "lag", tau) for name in ("rate", "direction", "torque", "power") for tau in LAGS_S]
     widths = [("angle", travel), ("torque", torque)]
-    return plain + lagged + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
+    longest = max(float(run.time[1] - run.time[0]) for run in problem.runs) * RING_STEPS
+    highest = min(RINGS_HZ[1], 1.0 / longest)
+    rings = [Axis("torque", "ring", 1.0 / f) for f in np.geomspace(RINGS_HZ[0], highest, RINGS)] if highest > RINGS_HZ[0] else []
+    return plain + lagged + rings + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
 
 
 def nearer(axis: Axis) -> list[Axis]:
     """The same with other sizes of its memory."""
-    return [replace(axis, memory_size=share * axis.memory_size) for share in NEARER] if axis.memory != "none" else []
+    near = {"none": (), "ring": NEARER_RING}.get(axis.memory, NEARER)
+    return [replace(axis, memory_size=float(share) * axis.memory_size) for share in near]
 
 
 def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Traces:

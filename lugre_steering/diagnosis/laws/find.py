@@ -77,15 +77,19 @@ class FoundLaws:
         return max(excess(self.problem, self.fitted, held), OWN_ERROR)
 
 
-def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None] = lambda _: None) -> FoundLaws | None:
+def find(
+    done: Finished, before: Fit, seed: int, progress: Callable[[str], None] = lambda _: None, *, freely: bool = False
+) -> FoundLaws | None:
     """Laws in what a fit leaves over, with or without named effects; None where none stands. Sought on the samples on which names are
-    compared, fitted and judged on all."""
+    compared, fitted and judged on all; ``freely``: sought beside the freedoms with which these are compared, too."""
     there, problem = done.compared, _with_places(done.problem, before)
-    sought, roles, weight = _with_places(there.problem, before), there.roles, there.fitted
+    sought = with_freedoms(there, bool(before.effects)) if freely else _with_places(there.problem, before)
+    roles, weight = there.roles, there.fitted
     samples = float(roles.fit.sum())
     gains: list[float] = []
     ties: tuple[Tried, ...] = ()
-    current, first_bar, foretold, ceiling = fit(sought, weight, before.effects, before.x), 0.0, 0.0, 0.0
+    x = np.append(before.x, np.zeros(sought.nuisances - before.x.size))
+    current, first_bar, foretold, ceiling = fit(sought, weight, before.effects, x), 0.0, 0.0, 0.0
     for index in range(MOST_LAWS):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
@@ -110,7 +114,7 @@ def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None]
     if not gains:
         return None
     progress("proving the law")
-    fitted, whole = (fit(problem, w, current.effects, current.x, linearisations=6) for w in (done.fitted, done.weight))
+    fitted, whole = (fit(problem, w, current.effects, current.x[: problem.nuisances], linearisations=6) for w in (done.fitted, done.weight))
     judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
     if judged.interval[0] <= 0.0:
         return None
@@ -120,6 +124,17 @@ def find(done: Finished, before: Fit, seed: int, progress: Callable[[str], None]
 def _with_places(problem: Problem, before: Fit) -> Problem:
     """The problem with places for laws, beside names if there are any; without freedoms, which a vehicle file cannot hold."""
     return Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS, beside_names=bool(before.effects))
+
+
+def with_freedoms(there: Finished, beside_names: bool) -> Problem:
+    """The problem on which names are compared, with places for laws; of the freedoms those of the friction law, not those of names."""
+    compared, of_names = there.problem, there.form.count("")
+    columns = compared.bends[:, : compared.bends.shape[1] - of_names]
+    problem = Problem(
+        compared.vehicle, compared.runs, compared.calibrations, more_laws=MOST_LAWS, beside_names=beside_names, bends=columns
+    )
+    problem.shapes = compared.shapes - of_names
+    return problem.doubted(compared.doubt, compared.typical)
 
 
 def _unseen(there: Finished, result: Fit) -> float:

@@ -27,6 +27,8 @@ PULL = 0.03
 TRIED_FORMS = 3
 SHARE, MOST = 0.03, 1e4
 """Size of a law worth seeing, as a share of the torque amplitude, and how many times that it may have."""
+FITTED = ("lag", "ring")
+"""Memories whose size is fitted, not chosen."""
 UNSEEN = 1e-10
 """Share of the largest variance of a fit below which a direction of its values is one that the data do not show."""
 
@@ -60,7 +62,12 @@ class Law(Effect):
 
 def _law(cell: Cell, place: int, form: str, parameters: Sequence[Parameter], **more: object) -> Law:
     slot = laws.slot(place)
-    memory = (Parameter("memory_size", "s", "time constant", 1.0, 0.05, 60.0, (1.0,)),) if cell.axis.memory == "lag" else ()
+    memory: tuple[Parameter, ...] = ()
+    if cell.axis.memory == "lag":
+        memory = (Parameter("memory_size", "s", "time constant", 1.0, 0.05, 60.0, (1.0,)),)
+    elif cell.axis.memory == "ring":
+        known = cell.axis.memory_size
+        memory = (Parameter("memory_size", "s", "period", 0.02 * known, 0.8 * known, 1.25 * known),)
     plain = {item.name: getattr(slot, item.name) for item in dataclasses.fields(slot) if item.name != "parameters"}
     return Law(**plain, parameters=(*parameters, *memory), cell=cell, form=form, **more)  # type: ignore[arg-type]
 
@@ -88,7 +95,7 @@ def free_law(problem: Problem, cell: Cell, place: int, pieces: Array) -> tuple[C
 
     effect = _law(cell, place, laws.TABLE, parameters, shape=shape)
     start = dict(zip(names, np.maximum(pieces, low).tolist(), strict=True))
-    if cell.axis.memory == "lag":
+    if cell.axis.memory in FITTED:
         start["memory_size"] = cell.axis.memory_size
     return Candidate(effect, free=tuple(start)), start
 
@@ -203,7 +210,7 @@ def closed_law(
 
     effect = _law(cell, place, form, [parameter(name) for name in start], shape=shape, fixed=fixed)
     values = dict(start)
-    if cell.axis.memory == "lag":
+    if cell.axis.memory in FITTED:
         values["memory_size"] = cell.axis.memory_size
     return Candidate(effect, free=tuple(values)), values
 

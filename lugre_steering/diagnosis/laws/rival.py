@@ -11,9 +11,9 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
+from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, with_freedoms
 from lugre_steering.diagnosis.loudness import excess
-from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, settled
+from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
@@ -31,6 +31,13 @@ def room_for_laws(done: Finished) -> bool:
     rest = excess(there.problem, named.final, there.fitted)
     stuck = at_bounds(done.problem, final.x, [calibration.name for calibration in done.problem.calibrations])
     return bool(stuck) or rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
+
+
+def evident(done: Finished, alone: FoundLaws) -> bool:
+    """Whether laws take as much as a name must, beside the same freedoms: where what is left is not loud, only that tells of them."""
+    model = beside_form(done, alone)
+    mine, base = _energies(done, [model])
+    return base - mine > needed(*settled(*model), done.compared.fitted)
 
 
 def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool:
@@ -104,11 +111,6 @@ def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> l
 
 def beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
     """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
-    there, of_names = done.compared.problem, done.compared.form.count("")
-    columns = there.bends[:, : there.bends.shape[1] - of_names]
-    names = laws.names > 0
-    problem = Problem(there.vehicle, there.runs, there.calibrations, more_laws=MOST_LAWS, beside_names=names, bends=columns)
-    problem.shapes = there.shapes - of_names
-    problem = problem.doubted(there.doubt, there.typical)
-    x = np.append(laws.fitted.x[: problem.first_bend], np.zeros(columns.shape[1]))
+    problem = with_freedoms(done.compared, laws.names > 0)
+    x = np.append(laws.fitted.x[: problem.first_bend], np.zeros(problem.bends.shape[1]))
     return problem, done.compared.fitted, fit(problem, done.compared.fitted, laws.fitted.effects, x)

@@ -86,6 +86,8 @@ def law_words(law: Law, values: Mapping[str, float], vehicle: Vehicle) -> str:
         along = COORDINATE_WORDS[cell.axis.coordinate]
         if cell.axis.memory == "lag":
             along += f" as remembered for {cell.axis.memory_size:.2g} s"
+        elif cell.axis.memory == "ring":
+            along = f"ringing of the {along} in a mode of {1.0 / cell.axis.memory_size:.3g} Hz"
         elif cell.axis.memory != "none":
             along += f" through a {cell.axis.memory} of {shown(cell.axis.coordinate, cell.axis.memory_size, vehicle)} to each side"
         what += f", {_shape_words(law, values, along, vehicle)}"

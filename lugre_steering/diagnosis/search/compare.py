@@ -15,7 +15,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, beyond_calibration, form_energy
-from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal
 from lugre_steering.effects.entry import Effect
@@ -23,7 +22,7 @@ from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import TYPICAL, Problem
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, cost, rank
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, rank
 from lugre_steering.recording import Array
 
 SURE = 25.0
@@ -46,9 +45,9 @@ TIE_T, TIE = 2.5, 10.0
 PER_VALUE = 4.0
 """Doubts that a free value costs where models are tied."""
 HALF = 0.5
-"""Share of the best one's energy that a rival must take; and of their own that names must still take beside a pattern to stand."""
+"""Share of the best one's energy that a rival must take."""
 MARGIN = 0.1
-"""Share of what names take that a pattern must take more: a name wins a draw."""
+"""Share of what names take that laws must take more: a name wins a draw."""
 
 
 def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | None = None) -> tuple[Problem, Fit]:
@@ -166,14 +165,3 @@ def simplest(best: Trial, rivals: list[Trial], before: float, own_doubt: float) 
     group = [best, *rivals]
     chosen = min(group, key=lambda trial: rank(trial, before) + PER_VALUE * own_doubt * len(trial.candidate.free))
     return chosen, [trial for trial in group if trial is not chosen]
-
-
-def foreign(weight: Array, pattern: Pattern, baseline: tuple[Problem, Fit], named: tuple[Problem, Fit]) -> bool:
-    """Whether one pattern outside the catalogue, sought beside the ``baseline``, takes clearly more than all names, which take
-    little beside it."""
-    taken = left(*baseline) - left(*named)
-    alone = cost(*baseline, weight) - pattern.cost(baseline[0], weight)
-    if alone < (1.0 + MARGIN) * taken:
-        return False
-    beside = cost(*named, weight) - strongest(*named, weight).cost(named[0], weight)
-    return alone - beside > HALF * taken

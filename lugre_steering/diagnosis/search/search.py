@@ -17,7 +17,6 @@ import numpy as np
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
     clearest,
-    foreign,
     left,
     may_differ,
     needed,
@@ -26,7 +25,6 @@ from lugre_steering.diagnosis.search.compare import (
     tied,
     worlds,
 )
-from lugre_steering.diagnosis.search.foreign import Pattern, strongest
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
@@ -78,8 +76,6 @@ class Search:
     found: tuple[Found, ...]
     first_scores: tuple[Score, ...]
     trials: tuple[Trial, ...]
-    pattern: Pattern | None
-    """The strongest pattern that no entry makes, if it was sought."""
 
 
 def search(
@@ -127,13 +123,8 @@ def search(
             found[i] = _told(item, _rivals(bare, noise, weight, split, fitted, item, i))
     if not any(item.in_place for item in found):
         problem, baseline = settled(problem, weight, baseline, now.doubt)
-    pattern = strongest(problem, baseline, weight)
-    if len(found) > given and foreign(weight, pattern, (problem, baseline), (now, current)):
-        rest = current.effects[:given]
-        now, current = settled(problem, weight, fit(problem, weight, rest, current.x[: problem.nuisances]))
-        found = found[:given]
     more = np.zeros(now.nuisances - baseline.x.size)
-    return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), pattern)
+    return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried))
 
 
 class _Step(NamedTuple):
