@@ -122,6 +122,8 @@ def tangent(
     since = since + moved if heading == direction else moved
     now = coordinate(cell[1], theta, omega, heading, since, last_torque, slip, work, dwell, time, temperature, air_temperature)
     if cell[2] == _RING:
+        if cell[0] == _TORQUE:
+            now -= value  # what it adds itself does not excite it: its period is that at which the torque rings
         if before != 0.0:  # what is there at the start has always been there
             kept, speed = rung(cell[3], kept, speed, now - before, dt)
         before = now

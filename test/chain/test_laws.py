@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from chain_support import swing, vehicle
+from scipy.signal import lsim
 
 from lugre_steering.chain.step import run_side, torque_side
 from lugre_steering.effects import laws
@@ -90,6 +91,18 @@ def test_a_lagged_rate_follows_its_differential_equation() -> None:
         kept[i] = kept[i - 1] + 1e-3 * (0.5 * (rate[i] + rate[i - 1]) - kept[i - 1]) / 2.0
     expected = 1e4 * np.interp(TIME[:-1], fine, kept)
     assert (with_law(entry) - with_law())[:-1] == pytest.approx(expected, abs=0.01 * np.abs(expected).max())
+
+
+def test_what_rings_follows_its_differential_equation() -> None:
+    """It adds c (x - M0) with x'' + 2 d w x' + w^2 (x - M0) = 0, for a torque M0 that stays for a step as the last one left it."""
+    values = {"value": 0.0, "slope": 0.2}
+    entry = LawEntry("conservative_torque", "torque", "linear", (-1e6, 1e6), values, memory="ring", memory_size=0.8)
+    w, base = 2.0 * np.pi / 0.8, with_law()
+    force = base - base[0]
+    position = lsim(([w * w], [1.0, 0.06 * w, w * w]), force, TIME, interp=False)[1]
+    expected = 0.2 * (position[1:] - force[:-1])
+    assert np.abs(expected).max() > 1e3
+    assert (with_law(entry) - base)[1:] == pytest.approx(expected, abs=0.05)  # the first torque has always been there
 
 
 @pytest.mark.parametrize("kind", ["play", "relay"])

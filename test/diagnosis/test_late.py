@@ -33,7 +33,7 @@ def begun_unseen(late: bool, told: tuple[float, ...]) -> Finished:
     fitted = np.where(roles.fit, weight(problem), 0.0)
     noise = Noise(np.full(problem.valid.size, SIGMA), np.zeros((1, problem.valid.size)), 0.0)
     named = fit(problem, fitted, [(replace(STOP[0], since=told), STOP[1])])
-    return Finished(problem, noise, roles, Search(fit(problem, fitted), named, (), (), (), None))
+    return Finished(problem, noise, roles, Search(fit(problem, fitted), named, (), (), ()))
 
 
 def is_when_it_began(since: tuple[float, ...]) -> bool:

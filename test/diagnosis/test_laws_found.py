@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
+from lugre_steering.diagnosis.conclude.stands import standing
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws import rival
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
@@ -41,6 +42,8 @@ from lugre_steering.vehicle import save
 
 NOTHING = small_problem(40.0)
 """At 40 Hz, quick enough for whole searches."""
+QUIET = 0.4
+"""Size of something hidden, in noise standard deviations, that does not stand out of the noise."""
 
 
 @remembered
@@ -64,7 +67,7 @@ def white(problem: Problem) -> Noise:
 
 def named(problem: Problem, final: Fit) -> Finished:
     """A search that came to ``final``."""
-    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), (), None))
+    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), ()))
 
 
 def by_run(part: object) -> Array:
@@ -126,6 +129,46 @@ def test_a_loss_that_remembers_where_it_came_from_is_found() -> None:
     entry = entries(found)[0]
     assert (entry.channel, entry.coordinate, entry.memory) == ("viscous_loss", "angle", "play")
     assert entry.memory_size == pytest.approx(0.1, rel=0.2)
+
+
+def ringing(torque: np.ndarray, dt: float) -> np.ndarray:
+    """A tenth of what a mode of 1.2 Hz, damped by 3 %, adds to a torque, in small explicit steps."""
+    pulsation, position, speed = 2.0 * np.pi * 1.2, torque[0], 0.0
+    answer = np.zeros(torque.size)
+    for i in range(answer.size):
+        for part in range(20):
+            push = torque[max(i - 1, 0)] + (torque[i] - torque[max(i - 1, 0)]) * (part + 0.5) / 20.0
+            speed += dt / 20.0 * (pulsation**2 * (push - position) - 0.06 * pulsation * speed)
+            position += dt / 20.0 * speed
+        answer[i] = 0.1 * (position - torque[i])
+    return answer
+
+
+def ringing_beside(share: float) -> Array:
+    """What the mode adds to the torque of nothing, times a share."""
+    base = NOTHING.predict_all(NOTHING.start())
+    models = np.split(base, NOTHING.edges[1:-1])
+    return share * np.concatenate([ringing(model, run.time[1] - run.time[0]) for run, model in zip(NOTHING.runs, models, strict=True)])
+
+
+def test_what_a_mode_makes_of_the_torque_is_found_with_its_frequency() -> None:
+    _, found = searched(ringing_beside(1.0))
+    assert found is not None
+    entry = entries(found)[0]
+    assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "torque", "ring")
+    assert 1.0 / entry.memory_size == pytest.approx(1.2, rel=0.03)
+    assert entry.values["slope"] == pytest.approx(0.1, rel=0.1)
+    assert "mode of 1.2" in sentence(described(found), "{:.0f} N m".format)
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(QUIET, "unlisted_physics"), (0.0, "consistent")])
+def test_a_law_below_the_noise_is_told_by_its_evidence_alone(share: float, verdict: str) -> None:
+    hidden = ringing_beside(1.0)
+    hidden *= share * SIGMA / np.std(hidden)
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + hidden)
+    _, stands = standing(named(problem, fitted(problem)), 1, lambda _: None)
+    assert not stands.left.structured
+    assert stands.verdict == verdict
 
 
 def test_of_laws_that_tie_the_one_that_can_happen_again_is_preferred() -> None:

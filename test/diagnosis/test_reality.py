@@ -163,7 +163,7 @@ def searched(used: list[Recording], named: Effects = ()) -> Finished:
     sigma = np.concatenate([run.sigma for run in problem.runs])
     roles, noise = split(problem), Noise(sigma, np.zeros((1, sigma.size)), 0.0)
     models = [fit(problem, np.where(roles.fit, 1.0 / sigma, 0.0), effects) for effects in ((), named)]
-    return Finished(problem, noise, roles, Search(*models, (), (), (), None))
+    return Finished(problem, noise, roles, Search(*models, (), (), ()))
 
 
 def unplugged(recording: Recording, lasts_s: float) -> Recording:

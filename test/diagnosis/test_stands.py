@@ -38,7 +38,7 @@ def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(there:
 
     def finished(own, **more):  # type: ignore[no-untyped-def]
         names = (Found(Score(SLOPE[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.zeros(1)), (), (), 100.0),)
-        return Finished(own, noise, roles, Search(fit(own, fitted), fit(own, fitted, [SLOPE]), names, (), (), None), **more)
+        return Finished(own, noise, roles, Search(fit(own, fitted), fit(own, fitted, [SLOPE]), names, (), ()), **more)
 
     beside = finished(problem.bent([(120.0 * SIGMA * waves / np.abs(waves).max())[:, None]]), form=("its level along the ground",))
     done = finished(problem, **({"beside_form": beside} if freed else {}))
@@ -64,7 +64,7 @@ def test_what_clocks_may_be_apart_is_no_delay_of_the_machine_where_stamps_are_gi
 
     slow, delay = trial("pressure_lag", tau=late_s), trial("time_delay", delay=late_s)
     names = (Found(slow.score, ("time_delay",), (slow, delay), 100.0),)
-    told = _clock(Finished(problem, noise, roles, Search(fit(problem, fitted), slow.fit, names, (), (), None)))
+    told = _clock(Finished(problem, noise, roles, Search(fit(problem, fitted), slow.fit, names, (), ())))
     assert (told is not None) == apart
     if told is not None:
         assert told.late_s == pytest.approx(late_s, abs=5e-3)
