@@ -27,6 +27,8 @@ def _axis(vehicle: Vehicle, law: Mapping[str, Any]) -> tuple[str, float]:
     unit, name = laws.COORDINATES[law["coordinate"]], law["coordinate"].replace("_", " ")
     if law["memory"] == "relay":
         return f"relay of the {name}", 1.0
+    if law["memory"] == "ring":
+        name = f"ringing of the {name}"
     if unit.startswith("rad") and not units.is_linear(vehicle):
         return f"{name} (deg{unit[3:]})", _DEGREES
     return f"{name} ({units.label(vehicle, unit)})", 1.0
