@@ -35,7 +35,7 @@ def problem() -> Problem:
 
 def finished(problem: Problem, baseline: Fit, scores: tuple[Score, ...] = ()) -> Finished:
     noise = Noise(np.full(problem.valid.size, SIGMA), SIGMA * np.random.default_rng(4).standard_normal((4, problem.valid.size)), 0.0)
-    found = Search(baseline, baseline, (), scores, (), None)
+    found = Search(baseline, baseline, (), scores, ())
     return Finished(problem, noise, split.split(problem), found)
 
 
