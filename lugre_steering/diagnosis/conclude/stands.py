@@ -121,22 +121,21 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
     found, (named, clock, judged, _) = done.found, tested
     left = _left(done, named or clock is not None)
     rivals = not named or room_for_laws(done)
-    if not left.structured and (clock is not None or not (rivals or done.needs_form)):
+    if not left.structured and (clock is not None or not rivals):
         return Stands(named, clock, None, judged, left)
     alone = find(done, found.baseline, seed, progress, freely=not left.structured) if rivals else None
     if not named:
         if alone is not None and not left.structured and not evident(done, alone):
             alone = None
         return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
-    beside = find(done, done.freely, seed, progress) if left.structured else None
+    found_beside = find(done, done.freely, seed, progress) if left.structured else None
+    beside = found_beside if found_beside is not None and leaves_names(done, found_beside) else None
     if alone is not None and in_place(done, alone, beside):
         swapped = in_place_of_one(done, alone, seed)
-        beside = swapped or beside or find(done, done.freely, seed, progress)
+        beside = swapped or found_beside or find(done, done.freely, seed, progress)
         if beside is None or not (swapped or keeps_names(done, beside, alone)):
             nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
             return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
-    elif beside is not None and not leaves_names(done, beside):
-        beside = None
     if beside is not None:
         judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)
     return Stands(True, clock, beside, judged, left)

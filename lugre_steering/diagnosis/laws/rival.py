@@ -35,9 +35,9 @@ def room_for_laws(done: Finished) -> bool:
 
 def evident(done: Finished, alone: FoundLaws) -> bool:
     """Whether laws take as much as a name must, beside the same freedoms: where what is left is not loud, only that tells of them."""
-    model = beside_form(done, alone)
-    mine, base = _energies(done, [model])
-    return base - mine > needed(*settled(*model), done.compared.fitted)
+    problem, weight, fitted = beside_form(done, alone)
+    mine, base = _energies(done, [(problem, weight, fitted)])
+    return base - mine > needed(*settled(problem, weight, fitted), weight)
 
 
 def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool:
@@ -49,12 +49,13 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
 
 
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:
-    """Whether every name is still needed with laws ``beside`` it; one that is not has a rival there, and no companion."""
-    problem, fitted = beside.problem, beside.fitted
-    least = SURE * doubt(problem, fitted, done.fitted)
+    """Whether every name is still needed with laws ``beside`` it, where names are compared; one that is not has a rival there, and no
+    companion, or was named for the form of the friction law."""
+    problem, weight, fitted = beside_form(done, beside)
+    least = SURE * doubt(problem, fitted, weight)
     for index in range(beside.names):
         rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
-        if fit(problem, done.fitted, rest, fitted, linearisations=6).cost - fitted.cost < least:
+        if fit(problem, weight, rest, fitted, linearisations=6).cost - fitted.cost < least:
             return False
     return True
 

@@ -125,7 +125,8 @@ class Screen:
         Ridge regression on random Fourier features, which draws near a Gaussian process (Rahimi and Recht, NIPS 2007).
         """
         state = [bags for axis, bags in self.traces.axes.items() if axis.memory == "none" and axis.coordinate in STATE]
-        return max(self._smooth(along, seed) for along in (list(self.traces.axes.values()), state) if along)
+        slow = [bags for axis, bags in self.traces.axes.items() if axis.memory != "ring"]  # so many alike would hide the others
+        return max(self._smooth(along, seed) for along in (slow, state) if along)
 
     def _smooth(self, along: Sequence[list[Array]], seed: int) -> float:
         """The same of some axes, each by bag (sides, n)."""
