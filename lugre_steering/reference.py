@@ -139,9 +139,10 @@ def hooks() -> str:
 
 def law_parts() -> str:
     """What a law of the vehicle file may change, and what it may depend on."""
-    channels, coordinates = (", ".join(f"`{name}` [{unit}]" for name, unit in of.items()) for of in (CHANNELS, COORDINATES))
-    rows = [("`channel`", channels), ("`coordinate`", coordinates)]
-    rows += [("`form`", _listed([*FORMS, FORM_TABLE])), ("`memory`", _listed(MEMORIES))]
+    channels, coordinates, memories = (
+        ", ".join(f"`{name}`" + f" [{unit}]" * bool(unit) for name, unit in of.items()) for of in (CHANNELS, COORDINATES, MEMORIES)
+    )
+    rows = [("`channel`", channels), ("`coordinate`", coordinates), ("`form`", _listed([*FORMS, FORM_TABLE])), ("`memory`", memories)]
     return table(("key", "one of [unit]"), rows)
 
 

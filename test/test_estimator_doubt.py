@@ -655,6 +655,10 @@ def test_a_refused_command_takes_the_feed_forward_to_zero() -> None:
     estimator.set_plan(*plan_of([], []))
     drive(range(550, 552))
     assert told[452][0] == []
+    estimator.refuse_plan()
+    drive(range(100, 200))  # time is set back, and all begins anew
+    assert estimator.restarts == 1
+    assert told[100][0] == []
 
 
 def test_the_inertia_of_a_plan_counts() -> None:

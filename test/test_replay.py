@@ -28,7 +28,7 @@ from lugre_steering.bag import Bag
 from lugre_steering.bench.replay import write_cycle
 from lugre_steering.cli import app
 from lugre_steering.errors import BagError, DataError
-from lugre_steering.estimator import Estimator, Options
+from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.node_parameters import ParameterError, read_options
 from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.recording import Kind
@@ -110,7 +110,10 @@ def one_by_one(bag: Path, vehicle: Vehicle, options: Options) -> dict[str, list[
         if kind == TRAJECTORY:
             latest = max(estimator.latest_ns[f"angle/{side}"] for side in vehicle.sides)
             joints = [f"{side}_track_steer_joint" for side in vehicle.sides]
-            estimator.set_plan(*planned_angles(message, joints, latest))
+            try:
+                estimator.set_plan(*planned_angles(message, joints, latest))
+            except DataError:
+                estimator.refuse_plan()
             continue
         for i, channel in enumerate(vehicle.channels):
             if topic != "/" + channel.topic:
@@ -249,6 +252,19 @@ def test_plans_take_effect_in_recorded_order(tmp_path: Path) -> None:
         if a["feed_forward"].tolist() != b["feed_forward"].tolist()
     ]
     assert 0 < min(changed) < max(changed)
+
+
+def test_a_refused_plan_takes_the_feed_forward_to_zero_as_live(tmp_path: Path) -> None:
+    alone = [row for row in drive() if "pressure" not in row[0] or row[2] > make.T0 + 5 * SECOND]
+    wild, good = ([np.nan], make.T0 + 3 * SECOND), ([0.1], make.T0 + 6 * SECOND)
+    plans = [command(log, log, angles) for angles, log in (wild, good)]
+    bag = make.write(tmp_path / "run", sorted([*alone, *plans], key=lambda row: row[2]))
+    options = Options(feed_forward_horizon_s=0.4, plan_tolerance_rad=3.0)
+    replay([bag], VEHICLE, tmp_path / "out", options)
+    expected = one_by_one(bag, load(VEHICLE), options)
+    assert_same(tmp_path / "out" / "run", expected, sides=2)
+    doubted = [(row["stamp_ns"] - make.T0) / SECOND for _, row in expected["estimates"] if "command refused" in doubts(row)]
+    assert 3.0 <= min(doubted) < max(doubted) <= 3.51
 
 
 def test_unusable_plans_are_counted(tmp_path: Path) -> None:

@@ -18,11 +18,13 @@ _LAWS = """laws:
 - {channel: conservative_torque, coordinate: rate, form: step, range: [-1.0, 1.0], memory: lag, memory_size: 2.0, heldout_gain: 0.9,
   values: {before: 0.0, after: 3.0, at: 0.2, width: 0.05}, title: a drag that remembers the rate, intervals: {after: [2.5, 3.5]}}
 - {channel: gain, coordinate: angle, form: table, range: [-1.0, 1.0], knots: [0.0, 0.1, 0.0]}
+- {channel: conservative_torque, coordinate: torque, form: linear, range: [-3.0, 3.0], memory: ring, memory_size: 0.8,
+  values: {value: 0.0, slope: 0.1}}
 """
 
 
 def corpus(folder: Path) -> None:
-    """The shipped vehicle files, and a joint with two laws."""
+    """The shipped vehicle files, and a joint with laws."""
     fuzz_text.copied([*_FILES, _TABLE], folder)
     (folder / _WITH_LAWS).write_text((folder / "single_joint_example.yaml").read_text(encoding="utf-8") + _LAWS, encoding="utf-8")
 

@@ -130,7 +130,6 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args(argv)
-    rng = np.random.default_rng(options.seed)
     counts, hours = np.zeros((options.machines, THRESHOLDS.size), np.int64), np.zeros(options.machines)
     late: list[dict[str, float]] = []
     for i in range(options.machines):
@@ -144,6 +143,7 @@ def run(argv: list[str]) -> None:
             if not bags:
                 print(f"machine {i}: left out (too little motion)", file=sys.stderr, flush=True)
                 continue
+            rng = np.random.default_rng([options.seed, i])
             _excursions(np.zeros(1, STATE)[0], drawn(bags, options.hours, rng), THRESHOLDS, counts[i])
             hours[i] = options.hours
             if i % 4 == 0:

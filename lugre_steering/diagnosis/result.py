@@ -160,7 +160,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left: whether it is structure, where, and the formula of the law or pattern found for it."""
+    """What is left: whether it is structure, where, and the formula of the laws found for it."""
 
     structured: bool
     description: str

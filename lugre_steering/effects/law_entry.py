@@ -17,6 +17,8 @@ from lugre_steering.schema import Reader, quantity, suggestion
 
 NARROWEST, WIDEST = 1e-12, 1e12
 """How far apart the ends of a range may be, in any unit."""
+SHORTEST_S = 1e-3
+"""Period of a mode that a chain of such steps could follow."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,10 @@ def check_law(entry: LawEntry, reader: Reader, key: str) -> None:
             raise reader.fail(f"{key}.{name}", value, suggestion(value, list(known)))
     if entry.memory != "none" and not entry.memory_size > 0.0:
         raise reader.fail(f"{key}.memory_size", entry.memory_size, "a number above 0 for a memory")
+    if entry.memory == "ring" and (entry.channel, entry.coordinate) != laws.RINGS:
+        raise reader.fail(f"{key}.memory", "ring", f"no other than {' over '.join(laws.RINGS)} with it")
+    if entry.memory == "ring" and not entry.memory_size >= SHORTEST_S:
+        raise reader.fail(f"{key}.memory_size", entry.memory_size, f"a period of at least {SHORTEST_S:g} s for what rings")
     if len(entry.range) != 2 or not NARROWEST <= entry.range[1] - entry.range[0] <= WIDEST:
         expected = f"two ascending numbers, {NARROWEST:g} to {WIDEST:g} apart: where the coordinate was seen"
         raise reader.fail(f"{key}.range", list(entry.range), expected)

@@ -38,6 +38,8 @@ less than zero where it drives."""
 MEMORIES = {"none": "", "lag": "s", "play": "", "relay": "", "ring": "s"}
 """What stands between the coordinate and f: nothing, a first-order lag of so many seconds, a play or a relay of a half width in
 the unit of the coordinate; or how far beyond the coordinate a lightly damped mode of a period of so many seconds swings, excited by it."""
+RINGS = ("conservative_torque", "torque")
+"""Channel and coordinate of what rings."""
 RING_DAMPING = 0.03
 """Damping ratio of a mode that rings."""
 CELL = ("channel", "coordinate", "memory", "memory_size", "low", "per_unit", "seen_low", "seen_high")
@@ -122,8 +124,7 @@ def tangent(
     since = since + moved if heading == direction else moved
     now = coordinate(cell[1], theta, omega, heading, since, last_torque, slip, work, dwell, time, temperature, air_temperature)
     if cell[2] == _RING:
-        if cell[0] == _TORQUE:
-            now -= value  # what it adds itself does not excite it: its period is that at which the torque rings
+        now -= value  # what it adds itself does not excite it: its period is that at which the torque rings
         if before != 0.0:  # what is there at the start has always been there
             kept, speed = rung(cell[3], kept, speed, now - before, dt)
         before = now

@@ -18,7 +18,7 @@ Rules of time (header stamps only, never arrival times):
 * A confirmed jump of an angle moves the angle of the model, not its contact: it is never slip and never heat (``doubt``).
 * The feed-forward keeps to limits of value and rate, and goes to zero over a ramp while anything speaks against it
   (``doubts`` of the estimate says what): a jump, a frozen or noisy angle, a residual that is not plausible, a plan that is
-  not, a temperature or motion outside what the model knows (``release``).
+  not, a command that is none, a temperature or motion outside what the model knows (``release``).
 * After motion that nobody saw the torque is in doubt until every state that it can have left leads to the same (``unseen``).
 * A rate that is no number counts as not given; so does one that the angles contradict, which is counted (``absurd_rate``).
 """

@@ -77,6 +77,7 @@ def restart(core, k):
     c.lagged_ns = 0
     c.pending_count = 0
     c.plan_size = 0
+    c.plan_refused_ns = 0
 
 
 _DOUBTED, _SHARED, _THERE = range(3)

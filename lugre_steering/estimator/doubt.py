@@ -467,7 +467,7 @@ def _apart(core):
 @inner
 def standing_doubts(core, stamp_ns):
     """Doubts about the whole vehicle: sides that contradict, a residual beyond the bound of the calibration, or as large as the
-    torque; the plan."""
+    torque; the plan, and a command that is none."""
     c, found = core.config[0], APART if _apart(core) else 0
     if c.residual_ns != 0 and stamp_ns - c.residual_ns < RESIDUAL_MEMORY_S * 1e9:
         level = math.sqrt(c.residual_square)

@@ -87,7 +87,7 @@ _MEANINGS = {
     "feed_forward_rate_limit_Nm_s": "fastest change of the feed-forward [N m/s]; 0: what its presliding stiffness makes of 1 rad/s",
     "withdrawal_ramp_s": "the feed-forward goes to zero over this time when anything speaks against it [s]",
     "recovery_ramp_s": "and comes back over this time, as commands do after silence [s]",
-    "plan_tolerance_rad": "a steering/command farther than this from the present angle is not used [rad]",
+    "plan_tolerance_rad": "a steering/command farther than this from the present angle is refused [rad]",
     "side_tolerance_rad": "left and right angle contradict if they are farther than this from parallel and from the axle's geometry [rad]",
     "feed_forward_horizon_s": "the feed-forward is the torque needed this far ahead, along steering/command if it comes [s]",
 }

@@ -29,7 +29,7 @@ from lugre_steering.vehicle import Vehicle
 
 PLAN_SHARE = 0.1
 PLAN_BURST_S = 0.02
-"""Of the time so much, at most, goes into plans, and so much at once: what comes beyond is left out, and the next one is heard."""
+"""Of the time so much, at most, goes into plans, and so much at once: what comes beyond is refused, and the next one is heard."""
 SECOND_NS = 1_000_000_000
 
 _SCALARS: Mapping[Kind, tuple[type, Callable[[Any], float]]] = {

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Laws that nobody listed, drawn at random: a channel times a function of a coordinate or of its memory.
 
-A third lies outside such a product on purpose (OUTSIDE): what no table of one coordinate can write. Half have a memory. They
-are not the fixed unlisted kinds for which a diagnosis may have a pattern of its own. A law is a pure function of a
+A third lies outside such a product on purpose (OUTSIDE): what no table of one coordinate can write. Half have a memory. A
+resonator that the torque itself excites has become a law since; it is counted as outside. A law is a pure function of a
 ``Scene``, so that every simulator can carry it.
 """
 

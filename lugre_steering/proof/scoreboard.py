@@ -159,7 +159,7 @@ def _together(rows: Sequence[Row]) -> Row:
 
 
 def _unlisted(rows: Sequence[Row]) -> Row:
-    """The fixed kinds of unlisted physics, for three of which the engine has a pattern of its own."""
+    """The fixed kinds of unlisted physics, three of which are laws of the grammar."""
     return {
         "called_unlisted": proportion(called_unlisted(row) for row in rows if row["ratio"] >= CLEAR_RATIO),
         "by_ratio": [{"ratio": ratio, **proportion(called_unlisted(row) for row in rows if ratio_of(row) == ratio)} for ratio in RATIOS],
@@ -167,7 +167,7 @@ def _unlisted(rows: Sequence[Row]) -> Row:
 
 
 def _laws(rows: Sequence[Row]) -> Row:
-    """Unlisted laws from the generator, which nobody wrote a pattern for."""
+    """Unlisted laws from the generator, which nobody wrote for a single cell."""
     clear = [row for row in rows if row["ratio"] >= CLEAR_RATIO]
 
     def kept(key: str, empty: bool) -> Row:

@@ -93,7 +93,7 @@ def test_no_name_is_given_to_friction_of_another_form() -> None:
     left = left_over(there, baseline, done.needs_form)
     assert not left.structured
     assert "form" in left.entry.description
-    # The form does as much on the samples held out, where no pattern may make up for it.
+    # The form does as much on the samples held out, where no law may make up for it.
     per_sample = [form_energy(there.problem, baseline, used) / np.count_nonzero(used) for used in (there.fitted, there.held)]
     assert per_sample[1] == pytest.approx(per_sample[0])
     assert per_sample[0] > 1.0

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
+from lugre_steering.diagnosis.conclude.left_over import beside_laws
 from lugre_steering.diagnosis.conclude.stands import standing
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws import rival
@@ -169,6 +170,10 @@ def test_a_law_below_the_noise_is_told_by_its_evidence_alone(share: float, verdi
     _, stands = standing(named(problem, fitted(problem)), 1, lambda _: None)
     assert not stands.left.structured
     assert stands.verdict == verdict
+    if (found := stands.lawful) is not None:  # then the law itself tells where it lives
+        told = beside_laws(named(found.problem, found.fitted), stands.left, found.fitted, found.names, "a law", "f").entry
+        assert told.structured
+        assert told.where
 
 
 def test_of_laws_that_tie_the_one_that_can_happen_again_is_preferred() -> None:

@@ -117,7 +117,8 @@ def _tested(done: Finished, seed: int) -> _Tested:
 
 
 def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:
-    """What remains of the names beside laws for what they leave over."""
+    """What remains of the names beside laws for what they leave over; where that is not loud, of laws beside the freedoms alone what is
+    as evident as a name."""
     found, (named, clock, judged, _) = done.found, tested
     left = _left(done, named or clock is not None)
     rivals = not named or room_for_laws(done)

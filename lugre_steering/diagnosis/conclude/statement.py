@@ -66,7 +66,7 @@ def statement(
     told = headline.missing(done, effects, law, advice, not ended)
     them = "it" if len(effects) == 1 and not law else "them"
     them += _and_form(form)
-    remarks = _remarks(done, effects, judged, causal, left, ended)
+    remarks = _remarks(done, effects, judged, causal, left, ended, law)
     return told, " ".join([_gain(done, judged, them), floor, *remarks, *_formed(done, form)])
 
 
@@ -92,7 +92,7 @@ def _gain(done: Finished, judged: Judged, with_: str) -> str:
 
 
 def _remarks(
-    done: Finished, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver, ended: Sequence[str]
+    done: Finished, effects: Sequence[NamedEffect], judged: Judged, causal: float, left: LeftOver, ended: Sequence[str], law: str
 ) -> list[str]:
     """What limits named effects, one sentence each."""
 
@@ -125,7 +125,7 @@ def _remarks(
         who = headline.sentence(" and ".join(map(inside, ended))).removesuffix(".")
         remarks.append(f"{who} {verb} not act in {last}, the last recording: augmented.yaml is without.")
     if left.structured:
-        remarks.append(f"Structure is left: {left.text}.")
+        remarks.append(headline.sentence(left.text) if law else f"Structure is left: {left.text}.")
     elif done.needs_form:
         remarks.append(headline.sentence(left.entry.description))
     return remarks

@@ -30,7 +30,7 @@ RINGS_HZ, RINGS, RING_STEPS = (0.3, 8.0), 32, 10.0
 """Lowest and highest frequency of a mode, how many are tried, and samples that a period must have."""
 NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
 """Sizes of a memory that are tried once one has shown, times its own."""
-NEARER_RING = tuple(np.linspace(0.94, 1.06, 13))
+NEARER_RING = (0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.01, 1.02, 1.03, 1.04, 1.05, 1.06)
 """The same of what rings, which does so at its own period only."""
 SMALL = {"conservative_torque": 1.0, "coulomb_friction": 1.0, "load_friction": 1e-3, "lag": 1e-3}
 SMALLEST = 1e-4
@@ -43,8 +43,6 @@ FORM = "opposing_torque"
 """What the stiffness of another friction law depends on, which its freedoms have; no law of its own is sought there."""
 REMEMBERING = ("friction_level", "conservative_torque", "gain")
 """Channels whose laws may remember beside names, whose work a remembered loss or inertia would take over; where none stands all may."""
-RINGING = ("conservative_torque",)
-"""Channels of what rings."""
 
 
 @dataclass(frozen=True)
@@ -110,12 +108,18 @@ class Traces:
             often = (float(first), float(last)) if last - first > SEEN * (high - low) else (low, high)
             few = axis.memory in ("relay", "ring") or axis == Axis("direction")
             pieces = 1 if axis.coordinate == "none" else HATS if few else PIECES
-            for channel in RINGING if axis.memory == "ring" else self.signals if axis.memory == "none" else self.remembering:
+            for channel in self.channels(axis):
                 yield Cell(channel, axis, low, high, pieces, often=often)
                 if axis == Axis("angle") and channel in TOOTHED:
                     yield Cell(channel, axis, low, high, FINE, often=often)
                     for cycles in CYCLES:
                         yield Cell(channel, axis, low, high, 2, float((high - low) / cycles), often)
+
+    def channels(self, axis: Axis) -> Collection[str]:
+        """Those that may depend on an axis."""
+        if axis.memory == "ring":
+            return laws.RINGS[:1]
+        return self.signals if axis.memory == "none" else self.remembering
 
     def pieces(self, cell: Cell) -> list[Array]:
         """What each piece of a free f is, by bag (sides, n, pieces); the same for every channel."""
@@ -136,9 +140,9 @@ def axes_of(problem: Problem) -> list[Axis]:
         plain += [Axis("rubber_temperature"), Axis("air_temperature")]
     lagged = [Axis(name, "lag", tau) for name in ("rate", "direction", "torque", "power") for tau in LAGS_S]
     widths = [("angle", travel), ("torque", torque)]
-    longest = max(float(run.time[1] - run.time[0]) for run in problem.runs) * RING_STEPS
-    highest = min(RINGS_HZ[1], 1.0 / longest)
-    rings = [Axis("torque", "ring", 1.0 / f) for f in np.geomspace(RINGS_HZ[0], highest, RINGS)] if highest > RINGS_HZ[0] else []
+    shortest = max(float(run.time[1] - run.time[0]) for run in problem.runs) * RING_STEPS
+    highest = min(RINGS_HZ[1], 1.0 / shortest)
+    rings = [Axis(laws.RINGS[1], "ring", 1.0 / f) for f in np.geomspace(RINGS_HZ[0], highest, RINGS)] if highest > RINGS_HZ[0] else []
     return plain + lagged + rings + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
-from lugre_steering.diagnosis.laws.refine import PER_VALUE, Law, free_law, law_of, simplified, with_law
+from lugre_steering.diagnosis.laws.refine import FITTED, PER_VALUE, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
 from lugre_steering.fitting.fit import Fit, fit
@@ -44,7 +44,7 @@ class Tried:
     @property
     def values(self) -> int:
         """How many numbers the law has, with the width of a play or relay, which is chosen and not fitted."""
-        return len(self.fit.effects[-1][0].free) + (self.law.cell.axis.memory in ("play", "relay"))
+        return len(self.fit.effects[-1][0].free) + (self.law.cell.axis.memory not in ("none", *FITTED))
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def find(
     """Laws in what a fit leaves over, with or without named effects; None where none stands. Sought on the samples on which names are
     compared, fitted and judged on all; ``freely``: sought beside the freedoms with which these are compared, too."""
     there, problem = done.compared, _with_places(done.problem, before)
-    sought = with_freedoms(there, bool(before.effects)) if freely else _with_places(there.problem, before)
+    sought = with_freedoms(there, beside_names=bool(before.effects)) if freely else _with_places(there.problem, before)
     roles, weight = there.roles, there.fitted
     samples = float(roles.fit.sum())
     gains: list[float] = []
@@ -126,7 +126,7 @@ def _with_places(problem: Problem, before: Fit) -> Problem:
     return Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS, beside_names=bool(before.effects))
 
 
-def with_freedoms(there: Finished, beside_names: bool) -> Problem:
+def with_freedoms(there: Finished, *, beside_names: bool) -> Problem:
     """The problem on which names are compared, with places for laws; of the freedoms those of the friction law, not those of names."""
     compared, of_names = there.problem, there.form.count("")
     columns = compared.bends[:, : compared.bends.shape[1] - of_names]

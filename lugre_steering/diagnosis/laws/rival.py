@@ -112,6 +112,6 @@ def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> l
 
 def beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
     """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
-    problem = with_freedoms(done.compared, laws.names > 0)
+    problem = with_freedoms(done.compared, beside_names=laws.names > 0)
     x = np.append(laws.fitted.x[: problem.first_bend], np.zeros(problem.bends.shape[1]))
     return problem, done.compared.fitted, fit(problem, done.compared.fitted, laws.fitted.effects, x)

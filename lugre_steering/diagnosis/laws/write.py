@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -126,10 +127,12 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
     made = []
     effects = found.fit.effects[found.names :]
     cells = [law_of(candidate.effect).at(values) for candidate, values in effects]
-    traces = trace(found.problem, found.fit, found.problem.last_place, [cell.axis for cell in cells])
     for index, (entry, (candidate, values)) in enumerate(zip(entries(found), effects, strict=True)):
-        law = law_of(candidate.effect)
-        largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, found.names + index)), 99.0))
+        law, place = law_of(candidate.effect), found.names + index
+        # What rings is not excited by what it adds itself.
+        alone = tuple(effect for i, effect in enumerate(found.fit.effects) if i != place or cells[index].axis.memory != "ring")
+        traces = trace(found.problem, replace(found.fit, effects=alone), found.problem.last_place, [cells[index].axis])
+        largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, place)), 99.0))
         made.append({
             "id": law.id, "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
             "memory_size": entry.memory_size, "form": entry.form, "values": entry.values, "intervals": {
@@ -139,7 +142,7 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
             "share_of_ceiling": found.foretold / found.ceiling,
             "ties": [_tie(tie) for tie in found.ties] if not index else [], "nearest_listed": list(nearest),
             "f": {
-                **_picture(found, found.names + index, law, values), **_points(found, found.names + index, traces, law, values),
+                **_picture(found, place, law, values), **_points(found, place, traces, law, values),
             },
         })  # fmt: skip
     return made
@@ -191,7 +194,8 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
     if form == "constant":
         return f"{v['value']:.4g}"
     if law["memory"] != "none":
-        return f"f({place}; {law['memory']} of {law['memory_size']:.3g})"
+        size = f"{law['memory_size']:.3g} {laws.MEMORIES[law['memory']] or laws.COORDINATES[law['coordinate']]}"
+        return f"f({place}; {law['memory']} of {size})"
     level = f"{v['value']:+.4g} " if v.get("value") else ""
     if form == "linear":
         return f"({level}{v['slope']:+.4g} {place})"

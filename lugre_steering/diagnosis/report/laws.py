@@ -34,6 +34,12 @@ def _axis(vehicle: Vehicle, law: Mapping[str, Any]) -> tuple[str, float]:
     return f"{name} ({units.label(vehicle, unit)})", 1.0
 
 
+def _remembered(law: Mapping[str, Any]) -> str:
+    """Its memory, if it has one, with the size of that in SI units."""
+    unit = laws.MEMORIES[law["memory"]] or laws.COORDINATES[law["coordinate"]]
+    return f", {law['memory']} of {law['memory_size']:.3g} {unit}" if law["memory"] != "none" else ""
+
+
 def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the report lists of a law, as plain text."""
     _, scale = _axis(vehicle, law)
@@ -45,10 +51,10 @@ def facts(vehicle: Vehicle, law: Mapping[str, Any]) -> list[tuple[str, str]]:
         return f" ({words.number(ends[0], 3)} to {words.number(ends[1], 3)})" if ends else ""
 
     numbers = ", ".join(f"{name} = {words.number(value, 4)}{between(name)}" for name, value in law["values"].items())
-    ties = "; ".join(f"{tie['channel']} over {tie['coordinate']}" for tie in law["ties"])
+    ties = "; ".join(f"{tie['channel']} over {tie['coordinate']}{_remembered(tie)}" for tie in law["ties"])
     return [
         ("channel", words.labelled(law["channel"].replace("_", " "), units.label(vehicle, laws.CHANNELS[law["channel"]]))),
-        ("depends on", law["coordinate"] + (f", {law['memory']} of {law['memory_size']:.3g}" if law["memory"] != "none" else "")),
+        ("depends on", law["coordinate"] + _remembered(law)),
         ("form, SI units", f"{law['form']}: {numbers}" if numbers else f"{law['form']}, see augmented.yaml"),
         ("at most", f"{words.number(law['largest_Nm'], 3)} {unit}, {words.percent(law['largest_share'])} of the torque"),
         ("foretells on held-out data", f"{words.percent(law['heldout_gain'])} of the missing energy"),
