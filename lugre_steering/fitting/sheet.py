@@ -219,7 +219,10 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
         return None
     floor = float(np.count_nonzero(thin.valid))
     left, excess, beside_names = found[0].cost - floor, baseline.cost - floor, named.cost - floor
-    if excess <= 0.0 or left > min(1.0 - EXPLAINED, BETTER * rival) * excess or left > BETTER * beside_names:
+    if excess <= 0.0 or left > min(1.0 - EXPLAINED, BETTER * rival) * excess:
+        return None
+    # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
+    if effects and beside_names - left < max((1.0 - BETTER) * beside_names, SURPRISE):
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 

@@ -287,6 +287,15 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
     assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
 
 
+def test_physics_that_explains_all_is_no_wrong_arm_though_sensors_are_quieter_than_the_sheet_says() -> None:
+    """An error of all arms looks like a wrong bore of one cylinder, but for what noise as large as the sheet's would hide."""
+    linear = {"linear": -0.08, "quadratic": 0.0}
+    problem = synchronised(record(VEHICLE.replace(effects=(EffectEntry("moment_arm_error", linear),)), QUICK, 5), VEHICLE).problem
+    loud = Problem(problem.vehicle, [replace(run, sigma=3.0 * run.sigma) for run in problem.runs], problem.calibrations)
+    assert wrong_entry(loud) is not None
+    assert wrong_entry(loud, [effect("moment_arm_error", **linear)]) is None
+
+
 @pytest.mark.parametrize(("factor", "told"), [(0.5, 1.4), (2.0, 0.5)])
 def test_arms_that_are_all_measured_from_the_wrong_place_are_suspected_first(factor: float, told: float) -> None:
     """A factor of the knuckle pivots, as coarsely as it is tried: with levers twice as long all pressures do twice the work."""
