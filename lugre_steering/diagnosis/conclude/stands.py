@@ -124,7 +124,7 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
     rivals = not named or room_for_laws(done)
     if not left.structured and (clock is not None or not rivals):
         return Stands(named, clock, None, judged, left)
-    alone = find(done, found.baseline, seed, progress, freely=not left.structured) if rivals else None
+    alone = find(done, found.baseline, seed, progress, freely=not named and not left.structured) if rivals else None
     if not named:
         if alone is not None and not left.structured and not evident(done, alone):
             alone = None

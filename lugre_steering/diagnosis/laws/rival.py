@@ -29,8 +29,7 @@ def room_for_laws(done: Finished) -> bool:
     far as it may: then it makes up for what they are not."""
     there, named, final = done.compared, done.compared.found, done.freely
     rest = excess(there.problem, named.final, there.fitted)
-    stuck = at_bounds(done.problem, final.x, [calibration.name for calibration in done.problem.calibrations])
-    return bool(stuck) or rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
+    return _stuck(done.problem, final) or rest > MARGIN * (excess(there.problem, named.baseline, there.fitted) - rest)
 
 
 def evident(done: Finished, alone: FoundLaws) -> bool:
@@ -38,6 +37,11 @@ def evident(done: Finished, alone: FoundLaws) -> bool:
     problem, weight, fitted = beside_form(done, alone)
     mine, base = _energies(done, [(problem, weight, fitted)])
     return base - mine > needed(*settled(problem, weight, fitted), weight)
+
+
+def _stuck(problem: Problem, result: Fit) -> bool:
+    """Whether recalibration goes as far as it may."""
+    return bool(at_bounds(problem, result.x, [calibration.name for calibration in problem.calibrations]))
 
 
 def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool:
@@ -62,7 +66,9 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
     """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them each name is needed, and held-out data
-    are explained no worse by no more parts than without them, or far better."""
+    are explained no worse by no more parts than without them, or far better; nor where only a recalibration as far as it may go does that."""
+    if _stuck(beside.problem, beside.fitted) and not _stuck(alone.problem, alone.fitted):
+        return False
     parts, rest, other = beside.names + len(beside.gains), beside.beyond(done.held), alone.beyond(done.held)
     better = rest < TRUER * other or (rest <= other and parts <= len(alone.gains))
     return better and leaves_names(done, beside)
