@@ -66,7 +66,7 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
     """Whether names stand though laws ``alone`` explain more than they do: with laws ``beside`` them each name is needed, and held-out data
-    are explained no worse by no more parts than without them, or far better; nor where only a recalibration as far as it may go does that."""
+    are explained no worse by no more parts than without them, or far better; not where only a recalibration as far as it may go does so."""
     if _stuck(beside.problem, beside.fitted) and not _stuck(alone.problem, alone.fitted):
         return False
     parts, rest, other = beside.names + len(beside.gains), beside.beyond(done.held), alone.beyond(done.held)
