@@ -102,8 +102,9 @@ class Screen:
         residual = problem.measured - fitted.prediction
         slopes = fitted.jacobian / np.where(weight > 0.0, weight, 1.0)[:, None]
         named = FREE * normalised(self.rows.mean(slopes[:, problem.nuisances :]))
-        doubted = problem.scales() / problem.prior_weights(True)  # as far as each may go
-        self.nuisance = np.column_stack([self.rows.mean(slopes[:, : problem.nuisances] * doubted), named])
+        far = problem.scales()
+        far[problem.first_bend :] /= problem.prior_weights(True)[problem.first_bend :]  # no further than where names are compared
+        self.nuisance = np.column_stack([self.rows.mean(slopes[:, : problem.nuisances] * far), named])
         own = self.rows.mean(residual[:, None])
         self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
 
