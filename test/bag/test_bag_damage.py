@@ -339,3 +339,16 @@ def test_a_topic_with_fewer_messages_than_promised_is_told_when_it_is_read(tmp_p
     (finding,) = read_recording(folder, [LEFT]).findings
     assert (finding.finding, finding.topic) == ("message_count", "/" + LEFT.topic)
     assert "promises 999 messages, 200 could be read" in finding.statement
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_topic_whose_name_is_damaged_is_told_as_lost(tmp_path: Path, storage: str) -> None:
+    folder = make.write(tmp_path / "run", make.steering(2.0), storage)
+    (file,) = (file for file in folder.iterdir() if file.name != "metadata.yaml")
+    name = ("/" + MAIN_A.topic).encode()
+    data = file.read_bytes()
+    assert name in data
+    file.write_bytes(data.replace(name, name[:-1] + b"?"))
+    recording = read_recording(folder, [LEFT, MAIN_A])
+    lost = [f.topic for f in recording.findings if f.finding == "message_count" and "0 could be read" in f.statement]
+    assert lost == [name.decode()]
