@@ -114,7 +114,7 @@ def test_structure_is_located_in_a_recording_shorter_than_the_window(problem: Pr
     both = Problem(problem.vehicle, runs)
     residual = np.where(both.bag == 1, 10.0 * SIGMA, 0.0)
     done = finished(both, fit(both, weight(both)))
-    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual, None)
+    (entry,) = left_over._where(done, [locate.coordinates(run, run.measured) for run in runs], "time", residual)
     assert entry.bag == "short"
     assert entry.intervals_s[0] == pytest.approx([runs[1].time[0], runs[1].time[-1]], abs=0.05)
 

@@ -55,7 +55,7 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
         f"{words.percent(more / (1.0 + more))} of what the model leaves over is more than noise, most of it along {axis} "
         f"({words.percent(share)} of the residual energy follows it)"
     )
-    where = _where(done, axes, axis, residual, None)
+    where = _where(done, axes, axis, residual)
     return LeftOver(Unexplained(True, text, None, tuple(where)), text, True)
 
 
@@ -81,26 +81,26 @@ def beside_laws(done: Finished, before: LeftOver, fitted: Fit, names: int, law: 
         shape: Array = np.sum([locate.contribution(done.problem, fitted, i) for i in range(names, len(fitted.effects))], axis=0)
         stacked = {key: np.concatenate([bag[key] for bag in axes]) for key in axes[0]}
         axis, _, _ = locate.telling_coordinate(stacked, shape, done.weight, done.noise.draws)
-        where = tuple(_where(done, axes, axis, shape, shape))
+        where = tuple(_where(done, axes, axis, shape, noisy=False))
     return LeftOver(Unexplained(True, f"{law}; {rest}", formula, where), rest, True)
 
 
 def _where(
-    done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, residual: Array, shape: Array | None
+    done: Finished, axes: Sequence[Mapping[str, Array]], axis: str, torque: Array, *, noisy: bool = True
 ) -> list[Place]:
-    """Stretches and range of ``axis`` that hold it: where ``shape`` (n,) acts if given, else where the residual is loud."""
+    """Stretches and range of ``axis`` that hold a torque (n,): where a ``noisy`` one, a residual, is loud, else where it acts."""
     problem = done.problem
     entries = []
     for bag, (run, values) in enumerate(zip(problem.runs, axes, strict=True)):
         part = slice(problem.edges[bag], problem.edges[bag + 1])
-        if shape is None:
+        if noisy:
             width = int(np.clip(round(LOCATED_S / (run.time[1] - run.time[0])), 1, run.time.size))
-            smooth = np.sqrt(np.convolve((residual[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
+            smooth = np.sqrt(np.convolve((torque[part] * done.weight[part]) ** 2, np.ones(width) / width, mode="same"))
             limit = max(LOCATED_SIGMA, LOCATED_SHARE * float(np.percentile(smooth, 99.5)))
             spans = locate.intervals(run.time, np.where(smooth > limit, smooth, 0.0))
-            piece = residual[part] * (smooth > limit)
+            piece = torque[part] * (smooth > limit)
         else:
-            spans, piece = locate.intervals(run.time, shape[part]), shape[part]
+            spans, piece = locate.intervals(run.time, torque[part]), torque[part]
         if spans:
             between = locate.active_range(values[axis], piece)
             entries.append(Place(run.name, tuple(spans), axis, between, done.unit(units.COORDINATE_UNITS[axis])))

@@ -26,7 +26,7 @@ TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
 PLAYS = (0.05, 0.15)
 """Half widths of play and relay that are tried, as shares of the travel."""
-RINGS_HZ, RINGS, RING_STEPS = (0.3, 8.0), 32, 10.0
+RINGS_HZ, RINGS_TRIED, RING_STEPS = (0.3, 8.0), 32, 10.0
 """Lowest and highest frequency of a mode, how many are tried, and samples that a period must have."""
 NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
 """Sizes of a memory that are tried once one has shown, times its own."""
@@ -142,7 +142,7 @@ def axes_of(problem: Problem) -> list[Axis]:
     widths = [("angle", travel), ("torque", torque)]
     shortest = max(float(run.time[1] - run.time[0]) for run in problem.runs) * RING_STEPS
     highest = min(RINGS_HZ[1], 1.0 / shortest)
-    rings = [Axis(laws.RINGS[1], "ring", 1.0 / f) for f in np.geomspace(RINGS_HZ[0], highest, RINGS)] if highest > RINGS_HZ[0] else []
+    rings = [Axis(laws.RINGS[1], "ring", 1.0 / f) for f in np.geomspace(RINGS_HZ[0], highest, RINGS_TRIED)] if highest > RINGS_HZ[0] else []
     return plain + lagged + rings + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
 
 
