@@ -30,12 +30,17 @@ def test_the_policy_allows_what_the_node_does_and_no_more() -> None:
     with LiveNode("-p", "publish_commands:=true", "-p", "use_sim_time:=true") as _, World() as world:
         node, own = world.node, (NAME[1:], "/")
         world.wait(lambda: bool(world.heard["diagnostics"]))
-        published = {name for name, _ in node.get_publisher_names_and_types_by_node(*own)}
-        subscribed = {name for name, _ in node.get_subscriber_names_and_types_by_node(*own)}
-        offered = {name for name, _ in node.get_service_names_and_types_by_node(*own)}
-    assert published == allowed("topics", "publish")
-    assert subscribed == allowed("topics", "subscribe")
-    assert offered == allowed("services", "reply")
+
+        def seen() -> list[set[str]]:  # the graph becomes known piece by piece
+            asked = (
+                node.get_publisher_names_and_types_by_node, node.get_subscriber_names_and_types_by_node,
+                node.get_service_names_and_types_by_node,
+            )  # fmt: skip
+            return [{name for name, _ in ask(*own)} for ask in asked]
+
+        wanted = [allowed("topics", "publish"), allowed("topics", "subscribe"), allowed("services", "reply")]
+        world.wait(lambda: all(now >= all_of for now, all_of in zip(seen(), wanted, strict=True)))
+        assert seen() == wanted
 
 
 def test_a_node_that_is_told_to_be_secure_does_not_run_in_the_open(tmp_path: Path) -> None:
