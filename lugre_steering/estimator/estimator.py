@@ -22,6 +22,7 @@ from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD, watch_line
+from lugre_steering.estimator.held import hold
 from lugre_steering.estimator.known import known_range
 from lugre_steering.estimator.layout import (
     CHANNEL,
@@ -112,6 +113,16 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
     return n_estimates, n_residuals
 
 
+@njit(nogil=True, cache=True)
+def _process_one(held, first_line, channel, stamp_ns, value, rate):
+    """``_process`` of the one message that is given by its numbers."""
+    single = held.single
+    single.channel[0], single.stamp_ns[0], single.value[0], single.rate[0] = channel, stamp_ns, value, rate
+    return _process(
+        held.core, first_line, single.channel, single.stamp_ns, single.value, single.rate, single.estimates, single.residuals
+    )
+
+
 class Snapshot(NamedTuple):
     """The state of an estimator, for one of the same model in the same process."""
 
@@ -129,9 +140,9 @@ class Estimator:
         self.channels = self.vehicle.channels
         self._first_line = len(self.vehicle.sides)
         self._composition, self._core = _new_core(self.vehicle, self.options)
-        self._single = (np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1), np.empty(1))
         self._estimates = np.zeros(1, ESTIMATE)
         self._residuals = np.zeros(PENDING_RING, RESIDUAL)
+        self._held = hold(self._core, self._estimates, self._residuals)
 
     def push(self, channel: int, stamp_ns: int, value: float, rate: float = math.nan) -> tuple[Records, Records]:
         """One message -> new estimates (0 or 1) and residuals (0 or more), as views that the next push overwrites.
@@ -140,9 +151,7 @@ class Estimator:
         """
         if not 0 <= channel < len(self.channels):
             raise self._no_channel(channel)
-        single = self._single
-        single[0][0], single[1][0], single[2][0], single[3][0] = channel, stamp_ns, value, rate
-        e, r = _process(self._core, self._first_line, *single, self._estimates, self._residuals)
+        e, r = _process_one(self._held, self._first_line, channel, stamp_ns, float(value), float(rate))
         return self._estimates[:e], self._residuals[:r]
 
     def push_block(self, channel: IntArray, stamp_ns: IntArray, value: Array, rate: Array) -> tuple[Records, Records]:

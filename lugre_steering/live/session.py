@@ -109,9 +109,8 @@ class Session:
         self.health.set_vehicle(vehicle)
 
     def tick(self) -> None:
-        """Called often: counts what was lost, and leads the feed-forward to zero where that is due."""
+        """Called often: leads the feed-forward to zero where that is due."""
         outputs = self.outputs
-        self._inputs.count_lost()
         if outputs.fading is None:
             silent_ns = time.monotonic_ns() - self._arrived_ns
             if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and outputs.released:
@@ -120,6 +119,10 @@ class Session:
         elif not outputs.faded:
             outputs.fade(self._now_ns())
             self.estimator.set_released(outputs.released)
+
+    def count_lost(self) -> None:
+        """Count what the middleware has lost since the last time."""
+        self._inputs.count_lost()
 
     def _stale_to_zero(self) -> bool:
         return self.settings.when_stale == "zero"
