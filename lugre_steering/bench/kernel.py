@@ -21,6 +21,7 @@ from lugre_steering.resources import config_folder
 from lugre_steering.serialise import as_json
 from lugre_steering.vehicle import Vehicle, load
 from lugre_steering.vehicle.model import build_model
+from lugre_steering.vehicle.sections import EffectEntry
 from lugre_steering.vehicle.tables import limit_device
 
 RATE_HZ = 100.0
@@ -208,6 +209,23 @@ def _kernels(vehicle: Vehicle, p: Records, rubber: Array, truth: Array) -> list[
     ]
 
 
+def each_effect() -> list[Row]:
+    """The step composed for a file with one effect at its typical size, as replay and live node run it: each effect of the chain."""
+    vehicle = load(config_folder() / "test_vehicle.yaml")
+    time, theta, omega = manoeuvre(60.0)
+    still = np.zeros(time.size)
+
+    def composed(*effects: EffectEntry) -> Callable[[], Array]:
+        model = build_model(vehicle.replace(effects=effects), lean=True)
+        return lambda: torque_side(model.parameters[0], model.rubber, time, theta, omega, still)
+
+    tasks = {BASELINE: composed()}
+    for effect in CATALOGUE.values():
+        if effect.hooks and not effect.per_line:
+            tasks[effect.id] = composed(EffectEntry(effect.id, {p.name: p.typical for p in effect.parameters}))
+    return [_row(name, seconds, time.size, None, np.zeros(2)) for name, seconds in by_turns(tasks, 40).items()]
+
+
 def _neutral(p: Records) -> Records:
     """Parameters with a shape but no amplitude: the effect does nothing, but the stages are passed."""
     shape = next(f"{effect.id}_{p.name}" for effect in CATALOGUE.values() for p in effect.parameters if p.is_shape)
@@ -256,8 +274,9 @@ def run(arguments: list[str]) -> None:
     """Print the table, or JSON with ``--json``."""
     parser = argparse.ArgumentParser(prog="bench kernel", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--each", action="store_true", help="in place of the rest, the step composed for each effect of the chain alone")
     options = parser.parse_args(arguments)
-    rows = measure()
+    rows = each_effect() if options.each else measure()
     if options.json:
         print(as_json({"kernel": rows}))
         return
@@ -268,6 +287,8 @@ def run(arguments: list[str]) -> None:
         ns, error = float(str(row["ns_per_step_and_track"])), float(str(row["relative_error"]))
         shown = "-" if math.isnan(error) else f"{error:.1e}"
         print(f"{row['name']!s:<50} {ns:>11,.1f} {ns / base:>9,.4g} {shown:>8}")
+    if options.each:
+        return
     print(verdict(rows))
     if not any("C loop" in str(row["name"]) for row in rows):
         print("C loop skipped: gcc not found.")

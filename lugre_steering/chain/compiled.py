@@ -74,7 +74,7 @@ def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (si
     return types.float64(types.float64), codegen
 
 
-_NO_DOORS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_NO_DOORS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
 inner = njit(**_NO_DOORS)
 """Decorator of what only compiled code calls: without the entrances for Python and C, a third of the time to compile the estimator."""
 Law = TypeVar("Law", bound=Callable[..., Any])

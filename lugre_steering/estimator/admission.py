@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import row
 from lugre_steering.chain.layout import STATE
@@ -56,9 +54,8 @@ def _begin_side(core, side):
     saturated = state.saturated
     for i in range(core.state.shape[1]):
         core.state[side, i] = 0.0
-    core.motion[side] = np.zeros_like(core.motion)[side]
-    core.trust[side] = np.zeros_like(core.trust)[side]
-    core.guard[side] = np.zeros_like(core.guard)[side]
+    nothing = core.nothing[0]
+    core.motion[side], core.trust[side], core.guard[side] = nothing.motion, nothing.trust, nothing.guard
     state.saturated = saturated
     _clear(core.channels[side])
 

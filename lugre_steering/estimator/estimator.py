@@ -417,6 +417,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
         motion=np.zeros(sides, MOTION),
         trust=np.zeros(sides, TRUST),
         guard=np.zeros(sides, GUARD),
+        nothing=np.zeros(1, [("motion", MOTION), ("trust", TRUST), ("guard", GUARD)]),
         shadow=rows_of(np.zeros(sides, composition.state)),
         bounds=rows_of(np.zeros(2 * sides, composition.state)),
         released=np.zeros(sides),

@@ -147,6 +147,8 @@ class Core(NamedTuple):
     motion: Records
     trust: Records
     guard: Records
+    nothing: Records
+    """What motion, trust and guard are before anything was seen; never written."""
     shadow: Array
     bounds: Array
     released: Array
