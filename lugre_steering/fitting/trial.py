@@ -165,8 +165,20 @@ def _cornered(problem: Problem, current: Fit) -> bool:
 
 def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
     """A late effect from the instants that fit best, one per bag, with its values fitted anew."""
+    return _begun(problem, weight, trial, onset.timed(problem, weight, trial.fit, len(trial.fit.effects) - 1))
+
+
+def begun_with(problem: Problem, weight: Array, trial: Trial, other: Trial) -> Trial:
+    """A late effect from the instants of another one, where it explains more from these: timing sees only what is near its own."""
+    since = other.candidate.since
+    if not trial.candidate.since or not since or trial.candidate.since == since:
+        return trial
+    return _begun(problem, weight, trial, since)
+
+
+def _begun(problem: Problem, weight: Array, trial: Trial, since: tuple[float, ...]) -> Trial:
+    """A late effect from other instants, fitted anew, if it explains more from these."""
     *earlier, (candidate, values) = trial.fit.effects
-    since = onset.timed(problem, weight, trial.fit, len(earlier))
     effects = [*earlier, (replace(candidate, since=since), values)]
     result = fit(problem, weight, effects, trial.fit, linearisations=8, tolerance=TRIAL_TOLERANCE)
     return Trial(trial.score, result, result.cost) if result.cost < trial.cost else trial

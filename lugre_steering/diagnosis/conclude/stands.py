@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from lugre_steering.diagnosis.laws.rival import (
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.fit import fit
-from lugre_steering.fitting.problem import is_rig
+from lugre_steering.fitting.problem import Candidate, is_rig
 from lugre_steering.fitting.sheet import LEVELS, at_bounds
 
 SURELY = 2.0
@@ -112,8 +112,16 @@ def _tested(done: Finished, seed: int) -> _Tested:
     stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
     harmless = max(judged.gain, -np.inf if form is None else form.judged.gain) > -CONTRADICTED
     surely = beside.interval[0] > 0.0 or (judged.interval[0] > 0.0 and beside.interval[1] > 0.0)
-    named = bool(found.found) and harmless and surely and clock is None and not stuck
+    together = _of_one_vehicle([candidate for candidate, _ in found.final.effects], len(problem.runs))
+    named = bool(found.found) and harmless and surely and clock is None and not stuck and together
     return _Tested(named, clock, judged, form)
+
+
+def _of_one_vehicle(names: Sequence[Candidate], bags: int) -> bool:
+    """Whether every two names have a recording in common. Two things that no recording shows together make up, each in its own, for one
+    that is in all: a vehicle may change between recordings, but hardly loses one peculiarity as it gets another."""
+    acting = [{bag for bag in range(bags) if name.active_in(bag)} for name in names]
+    return all(one & other for i, one in enumerate(acting) for other in acting[:i])
 
 
 def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:

@@ -13,7 +13,18 @@ from scipy import stats
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, is_timed, ranked, refine, worth_of
+from lugre_steering.fitting.trial import (
+    PARTIAL,
+    TRIAL_TOLERANCE,
+    Round,
+    Trial,
+    begun_with,
+    is_timed,
+    rank,
+    ranked,
+    refine,
+    worth_of,
+)
 from lugre_steering.recording import Array
 
 SHORTLIST, SHORT = 7, 0.08
@@ -86,6 +97,9 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
         if trial.cost <= near:
             trials[i] = refine(problem, weight, trial, worth_of(current.cost, best))
             best = min(best, trials[i].cost)
+    if trials:
+        leads = min(trials, key=lambda each: rank(each, current.cost))
+        trials = [begun_with(problem, weight, trial, leads) if trial.cost <= near else trial for trial in trials]
     return Proposal(problem, current, seen[0].scores, ranked(_one_of_each(trials, current.cost), current.cost))
 
 
