@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
+    SIZES,
     clearest,
     left,
     may_differ,
@@ -32,7 +34,7 @@ from lugre_steering.fitting.clocks import still_apart
 from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import Problem, is_rig
+from lugre_steering.fitting.problem import TYPICAL, Problem, is_rig
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial
 from lugre_steering.recording import Array
@@ -96,6 +98,9 @@ def search(
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
         step = _step(seen, current, found[given:], weight, split, progress)
         if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
+            last = (found, current) if step is None else ([*found, step.name], step.fit)
+            if len(last[0]) > len(sure[0]) > given and (simpler := _in_place_by(problem, weight, sure, last)) is not None:
+                problem, baseline, sure = simpler
             break
         there, both = step.problem, [*found, step.name]
         if step.instead is not None:
@@ -258,6 +263,30 @@ def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | Non
     if exact.before - best.cost < needed(exact.problem, best.fit, weight):
         return None
     return exact if best.cost - free.before < REST * (exact.before - free.before) else None
+
+
+def _in_place_by(
+    problem: Problem, weight: Array, sure: tuple[Sequence[Found], Problem, Fit], last: tuple[Sequence[Found], Fit]
+) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
+    """The names that stand for ``sure`` with those that are short of it beside the freedoms, without freedoms, where all together do
+    nearly all that the freedoms do beside the former, and each is needed there: with problem and baseline without freedoms.
+
+    ``problem``: without bends of names.
+    """
+    (found, there, free), (every, wide) = sure, last
+    if not problem.bends.shape[1]:
+        return None
+    exact, known = problem.doubted(there.doubt, TYPICAL * SIZES[0]), len(free.effects)
+    settle = partial(fit, exact, weight, linearisations=20, tolerance=TRIAL_TOLERANCE)
+    named, bare = settle(wide.effects, wide.x[: exact.nuisances]), settle(free.effects, free.x[: exact.nuisances])
+    if named.cost - free.cost >= REST * (bare.cost - free.cost):
+        return None
+    least = needed(exact, named, weight)
+    for index in range(known, len(named.effects)):
+        if settle([own for i, own in enumerate(named.effects) if i != index], named.x).cost - named.cost < least:
+            return None
+    joined = [replace(item, in_place=True) if i >= len(found) else item for i, item in enumerate(every)]
+    return exact, fit(exact, weight, free.effects[: known - len(found)], free.x[: exact.nuisances]), (joined, exact, named)
 
 
 def _simplest(exact: Proposal, weight: Array, split: Split) -> tuple[Problem, Fit, Found]:
