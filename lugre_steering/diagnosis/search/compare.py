@@ -46,6 +46,8 @@ PER_VALUE = 4.0
 """Doubts that a free value costs where models are tied."""
 HALF = 0.5
 """Share of the best one's energy that a rival must take."""
+END = 0.01
+"""Share of its range within which a value stands at the end of it."""
 MARGIN = 0.1
 """Share of what names take that laws must take more: a name wins a draw."""
 
@@ -160,8 +162,23 @@ def tied(
     return found
 
 
+def as_far_as_it_may(current: Fit, names: int) -> bool:
+    """Whether one of the last ``names`` of a fit acts as strongly as it ever does: it makes up for what is something else."""
+    for candidate, values in current.effects[len(current.effects) - names :]:
+        for name in candidate.effect.amplitudes:
+            parameter, value = candidate.parameter(name), values.get(name, 0.0)
+            if value and not (1.0 - END) * parameter.low < value < (1.0 - END) * parameter.high:
+                return True
+    return False
+
+
 def simplest(best: Trial, rivals: list[Trial], before: float, own_doubt: float) -> tuple[Trial, list[Trial]]:
-    """Of effects that fit equally well the one with the fewest free parameters stands for the group."""
+    """Of effects that fit equally well the one with the fewest free parameters stands for the group, before any that must go as far as it
+    may to do so."""
     group = [best, *rivals]
-    chosen = min(group, key=lambda trial: rank(trial, before) + PER_VALUE * own_doubt * len(trial.candidate.free))
+
+    def plainness(trial: Trial) -> tuple[bool, float]:
+        return as_far_as_it_may(trial.fit, 1), rank(trial, before) + PER_VALUE * own_doubt * len(trial.candidate.free)
+
+    chosen = min(group, key=plainness)
     return chosen, [trial for trial in group if trial is not chosen]

@@ -18,6 +18,7 @@ import numpy as np
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
     SIZES,
+    as_far_as_it_may,
     clearest,
     left,
     may_differ,
@@ -45,8 +46,6 @@ HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 REST = 0.05
 """Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
-END = 0.01
-"""Share of its range within which a value stands at the end of it."""
 SURE_OF_SIZE = 2.0
 """Standard deviations by which a name on a single joint must be more than nothing."""
 BENT = 0.3
@@ -158,7 +157,7 @@ def _step(
         there, best, one = _closest([there] if names else worlds(there), weight, split, seen, current)
         whole = _everywhere(there, weight, best, names)
         one = replace(one, gain=one.gain + best.cost - whole.cost)
-        short = one.gain < needed(there, whole, weight, may_differ(there, whole, older, gains)) or _as_far_as_it_may(whole, len(names) + 1)
+        short = one.gain < needed(there, whole, weight, may_differ(there, whole, older, gains)) or as_far_as_it_may(whole, len(names) + 1)
         step = _Step(there, whole, one, short)
     if instead is not None and (step is None or step.short):
         step = _Step(*_simplest(instead, weight, split), short=False, instead=instead)
@@ -242,16 +241,6 @@ def _everywhere(problem: Problem, weight: Array, current: Fit, names: Sequence[F
         if tried.cost < current.cost + PARTIAL * item.gain:
             current = tried
     return current
-
-
-def _as_far_as_it_may(current: Fit, names: int) -> bool:
-    """Whether one of the last ``names`` of a fit acts as strongly as it ever does: it makes up for what is something else."""
-    for candidate, values in current.effects[len(current.effects) - names :]:
-        for name in candidate.effect.amplitudes:
-            parameter, value = candidate.parameter(name), values.get(name, 0.0)
-            if value and not (1.0 - END) * parameter.low < value < (1.0 - END) * parameter.high:
-                return True
-    return False
 
 
 def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | None:
