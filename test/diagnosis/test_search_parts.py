@@ -95,6 +95,17 @@ def test_a_late_effect_acts_from_its_start_and_is_timed(problem: Problem) -> Non
     assert tried.fit.effects[0][1]["torque"] == pytest.approx(400.0, rel=0.02)
 
 
+def test_a_late_rival_is_tried_from_the_instants_of_the_leader(problem: Problem) -> None:
+    candidate, values = effect("slope_bias", torque=400.0)
+    right, wrong = replace(candidate, since=(30.0, 41.0)), replace(candidate, since=(5.0, 60.0))
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [(right, values)]))
+    score = Score(candidate, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    fits = [fit(hidden, weight(hidden), [(own, values)]) for own in (right, wrong)]
+    leader, rival = (trial.Trial(score, own, own.cost) for own in fits)
+    assert trial.begun_with(hidden, weight(hidden), rival, leader).candidate.since == right.since
+    assert trial.begun_with(hidden, weight(hidden), leader, rival) is leader
+
+
 def searched(hidden: Problem) -> search.Search:
     """A search under white noise of the known level."""
     roles = split.split(hidden)
@@ -293,6 +304,26 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
     assert all(item.in_place for item in found.found)
 
 
+@pytest.mark.parametrize("uneven", [0.1, 0.9])
+def test_two_names_that_are_short_stand_for_freedoms_that_they_do_nearly_all_of(slower: Problem, uneven: float) -> None:
+    """Beside one that stands: freedoms that can be what both do in each stretch of time by itself, nearly of one law in all or by far not."""
+    stands, short = effect("slope_bias", torque=400.0), [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
+    base = slower.predict_all(slower.start(), [stands])
+    both = slower.predict_all(slower.start(), [stands, *short]) - base
+    stretch = np.arange(both.size) * 16 // both.size
+    pieces = np.where(stretch[:, None] == np.arange(16), both[:, None], 0.0)
+    torque = base + pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))
+    hidden = replace_bends(with_torque(slower, torque), 3.0 * pieces)
+    free, wide = (fit(hidden, weight(hidden), names) for names in ([stands], [stands, *short]))
+    every = [search.Found(Score(own[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1000.0) for own in (stands, *short)]
+    found = search._in_place_by(hidden, weight(hidden), (every[:1], hidden, free), (every, wide))
+    assert (found is None) == (uneven > 0.5)
+    if found is not None:
+        assert [item.in_place for item in found[2][0]] == [False, True, True]
+        assert dict(found[2][2].effects[1][1])["c"] == pytest.approx(1e5, rel=0.1)
+        assert found[0].typical < hidden.typical
+
+
 @pytest.mark.parametrize("settles", [False, True])
 def test_names_are_doubted_by_what_they_took_as_far_as_their_laws_bend(problem: Problem, settles: bool) -> None:
     """A twenty-fifth of it; and those that settle with time by all that they do, bent or not."""
@@ -398,6 +429,21 @@ def test_what_no_size_could_show_has_no_limit(problem: Problem) -> None:
     result, draws = fit(problem, blunt), 1e3 * SIGMA * np.random.default_rng(4).standard_normal((8, problem.measured.size))
     found = limits.smallest(problem, result, blunt, fingerprint.screen(problem, result, blunt, draws), [])
     assert found["heat_partition"][1] is None
+
+
+def test_a_name_that_must_go_as_far_as_it_may_does_not_stand_for_a_group() -> None:
+    named = [effect("slope_bias", torque=1.0), effect("kingpin_jacking", amplitude=1.0)]
+    score = Score(named[0][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    most, nothing = named[0][0].parameter("torque").high, np.zeros((1, 1))
+
+    def made_up(candidate: Candidate, cost: float, **values: float) -> trial.Trial:
+        made = Fit(nothing[0], ((candidate, values),), nothing[0], cost, nothing, nothing, nothing[0], nothing[0], nothing[0], True)
+        return trial.Trial(score, made, cost)
+
+    within, other = made_up(named[0][0], 480.0, torque=0.5 * most), made_up(named[1][0], 500.0, amplitude=1.0)
+    at_end = made_up(named[0][0], 480.0, torque=most)
+    assert compare.simplest(within, [other], 1000.0, 1.0)[0] is within
+    assert compare.simplest(at_end, [other], 1000.0, 1.0) == (other, [at_end])
 
 
 def test_an_onset_must_explain_clearly_more_to_stand_for_a_group() -> None:

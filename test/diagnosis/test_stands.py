@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude.stands import _clock, _tested
+from lugre_steering.diagnosis.conclude.stands import _clock, _of_one_vehicle, _tested
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Found, Search
 from lugre_steering.fitting.fingerprint import Score
@@ -69,3 +69,11 @@ def test_what_clocks_may_be_apart_is_no_delay_of_the_machine_where_stamps_are_gi
     if told is not None:
         assert told.late_s == pytest.approx(late_s, abs=5e-3)
         assert 0.0 < told.deviation_s < late_s
+
+
+@pytest.mark.parametrize(("first", "second", "stand"), [((0,), (1,), False), ((0,), None, True), (None, None, True), ((0,), (0, 1), True)])
+def test_names_that_no_recording_shows_together_do_not_stand(
+    first: tuple[int, ...] | None, second: tuple[int, ...] | None, stand: bool
+) -> None:
+    names = [replace(SLOPE[0], bags=first), replace(effect("kingpin_jacking", amplitude=1.0)[0], bags=second)]
+    assert _of_one_vehicle(names, 2) == stand
