@@ -306,7 +306,7 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
 
 @pytest.mark.parametrize("uneven", [0.1, 0.9])
 def test_two_names_that_are_short_stand_for_freedoms_that_they_do_nearly_all_of(slower: Problem, uneven: float) -> None:
-    """Beside one that stands: freedoms that can be what both do in each stretch of time by itself, nearly of one law in all or by far not."""
+    """Beside one that stands: freedoms may do what both do in each stretch of time by itself, nearly of one law in all or by far not."""
     stands, short = effect("slope_bias", torque=400.0), [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
     base = slower.predict_all(slower.start(), [stands])
     both = slower.predict_all(slower.start(), [stands, *short]) - base
