@@ -35,7 +35,7 @@ from lugre_steering.fitting.clocks import still_apart
 from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import TYPICAL, Problem, is_rig
+from lugre_steering.fitting.problem import TYPICAL, Candidate, Problem, is_rig
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial
 from lugre_steering.recording import Array
@@ -323,7 +323,8 @@ def _rivals(
         trials = _beside_given(problem, noise, weight, without, own[0].effect)
     else:
         had = {trial.candidate.effect.id: trial for trial in reversed(item.trials)}
-        trials = [_again(problem, weight, without, had[name]) for name in sorted(item.rivals)]
+        beside = replace(current, effects=tuple(rest))  # as the champion has it: what does the same leaves it so
+        trials = [_again(problem, weight, beside, had[name], own[0]) for name in sorted(item.rivals)]
     champion = Trial(item.score, replace(current, effects=(*rest, own)), current.cost)
     return tied(problem, weight, split, champion, trials, without.cost)
 
@@ -338,9 +339,14 @@ def _beside_given(problem: Problem, noise: Noise, weight: Array, without: Fit, g
     return [tried.try_effect(best[name]) for name in sorted(names) if best[name].explained > 0.0]
 
 
-def _again(problem: Problem, weight: Array, without: Fit, trial: Trial) -> Trial:
-    """An effect with all parts that its law had when it was tried, beside what a fit has."""
-    fitted = fit(problem, weight, [*without.effects, trial.fit.effects[-1]], without, linearisations=12, tolerance=TRIAL_TOLERANCE)
+def _again(problem: Problem, weight: Array, beside: Fit, trial: Trial, champion: Candidate) -> Trial:
+    """An effect with all parts that its law had when it was tried, beside what a fit has; one that acted in part of the recordings does so
+    where the ``champion`` does now."""
+    candidate, values = trial.fit.effects[-1]
+    if candidate.bags is not None or candidate.since:
+        candidate = replace(candidate, bags=champion.bags, since=champion.since)
+    effects = [*beside.effects, (candidate, values)]
+    fitted = fit(problem, weight, effects, beside.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
     return Trial(trial.score, fitted, fitted.cost)
 
 
