@@ -21,9 +21,11 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
     """Recalibrated vehicle with the named effects that act in the last bag; ``heldout_rmse`` [N m] was found before all
     data were fitted."""
     problem = done.problem
-    if not whole.effects and not weather_findings(problem, whole):  # nothing speaks against the temperatures of the file
+    if not weather_findings(problem, whole):  # nothing speaks against the temperatures of the file
         problem = problem.with_known_weather()
-        whole = fit(problem, done.weight, start=whole.x)
+        held = [(replace(candidate, free=()), values) for candidate, values in whole.effects]
+        around = fit(problem, done.weight, held, whole.x[: problem.nuisances])
+        whole = replace(around, effects=whole.effects)
     entries = list(problem.vehicle.effects)
     last = len(problem.runs) - 1
     for candidate, values in whole.effects[: len(effects)]:
