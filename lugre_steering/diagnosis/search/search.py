@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
     SIZES,
+    SURE,
     as_far_as_it_may,
     clearest,
     left,
@@ -35,7 +35,7 @@ from lugre_steering.fitting.clocks import still_apart
 from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import TYPICAL, Candidate, Problem, is_rig
+from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial
 from lugre_steering.recording import Array
@@ -97,9 +97,6 @@ def search(
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
         step = _step(seen, current, found[given:], weight, split, progress)
         if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
-            last = (found, current) if step is None else ([*found, step.name], step.fit)
-            if len(last[0]) > len(sure[0]) > given and (simpler := _in_place_by(problem, weight, sure, last)) is not None:
-                problem, baseline, sure = simpler
             break
         there, both = step.problem, [*found, step.name]
         if step.instead is not None:
@@ -112,6 +109,8 @@ def search(
         waiting = step.short  # what another one keeps in doubt may stand beside that one
         if not waiting:
             sure = found, now, current
+    if len(sure[0]) > given and (instead := _in_place(problem, noise, weight, split, sure, progress)) is not None:
+        problem, baseline, sure = instead
     found, now, current = sure
     if len(found) > given and is_rig(problem.vehicle):
         found, current = _given_beside(now, noise, weight, split, current, found)
@@ -254,28 +253,38 @@ def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | Non
     return exact if best.cost - free.before < REST * (exact.before - free.before) else None
 
 
-def _in_place_by(
-    problem: Problem, weight: Array, sure: tuple[Sequence[Found], Problem, Fit], last: tuple[Sequence[Found], Fit]
+def _in_place(
+    problem: Problem, noise: Noise, weight: Array, split: Split, sure: tuple[list[Found], Problem, Fit],
+    progress: Callable[[str], None],
 ) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
-    """The names that stand for ``sure`` with those that are short of it beside the freedoms, without freedoms, where all together do
-    nearly all that the freedoms do beside the former, and each is needed there: with problem and baseline without freedoms.
-
-    ``problem``: without bends of names.
+    """Further names beside those of a vehicle that stand for ``sure``, where all together without freedoms are clearly more evident than
+    the former with them, and each is needed: with problem and baseline without freedoms. ``problem``: without bends of names.
     """
-    (found, there, free), (every, wide) = sure, last
-    if not problem.bends.shape[1]:
+    found, there, free = sure
+    exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
+    if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
-    exact, known = problem.doubted(there.doubt, TYPICAL * SIZES[0]), len(free.effects)
-    settle = partial(fit, exact, weight, linearisations=20, tolerance=TRIAL_TOLERANCE)
-    named, bare = settle(wide.effects, wide.x[: exact.nuisances]), settle(free.effects, free.x[: exact.nuisances])
-    if named.cost - free.cost >= REST * (bare.cost - free.cost):
-        return None
-    least = needed(exact, named, weight)
-    for index in range(known, len(named.effects)):
-        if settle([own for i, own in enumerate(named.effects) if i != index], named.x).cost - named.cost < least:
+    current, named = _settled_in(exact, weight, free.effects, free.x), left(there, free) - SURE * there.doubt
+    while left(exact, current) > named:
+        own = _round(exact, noise, weight, current, True, progress) if len(found) < MAX_EFFECTS else None
+        if own is None or not own.trials:
             return None
-    joined = [replace(item, in_place=True) if i >= len(found) else item for i, item in enumerate(every)]
-    return exact, fit(exact, weight, free.effects[: known - len(found)], free.x[: exact.nuisances]), (joined, exact, named)
+        _, current, name = _simplest(own, weight, split)
+        if name.gain < needed(exact, current, weight):
+            return None
+        found = [*found, name]
+    if len(found) == len(sure[0]):
+        return None
+    least = needed(exact, current, weight)
+    for index in range(len(found)):
+        rest = [own for i, own in enumerate(current.effects) if i != index]
+        if _settled_in(exact, weight, rest, current.x).cost - current.cost < least:
+            return None
+    return exact, _settled_in(exact, weight, (), free.x), (found, exact, current)
+
+
+def _settled_in(problem: Problem, weight: Array, effects: Effects, x: Array) -> Fit:
+    return fit(problem, weight, effects, x[: problem.nuisances], linearisations=20, tolerance=TRIAL_TOLERANCE)
 
 
 def _simplest(exact: Proposal, weight: Array, split: Split) -> tuple[Problem, Fit, Found]:
