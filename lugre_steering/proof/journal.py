@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence, Set
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import TextIO
 
 from lugre_steering.errors import LugreSteeringError
+from lugre_steering.pool import begin, processors
 from lugre_steering.proof.blind import Job, Row, run, source_version
 from lugre_steering.proof.campaign import PEERS_EVERY, Hiding
 
@@ -68,9 +68,9 @@ def run_all(
 
 def _work_through(jobs: list[Job], late: Callable[[], bool], rows: list[Row], log: TextIO, tell: Callable[[], None]) -> None:
     """Run the jobs, one process per core, and keep each row as it comes; none is begun once it is ``late``."""
-    workers = os.cpu_count() or 1
+    workers = processors()
     # A fresh interpreter per worker: forking a process that has compiled code and threads is not safe.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=begin, initargs=(1,)) as pool:
         running: set[Future[Row]] = set()
         while jobs or running:
             if late():
