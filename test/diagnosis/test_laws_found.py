@@ -209,6 +209,9 @@ def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling(
     assert found is not None
     assert 0.3 < found.foretold / found.ceiling < 0.9
     assert described(found)[0]["share_of_ceiling"] == found.foretold / found.ceiling
+    assert found.doubt > 10.0  # what is left of the wave is large and lasts: so much less is f known than from white noise
+    band, bare = (np.array(described(each)[0]["f"]["band"]) for each in (found, replace(found, doubt=1.0)))
+    assert np.allclose(band, np.sqrt(found.doubt) * bare)
 
 
 def test_laws_that_tie_are_separated_by_the_next_experiment() -> None:

@@ -22,6 +22,7 @@ from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws
 from lugre_steering.diagnosis.laws.refine import law_of, sized_law
 from lugre_steering.diagnosis.laws.rival import beside_form
 from lugre_steering.diagnosis.loudness import loudness
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE
@@ -67,7 +68,8 @@ def formed_beside(done: Finished, found: FoundLaws, seed: int) -> tuple[FoundLaw
     form = _formed(done, linear, bent.first_bend, names, laws, found.fitted, seed)
     if form is None:
         return None
-    return replace(found, problem=form.problem, fitted=form.fitted, fit=form.whole, judged=form.judged), form
+    own = doubt(form.problem, form.whole, done.weight)
+    return replace(found, problem=form.problem, fitted=form.fitted, fit=form.whole, judged=form.judged, doubt=own), form
 
 
 def _formed(

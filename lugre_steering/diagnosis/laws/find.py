@@ -15,6 +15,7 @@ from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import FITTED, PER_VALUE, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
@@ -66,6 +67,13 @@ class FoundLaws:
     bar: float
     foretold: float
     ceiling: float
+    doubt: float
+    """Energy, in noise variances, that counts as one independent error of ``fit``."""
+
+    @property
+    def spread(self) -> Array:
+        """Covariance of all that ``fit`` has: as little is known as its errors are large and last."""
+        return np.asarray(self.fit.covariance * max(self.doubt, 1.0))
 
     @property
     def names(self) -> int:
@@ -118,7 +126,8 @@ def find(
     judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
     if judged.interval[0] <= 0.0:
         return None
-    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, foretold, max(ceiling, foretold))
+    own = doubt(problem, whole, done.weight)
+    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, foretold, max(ceiling, foretold), own)
 
 
 def _with_places(problem: Problem, before: Fit) -> Problem:

@@ -94,7 +94,8 @@ def _swapped(done: Finished, alone: FoundLaws, index: int, seed: int) -> FoundLa
     fitted, whole = (fit(problem, weight, effects, x, linearisations=12) for weight in (done.fitted, done.weight))
     judged = verify.verify(problem, done.weight, names, fitted, done.roles, seed)
     gains = tuple(gain for i, gain in enumerate(alone.gains) if i != index)
-    return replace(alone, problem=problem, fitted=fitted, fit=whole, judged=judged, gains=gains, ties=alone.ties if index else ())
+    ties, own = alone.ties if index else (), doubt(problem, whole, done.weight)
+    return replace(alone, problem=problem, fitted=fitted, fit=whole, judged=judged, gains=gains, ties=ties, doubt=own)
 
 
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:

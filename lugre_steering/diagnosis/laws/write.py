@@ -43,7 +43,7 @@ COORDINATE_WORDS = {
 def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
     """The laws as a vehicle file has them."""
     made, first = [], found.problem.nuisances
-    spread = np.sqrt(np.maximum(np.diag(found.fit.covariance), 0.0))
+    spread = np.sqrt(np.maximum(np.diag(found.spread), 0.0))
     gain = 1.0 - (found.judged.after / found.judged.before) ** 2
     for index, (candidate, values) in enumerate(found.fit.effects):
         deviations = dict(zip(candidate.free, spread[first:], strict=False))
@@ -154,12 +154,12 @@ def _tie(tie: Tried) -> dict[str, Any]:
 
 
 def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
-    """f over its range with its 95 % band, from the covariance of the fit."""
+    """f over its range with its 95 % band, from the spread of the fit."""
     first = found.problem.nuisances + sum(len(known.free) for known, _ in found.fit.effects[:index])
     names = [name for name in found.fit.effects[index][0].free if name != "memory_size"]
     part = slice(first, first + len(names))
     at, f = np.linspace(law.cell.low, law.cell.high, laws.KNOTS), law.shape(values)
-    covariance, slopes = found.fit.covariance[part, part], []
+    covariance, slopes = found.spread[part, part], []
     for i, name in enumerate(names):
         step = float(np.sqrt(max(covariance[i, i], 1e-300)))
         up, down = ({**values, name: values[name] + sign * 0.5 * step} for sign in (1.0, -1.0))
