@@ -23,7 +23,7 @@ from lugre_steering.diagnosis.conclude.stands import standing
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws import rival
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
-from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, find, preferred
+from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _sure, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
 from lugre_steering.diagnosis.laws.rival import beside_form, in_place, in_place_of_one, keeps_names, leaves_names
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
@@ -212,6 +212,20 @@ def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling(
     assert found.doubt > 10.0  # what is left of the wave is large and lasts: so much less is f known than from white noise
     band, bare = (np.array(described(each)[0]["f"]["band"]) for each in (found, replace(found, doubt=1.0)))
     assert np.allclose(band, np.sqrt(found.doubt) * bare)
+
+
+@pytest.mark.parametrize(("wandering", "sure"), [(0.0, True), (15.0, False)])
+def test_a_law_takes_more_than_one_more_of_the_errors_that_are_left(wandering: float, sure: bool) -> None:
+    """A spring beyond an angle, alone and where a torque that wanders for seconds is left that is several times as large."""
+    spring = by_run(lambda run: np.sum(4e3 * np.maximum(run.theta - 0.1, 0.0), axis=0))
+    steps = np.random.default_rng(11).standard_normal(spring.size)
+    slow = lfilter([1.0], [1.0, -np.exp(-1.0 / (2.0 * 40.0))], steps)
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + spring + wandering * SIGMA * slow / np.std(slow))
+    room = Problem(problem.vehicle, problem.runs, more_laws=1)
+    cell = Cell("conservative_torque", Axis("angle"), -0.3, 0.3)
+    law = closed_law(room, cell, 0, "hinge", {"value": 0.0, "below": 0.0}, {"at": 0.1, "above": 4e3})
+    done = named(problem, fitted(problem))
+    assert _sure(done, fit(room, done.fitted, [law]), 0) == sure
 
 
 def test_laws_that_tie_are_separated_by_the_next_experiment() -> None:

@@ -15,6 +15,8 @@ from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import FITTED, PER_VALUE, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
+from lugre_steering.diagnosis.search.compare import PER_VALUE as FREE_VALUE
+from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
@@ -122,12 +124,25 @@ def find(
     if not gains:
         return None
     progress("proving the law")
+    if not _sure(there, current, len(before.effects)):
+        return None
     fitted, whole = (fit(problem, w, current.effects, current.x[: problem.nuisances], linearisations=6) for w in (done.fitted, done.weight))
     judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
     if judged.interval[0] <= 0.0:
         return None
     own = doubt(problem, whole, done.weight)
     return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, foretold, max(ceiling, foretold), own)
+
+
+def _sure(there: Finished, found: Fit, names: int) -> bool:
+    """Whether the laws of a fit, after so many names, take as much together as a name must, and what their values cost, beside the freedoms
+    of the friction law: what is left may be so large and last so long that they are no more than one more of such errors."""
+    problem = with_freedoms(there, beside_names=names > 0)
+    x = np.append(found.x[: problem.first_bend], np.zeros(problem.bends.shape[1]))
+    fitted = fit(problem, there.fitted, found.effects, x, linearisations=6)
+    taken = fit(problem, there.fitted, found.effects[:names], fitted.x, linearisations=6).cost - fitted.cost
+    values = sum(len(candidate.free) for candidate, _ in found.effects[names:])
+    return taken > (SURE + FREE_VALUE * values) * doubt(problem, fitted, there.fitted)
 
 
 def _with_places(problem: Problem, before: Fit) -> Problem:
