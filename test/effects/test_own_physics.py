@@ -135,13 +135,14 @@ def refusal(file: Path, text: str, old: str, new: str, words: str) -> str:
 
 
 OWN_PYTHON = """
+import numpy as np
 from lugre_steering.effects import Effect, Parameter, law
 
 GAIN = 1.0
 
 @law
 def shape(theta):
-    return GAIN * theta
+    return GAIN * np.interp(theta, np.array([-1.0, 1.0]), np.array([-1.0, 1.0]))  # a law may make arrays
 
 def torque(stiffness, theta):
     return stiffness * shape(theta)
