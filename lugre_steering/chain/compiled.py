@@ -75,7 +75,8 @@ def _power_of_two(typing_context: Any, shifted: Any) -> Any:  # noqa: ARG001 (si
 
 
 _NO_DOORS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inner = njit(**_NO_DOORS, _nrt=False)
+_UNCOUNTED: Any = {**_NO_DOORS, "_nrt": False}
+inner = njit(**_UNCOUNTED)
 """Decorator of what only compiled code calls: without the entrances for Python and C, and without counting who holds an array (so it can
 make none), two fifths of the time to compile the estimator."""
 Law = TypeVar("Law", bound=Callable[..., Any])

@@ -23,6 +23,7 @@ from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, synchronised
+from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_beside, physics_instead, wrong_entry, wrong_sheet
@@ -81,7 +82,7 @@ def diagnose_recordings(
     if isinstance(searched, Diagnosis):
         return searched
     done, clocks = searched
-    case.found(weather_findings(done.problem, done.found.final))
+    case.found(weather_findings(in_doubt(done.problem, done.fitted, done.found.final), done.found.final))
     progress("verifying on held-out data")
     result = conclude(done, case.findings, pieces, seed=seed, material=material, progress=progress)
     named, late = done.found.final.effects if result.effects else (), None if cut else clocks.late

@@ -37,3 +37,8 @@ def doubt(problem: Problem, result: Fit, weight: Array) -> float:
     ended = np.flatnonzero(correlation < FORGOTTEN)
     lasting_s = slowest * (1.0 + 2.0 * float(correlation[1 : ended[0] if ended.size else longest].sum()))
     return float(max(covariance[0], 1.0) * lasting_s * pairs[0] / max(seconds, 1e-300))
+
+
+def in_doubt(problem: Problem, weight: Array, result: Fit) -> Problem:
+    """The problem with the doubt that a fit leaves, by which the sheet and the weather weigh, and all that is known of it."""
+    return problem.doubted(doubt(problem, result, weight), problem.typical)

@@ -12,6 +12,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import NamedEffect
 from lugre_steering.effects.registry import ORIGINS
 from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.weather import initial_of, weather_findings
 from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
@@ -20,12 +21,11 @@ from lugre_steering.vehicle import EffectEntry, Vehicle, each_once
 def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect], heldout_rmse: float) -> Vehicle:
     """Recalibrated vehicle with the named effects that act in the last bag; ``heldout_rmse`` [N m] was found before all
     data were fitted."""
-    problem = done.problem
+    problem = in_doubt(done.problem, done.weight, whole)  # where the model errs, the sheet weighs against its errors, not the sensors'
     if not weather_findings(problem, whole):  # nothing speaks against the temperatures of the file
         problem = problem.with_known_weather()
-        held = [(replace(candidate, free=()), values) for candidate, values in whole.effects]
-        around = fit(problem, done.weight, held, whole.x[: problem.nuisances])
-        whole = replace(around, effects=whole.effects)
+    held = [(replace(candidate, free=()), values) for candidate, values in whole.effects]
+    whole = replace(fit(problem, done.weight, held, whole.x[: problem.nuisances]), effects=whole.effects)
     entries = list(problem.vehicle.effects)
     last = len(problem.runs) - 1
     for candidate, values in whole.effects[: len(effects)]:
