@@ -123,7 +123,7 @@ def test_the_form_of_the_friction_is_written_as_laws_that_foretell_another_manoe
 
 
 def test_errors_of_the_model_do_not_lead_a_vehicle_file_away_from_its_sheet() -> None:
-    """The sheet is that of the vehicle, whose friction has another form: by the noise of the sensors alone, all values would go far from it,
+    """The sheet is that of the vehicle, whose friction has another form: by the noise of the sensors alone, values would go far from it,
     and the rubber would begin 16 K warmer; beside the errors of the model they stay nearer."""
     done = rubbed()
     near, far = done.problem.vehicle, apply_calibration(done.problem.vehicle, done.problem, done.found.baseline.x)
