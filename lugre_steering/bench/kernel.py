@@ -223,7 +223,9 @@ def each_effect() -> list[Row]:
     for effect in CATALOGUE.values():
         if effect.hooks and not effect.per_line:
             tasks[effect.id] = composed(EffectEntry(effect.id, {p.name: p.typical for p in effect.parameters}))
-    return [_row(name, seconds, time.size, None, np.zeros(2)) for name, seconds in by_turns(tasks, 40).items()]
+    best = by_turns(tasks, 40)
+    order = [BASELINE, *sorted(best.keys() - {BASELINE}, key=lambda name: -best[name])]
+    return [_row(name, best[name], time.size, None, np.zeros(2)) for name in order]
 
 
 def _neutral(p: Records) -> Records:

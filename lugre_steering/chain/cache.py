@@ -27,7 +27,8 @@ from pathlib import Path
 from typing import IO, Any
 
 import numba
-from numba.core import bytecode, caching, ccallback, dispatcher, event
+from numba.core import bytecode, caching, ccallback, dispatcher
+from numba.core import event as events
 
 _SEAL = hashlib.sha256
 _SEAL_BYTES = _SEAL().digest_size
@@ -128,21 +129,21 @@ class _Forms(caching.CompileResultCacheImpl):
     _locator_classes = [_ByContent]  # noqa: RUF012 (as Numba has it)
 
 
-class _Uncollected(event.Listener):
+class _Uncollected(events.Listener):
     """No garbage collection while Numba compiles this package: of the millions of objects that it makes nearly all live until it is
     done, and to look through them takes an eighth of its time."""
 
     def __init__(self) -> None:
         self._depth, self._was_on = 0, False
 
-    def on_start(self, event: event.Event) -> None:
+    def on_start(self, event: events.Event) -> None:
         if _is_ours(event.data["dispatcher"].py_func):
             if self._depth == 0:
                 self._was_on = gc.isenabled()
                 gc.disable()
             self._depth += 1
 
-    def on_end(self, event: event.Event) -> None:
+    def on_end(self, event: events.Event) -> None:
         if _is_ours(event.data["dispatcher"].py_func):
             self._depth -= 1
             if self._depth == 0 and self._was_on:
@@ -212,7 +213,7 @@ def keep_safely() -> None:
         _tell(f"compiled code cannot be kept in {_folder() or 'any folder'}: every start compiles")
         return caching.NullCache()
 
-    event.register("numba:compile", _Uncollected())
+    events.register("numba:compile", _Uncollected())
     bytecode.FunctionIdentity._unique_ids = iter(lambda: secrets.randbits(64), None)  # type: ignore[assignment]
     ccallback.FunctionCache = dispatcher.FunctionCache = cache_of  # type: ignore[attr-defined]
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.experimental import structref
 
+from lugre_steering.chain.compiled import njit
 from lugre_steering.chain.step import Records
 from lugre_steering.estimator.layout import Core
 from lugre_steering.recording import Array, IntArray

@@ -209,18 +209,30 @@ def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling(
     assert found is not None
     assert 0.3 < found.foretold / found.ceiling < 0.9
     assert described(found)[0]["share_of_ceiling"] == found.foretold / found.ceiling
-    assert found.doubt > 10.0  # what is left of the wave is large and lasts: so much less is f known than from white noise
-    band, bare = (np.array(described(each)[0]["f"]["band"]) for each in (found, replace(found, doubt=1.0)))
-    assert np.allclose(band, np.sqrt(found.doubt) * bare)
+
+
+def wandering_for_seconds(size: int, seed: int) -> Array:
+    """Errors (size,) of unit deviation that last two seconds."""
+    slow = lfilter([1.0], [1.0, -np.exp(-1.0 / (2.0 * 40.0))], np.random.default_rng(seed).standard_normal(size))
+    return np.asarray(slow / np.std(slow))
+
+
+def test_the_band_of_a_law_holds_it_where_errors_last() -> None:
+    """A periodic torque below errors that wander for seconds, four times as large as those of the sensors."""
+    hidden = by_run(lambda run: np.sum(900.0 * np.sin(2.0 * np.pi * run.theta / 0.3), axis=0))
+    _, found = searched(hidden + 4.0 * SIGMA * wandering_for_seconds(hidden.size, 2))
+    assert found is not None
+    at, f, band = (np.array(described(found)[0]["f"][key]) for key in ("at", "f", "band"))
+    assert np.mean(np.abs(f - 900.0 * np.sin(2.0 * np.pi * at / 0.3)) < band) > 0.9
+    assert np.median(band) < 450.0  # and says more than that nothing is known
 
 
 @pytest.mark.parametrize(("wandering", "sure"), [(0.0, True), (15.0, False)])
 def test_a_law_takes_more_than_one_more_of_the_errors_that_are_left(wandering: float, sure: bool) -> None:
     """A spring beyond an angle, alone and where a torque that wanders for seconds is left that is several times as large."""
     spring = by_run(lambda run: np.sum(4e3 * np.maximum(run.theta - 0.1, 0.0), axis=0))
-    steps = np.random.default_rng(11).standard_normal(spring.size)
-    slow = lfilter([1.0], [1.0, -np.exp(-1.0 / (2.0 * 40.0))], steps)
-    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + spring + wandering * SIGMA * slow / np.std(slow))
+    slow = wandering * SIGMA * wandering_for_seconds(spring.size, 11)
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + spring + slow)
     room = Problem(problem.vehicle, problem.runs, more_laws=1)
     cell = Cell("conservative_torque", Axis("angle"), -0.3, 0.3)
     law = closed_law(room, cell, 0, "hinge", {"value": 0.0, "below": 0.0}, {"at": 0.1, "above": 4e3})

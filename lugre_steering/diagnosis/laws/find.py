@@ -12,11 +12,10 @@ import numpy as np
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
-from lugre_steering.diagnosis.laws.refine import FITTED, PER_VALUE, Law, free_law, law_of, simplified, with_law
+from lugre_steering.diagnosis.laws.refine import FITTED, NUMBER_COSTS, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
-from lugre_steering.diagnosis.search.compare import PER_VALUE as FREE_VALUE
-from lugre_steering.diagnosis.search.compare import SURE
+from lugre_steering.diagnosis.search.compare import PER_VALUE, SURE
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
@@ -142,7 +141,7 @@ def _sure(there: Finished, found: Fit, names: int) -> bool:
     fitted = fit(problem, there.fitted, found.effects, x, linearisations=6)
     taken = fit(problem, there.fitted, found.effects[:names], fitted.x, linearisations=6).cost - fitted.cost
     values = sum(len(candidate.free) for candidate, _ in found.effects[names:])
-    return taken > (SURE + FREE_VALUE * values) * doubt(problem, fitted, there.fitted)
+    return taken > (SURE + PER_VALUE * values) * doubt(problem, fitted, there.fitted)
 
 
 def _with_places(problem: Problem, before: Fit) -> Problem:
@@ -191,7 +190,7 @@ def preferred(tried: Sequence[Tried], before: float) -> list[Tried]:
     gain = before - min(each.fit.cost for each in tried)
 
     def price(each: Tried) -> float:
-        return PER_VALUE * each.values + TIED * (cell_of(each).axis.coordinate in ONCE)
+        return NUMBER_COSTS * each.values + TIED * (cell_of(each).axis.coordinate in ONCE)
 
     return sorted(tried, key=lambda each: each.fit.cost + gain * price(each))
 

@@ -20,7 +20,7 @@ from lugre_steering.recording import Array
 
 KEPT = 0.95
 """Share of the free gain that a closed form must keep."""
-PER_VALUE = 0.01
+NUMBER_COSTS = 0.01
 """Share of the gain that one more value of a law must bring to be preferred."""
 PULL = 0.03
 """How strongly fits pull the free pieces to zero, for those that the data do not show."""
@@ -230,7 +230,7 @@ def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: i
     gain = before.cost - free.cost
     trials = closed_forms(cell, np.array([values[name] for name in names]), free.covariance[part, part])
     promising = [trial for trial in trials if trial[0] < (1.0 - KEPT) * gain * 2.0]
-    for _, form, fixed, start in sorted(promising, key=lambda trial: trial[0] + PER_VALUE * gain * len(trial[3]))[:TRIED_FORMS]:
+    for _, form, fixed, start in sorted(promising, key=lambda trial: trial[0] + NUMBER_COSTS * gain * len(trial[3]))[:TRIED_FORMS]:
         law_here = closed_law(problem, cell, place, form, fixed, start)
         closed = with_law(problem, weight, dataclasses.replace(before, x=free.x), law_here)
         if before.cost - closed.cost >= KEPT * gain:

@@ -264,8 +264,8 @@ def _in_place(
     exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
     if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
-    current, named = _settled_in(exact, weight, free.effects, free.x), left(there, free) - SURE * there.doubt
-    while left(exact, current) > named:
+    current, clearly_less = _settled_in(exact, weight, free.effects, free.x), left(there, free) - SURE * there.doubt
+    while left(exact, current) > clearly_less:
         own = _round(exact, noise, weight, current, True, progress) if len(found) < MAX_EFFECTS else None
         if own is None or not own.trials:
             return None
