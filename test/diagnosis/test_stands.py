@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude.stands import _clock, _of_one_vehicle, _tested
+from lugre_steering.diagnosis.conclude.stands import _clock, _missed_by, _of_one_vehicle, _tested
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Found, Search
 from lugre_steering.fitting.fingerprint import Score
@@ -77,3 +77,14 @@ def test_names_that_no_recording_shows_together_do_not_stand(
 ) -> None:
     names = [replace(SLOPE[0], bags=first), replace(effect("kingpin_jacking", amplitude=1.0)[0], bags=second)]
     assert _of_one_vehicle(names, 2) == stand
+
+
+@pytest.mark.parametrize(("hidden_in", "missed"), [((0, 1), False), ((0,), True)])
+def test_a_late_name_that_one_recording_contradicts_does_not_stand(hidden_in: tuple[int, ...], missed: bool) -> None:
+    """Said to act in both from an instant on, it is hidden in both or in one alone."""
+    candidate, values = effect("slope_bias", torque=400.0)
+    since = tuple(float(run.time[0]) + 20.0 for run in NOTHING.runs)
+    there = replace(candidate, since=tuple(start if bag in hidden_in else np.inf for bag, start in enumerate(since)))
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start(), [(there, values)]))
+    said = [(replace(candidate, since=since, free=()), values)]
+    assert _missed_by(problem, fit(problem, weight(problem)), fit(problem, weight(problem), said)) == missed

@@ -26,14 +26,16 @@ from lugre_steering.diagnosis.laws.rival import (
 )
 from lugre_steering.diagnosis.result import Verdict
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
-from lugre_steering.fitting.fit import fit
-from lugre_steering.fitting.problem import Candidate, is_rig
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Candidate, Problem, is_rig
 from lugre_steering.fitting.sheet import LEVELS, at_bounds
 
 SURELY = 2.0
 """Standard deviations by which a delay must be longer than those of clocks, where stamps are given on receipt."""
 CONTRADICTED = 0.02
 """Growth of the held-out error that overrules a name."""
+FAR_WORSE = 2.0**0.5
+"""Growth of the error in one recording, from the instant of a late name on, that overrules it: twice the energy."""
 
 
 class Apart(NamedTuple):
@@ -113,8 +115,22 @@ def _tested(done: Finished, seed: int) -> _Tested:
     harmless = max(judged.gain, -np.inf if form is None else form.judged.gain) > -CONTRADICTED
     surely = beside.interval[0] > 0.0 or (judged.interval[0] > 0.0 and beside.interval[1] > 0.0)
     together = _of_one_vehicle([candidate for candidate, _ in found.final.effects], len(problem.runs))
-    named = bool(found.found) and harmless and surely and clock is None and not stuck and together
+    there_too = not _missed_by(problem, found.baseline, found.final)
+    named = bool(found.found) and harmless and surely and clock is None and not stuck and together and there_too
     return _Tested(named, clock, judged, form)
+
+
+def _missed_by(problem: Problem, baseline: Fit, final: Fit) -> bool:
+    """Whether a late name makes far worse what it is said to act on in one of the recordings: then another one's event named it."""
+    time = np.concatenate([run.time for run in problem.runs])
+    for candidate, _ in final.effects:
+        for bag, start in enumerate(candidate.since):
+            after = problem.valid & (problem.bag == bag) & (time > start)
+            if not candidate.active_in(bag) or not after.any():
+                continue
+            if verify.rmse(problem, final, after) > FAR_WORSE * verify.rmse(problem, baseline, after):
+                return True
+    return False
 
 
 def _of_one_vehicle(names: Sequence[Candidate], bags: int) -> bool:
