@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import os
 import signal
 import sys
 import tempfile
@@ -29,7 +28,7 @@ import numpy as np
 import yaml
 
 from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
-from lugre_steering.bench.neighbour import SECOND, NodeProcess
+from lugre_steering.bench.neighbour import SECOND, NodeProcess, use_own_domain
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.diagnosis.library import diagnose
 from lugre_steering.proof.field.hydraulics import gains
@@ -284,7 +283,7 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--out", type=Path, help="file of the picture (.png)")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args(argv)
-    os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
+    use_own_domain()
     runs = campaign(options.seed, options.seconds)
     _tell(runs, options.json)
     if options.out is not None:

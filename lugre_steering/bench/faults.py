@@ -14,7 +14,6 @@ import argparse
 import itertools
 import json
 import math
-import os
 import signal
 import sys
 import tempfile
@@ -27,7 +26,16 @@ from typing import Any
 
 import numpy as np
 
-from lugre_steering.bench.neighbour import NO_TEXT, SECOND, Fault, Neighbour, NodeProcess, Sample, as_it_is
+from lugre_steering.bench.neighbour import (
+    NO_TEXT,
+    SECOND,
+    Fault,
+    Neighbour,
+    NodeProcess,
+    Sample,
+    as_it_is,
+    use_own_domain,
+)
 from lugre_steering.estimator import Estimator
 from lugre_steering.recording import NODE, Kind
 from lugre_steering.resources import config_folder
@@ -491,7 +499,7 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args(argv)
-    os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
+    use_own_domain()
     scores: list[Score] = []
     others: dict[str, Any] = {}
     if not options.json:

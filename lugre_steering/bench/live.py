@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.bench.neighbour import use_own_domain
 from lugre_steering.recording import Array, Kind
 from lugre_steering.resources import config_folder
 from lugre_steering.serialise import as_json
@@ -258,8 +259,7 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--rounds", type=int, default=5, help="runs of node and echo, by turns; the ratio of their p99 is a median")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args(argv)
-    # Alone on a DDS domain of its own.
-    os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
+    use_own_domain()
     results = []
     if not options.json:
         print(LEGEND)

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.bench.live import eight_lines, observe, serve
-from lugre_steering.bench.neighbour import SECOND, STEP_S, Strokes
+from lugre_steering.bench.neighbour import SECOND, STEP_S, Strokes, use_own_domain
 from lugre_steering.estimator import Estimator
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.vehicle import save
@@ -128,7 +128,7 @@ def run(argv: list[str]) -> None:
     parser.add_argument("--samples", type=int, default=10_000_000, help="in compressed time")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the lines")
     options = parser.parse_args(argv)
-    os.environ["ROS_DOMAIN_ID"] = str(10 + os.getpid() % 90)
+    use_own_domain()
     result = {"compressed": compressed(options.samples, 1), "live": live(options.rate, 60.0 * options.minutes)}
     if options.json:
         json.dump(result, sys.stdout, indent=2)

@@ -37,7 +37,9 @@ from lugre_steering.vehicle import Vehicle, load
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 VEHICLE = PACKAGE_ROOT / "config" / "test_vehicle.yaml"
-DOMAIN = 1 + os.getpid() % 100
+DOMAIN = 1 + os.getpid() % 50
+OWN_DOMAIN = DOMAIN + 50
+"""Of nodes that run in the process of the tests: what stays of one whose context was shut down is no namesake of the next."""
 START_TIMEOUT_S = 240.0  # a first start compiles
 PATIENCE_S = 60.0
 """What is waited for comes at once where nothing is wrong, and at last on a machine that is busy with all other tests."""

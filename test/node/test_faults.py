@@ -19,7 +19,7 @@ from lugre_steering.bench.soak import compressed
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Iterator[faults.Campaign]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", "78")
+        patch.setenv("ROS_DOMAIN_ID", "101")
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         patch.setenv("PYTHONPATH", str(Path(faults.__file__).parents[2]))
         made = faults.Campaign(tmp_path_factory.mktemp("campaign"), 1)

@@ -19,7 +19,7 @@ pytest.importorskip("rclpy")
 
 import rclpy
 from geometry_msgs.msg import WrenchStamped
-from live_harness import DOMAIN, PATIENCE_S, VEHICLE
+from live_harness import OWN_DOMAIN, PATIENCE_S, VEHICLE
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -55,7 +55,7 @@ def arguments(folder: Path) -> list[str]:
 @pytest.fixture
 def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SteeringTorqueEstimator]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    rclpy.init(args=arguments(tmp_path), domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments(tmp_path), domain_id=OWN_DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
     made = SteeringTorqueEstimator()
     try:
         yield made
@@ -230,7 +230,7 @@ def test_a_context_that_others_shut_down_costs_no_state(tmp_path: Path, monkeypa
         return True
 
     monkeypatch.setattr(run, "spin", spin)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(OWN_DOMAIN))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     assert run.run(["estimator", *arguments(tmp_path)]) == 0
     memory = read_state(tmp_path / "state" / "s.json", load(VEHICLE), time.time_ns(), 60.0)
@@ -248,7 +248,7 @@ def test_a_context_that_ends_while_it_spins_ends_the_node(executor: str, tmp_pat
         return real(node, *given)
 
     monkeypatch.setattr(run, "spin", spin)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(OWN_DOMAIN))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     try:
         assert run.run(["estimator", *arguments(tmp_path), "-p", f"executor:={executor}"]) == 0

@@ -97,9 +97,9 @@ def test_stamps_are_moved_and_nothing_else() -> None:
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """ROS in this process, heard by nobody else."""
     pytest.importorskip("rclpy")
-    from live_harness import DOMAIN
+    from live_harness import OWN_DOMAIN
 
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(OWN_DOMAIN))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 
