@@ -67,8 +67,8 @@ def bent(problem: Problem, fitted: Fit) -> Bent:
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
     words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
-    freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
-    return Bent(freer.bent([still_apart(problem, base)]), words, tuple(freedoms))
+    columns.append(still_apart(problem, base))
+    return Bent(Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns)), words, tuple(freedoms))
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:

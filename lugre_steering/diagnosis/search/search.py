@@ -28,6 +28,7 @@ from lugre_steering.diagnosis.search.compare import (
     tied,
     worlds,
 )
+from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
@@ -410,6 +411,6 @@ def _shaped(plain: Problem, problem: Problem, current: Fit, names: Iterable[int]
     shapes = [flexible.bends(problem, current, i) for i in names]
     columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
     if plain.bends.shape[1]:
-        columns.append(still_apart(problem, current.prediction))
+        columns.append(still_apart(problem, sum((contribution(problem, current, i) for i in names), np.zeros(problem.measured.size))))
     shaped = plain.bent(columns)
     return shaped, np.append(current.x[: plain.nuisances], np.zeros(shaped.nuisances - plain.nuisances))
