@@ -21,11 +21,19 @@ from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.left_over import beside_laws
 from lugre_steering.diagnosis.conclude.stands import standing
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws import rival
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _sure, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
-from lugre_steering.diagnosis.laws.rival import beside_form, in_place, in_place_of_one, keeps_names, leaves_names
+from lugre_steering.diagnosis.laws.rival import (
+    beside_form,
+    evident,
+    in_place,
+    in_place_of_one,
+    keeps_names,
+    leaves_names,
+)
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
@@ -174,6 +182,16 @@ def test_a_law_below_the_noise_is_told_by_its_evidence_alone(share: float, verdi
         told = beside_laws(named(found.problem, found.fitted), stands.left, found.fitted, found.names, "a law", "f").entry
         assert told.structured
         assert told.where
+
+
+@pytest.mark.parametrize(("known", "stands"), [("angle", False), ("abs_rate", True)])
+def test_friction_along_what_its_own_law_depends_on_is_no_law_where_nothing_is_loud(known: str, stands: bool) -> None:
+    """A loss beyond an angle, however evident: it is the form of the friction law, where that may be another along the angle."""
+    problem, found = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
+    assert found is not None
+    assert entries(found)[0].coordinate == "angle"
+    freedom = Freedom("its level along the ground", "friction_level", known, -0.3, 0.3, np.zeros((1, 2)))
+    assert evident(replace(named(problem, fitted(problem)), freedoms=(freedom,)), found) == stands
 
 
 def test_of_laws_that_tie_the_one_that_can_happen_again_is_preferred() -> None:

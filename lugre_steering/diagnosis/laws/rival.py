@@ -11,7 +11,9 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.laws.cells import Axis
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, with_freedoms
+from lugre_steering.diagnosis.laws.refine import law_of
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
 from lugre_steering.fitting.doubt import doubt
@@ -20,6 +22,10 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.sheet import at_bounds
 from lugre_steering.recording import Array
 
+OPPOSING = (
+    "friction_level", "presliding_stiffness", "coulomb_friction", "load_friction", "viscous_loss", "turbulent_loss", "gain",
+)  # fmt: skip
+"""Channels whose torque is against the motion, as friction is."""
 TRUER = 0.5
 """Share of what another model leaves beyond noise that one must leave at most to be far truer."""
 
@@ -33,7 +39,12 @@ def room_for_laws(done: Finished) -> bool:
 
 
 def evident(done: Finished, alone: FoundLaws) -> bool:
-    """Whether laws take as much as a name must, beside the same freedoms: where what is left is not loud, only that tells of them."""
+    """Whether laws take as much as a name must, beside the same freedoms, and are no more of these: where what is left is not loud, only
+    that tells of them, and friction along what its own law depends on is of that form which is not known."""
+    free = {Axis(freedom.coordinate) for freedom in done.compared.freedoms}
+    cells = [law_of(candidate.effect).cell for candidate, _ in alone.fitted.effects[alone.names :]]
+    if any(cell.channel in OPPOSING and cell.axis in free for cell in cells):
+        return False
     problem, weight, fitted = beside_form(done, alone)
     mine, base = _energies(done, [(problem, weight, fitted)])
     return base - mine > needed(*settled(problem, weight, fitted), weight)
