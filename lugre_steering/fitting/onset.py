@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -35,15 +36,16 @@ def suggested(problem: Problem, error: Array) -> tuple[float, ...]:
 
 def timed(problem: Problem, weight: Array, result: Fit, index: int) -> tuple[float, ...]:
     """The instants from which effect ``index`` of a fit explains most, one per bag; infinity where it never does."""
-    left = _left(problem, weight, result, index)
+    late = _Late(problem, weight, result, index)
     since = list(result.effects[index][0].since)
     for bag, run in enumerate(problem.runs):
 
         def here(start: float, bag: int = bag) -> float:
-            return left((*since[:bag], start, *since[bag + 1 :]))
+            return late.left((*since[:bag], start, *since[bag + 1 :]))
 
         grid, step = np.linspace(run.time[0], run.time[-1], INSTANTS, endpoint=False, retstep=True)
-        best = min([*grid, since[bag], np.inf], key=here)
+        sharp = float(run.time[np.argmin(late.at_each(since, bag, float(run.time[0])))])
+        best = min([*grid, sharp, since[bag], np.inf], key=here)
         if np.isfinite(best):
             near = minimize_scalar(here, bounds=(best - step, best + step), method="bounded", options={"xatol": 0.1})
             best = min([best, float(near.x)], key=here)
@@ -83,7 +85,7 @@ def undetermined(problem: Problem, weight: Array, result: Fit) -> Mask:
                 unsure[problem.edges[bag] : problem.edges[bag + 1]] |= _between(problem.runs[bag].time, first, last)
         if not candidate.since:
             continue
-        left = _left(problem, weight, result, index)
+        left = _Late(problem, weight, result, index).left
         for bag, start in enumerate(candidate.since):
             run = problem.runs[bag]
             alike = _alike(left, candidate.since, bag)
@@ -129,26 +131,42 @@ def _span_of(alike: Callable[[float], bool], low: float, high: float, start: flo
     return ends[0], ends[1]
 
 
-def _left(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[[Sequence[float]], float]:
-    """Energy left over as a function of the instants, once the size of the effect and all else fitted have followed them.
+class _Late:
+    """Energy left over as a function of the instants from which an effect of a fit acts, once its size and all else have followed them.
 
     To first order: errors without the effect, projected off the other columns of the Jacobian and its own trace from the instant.
     """
-    candidate, values = result.effects[index]
-    basis, without, bare = _bare(problem, weight, result, index)
 
-    @lru_cache(maxsize=64)
-    def trace(bag: int, start: float) -> Array:
-        instants = (start,) * len(problem.runs)  # those of other bags do not matter here
-        effects = [*result.effects]
-        effects[index] = (replace(candidate, since=instants), values)
-        part = slice(problem.edges[bag], problem.edges[bag + 1])
-        return np.asarray((problem.predict(bag, result.x, effects) - without[bag]) * weight[part])
+    def __init__(self, problem: Problem, weight: Array, result: Fit, index: int) -> None:
+        basis, without, bare = _bare(problem, weight, result, index)
+        candidate, values = result.effects[index]
+        parts = [slice(a, b) for a, b in pairwise(problem.edges)]
 
-    def left(since: Sequence[float]) -> float:
-        return _beyond(bare, _projected(basis, np.concatenate([trace(bag, start) for bag, start in enumerate(since)])))
+        @lru_cache(maxsize=64)
+        def trace(bag: int, start: float) -> Array:
+            instants = (start,) * len(problem.runs)  # those of other bags do not matter here
+            effects = [*result.effects]
+            effects[index] = (replace(candidate, since=instants), values)
+            return np.asarray((problem.predict(bag, result.x, effects) - without[bag]) * weight[parts[bag]])
 
-    return left
+        self._basis, self._bare, self._parts, self._trace = basis, bare, parts, trace
+
+    def left(self, since: Sequence[float]) -> float:
+        own = np.concatenate([self._trace(bag, start) for bag, start in enumerate(since)])
+        return _beyond(self._bare, _projected(self._basis, own))
+
+    def at_each(self, since: Sequence[float], bag: int, first: float) -> Array:
+        """The same with each sample of a bag as its instant, of what acts there as it does if it is there from the ``first`` one."""
+        others = [self._trace(i, start) if i != bag else np.zeros_like(self._bare[self._parts[bag]]) for i, start in enumerate(since)]
+        rest, own, part = np.concatenate(others), self._trace(bag, first), self._parts[bag]
+
+        def from_each(values: Array) -> Array:
+            return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+
+        along = rest @ self._bare + from_each(own * self._bare[part])
+        known = rest @ self._basis + from_each(own[:, None] * self._basis[part])
+        size = rest @ rest + from_each(own**2) - np.sum(known**2, axis=1)
+        return np.asarray(self._bare @ self._bare - np.maximum(along, 0.0) ** 2 / np.maximum(size, 1e-18))
 
 
 def _left_by_values(problem: Problem, weight: Array, result: Fit, index: int) -> Callable[[Values], float]:

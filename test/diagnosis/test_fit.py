@@ -161,6 +161,20 @@ def test_wrong_signs_are_no_physics() -> None:
     assert wrong.visible == right.visible == pytest.approx(10.0)  # its detection limit is the same
 
 
+def test_all_instants_at_once_are_told_as_each_is_alone(problem: Problem) -> None:
+    """Of an effect that remembers nothing; strokes end between instants that are tried one by one."""
+    late, values = effect("line_loss_linear", b=4e3)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [(replace(late, since=(31.0, 12.0)), values)]))
+    since = (40.0, 12.0)
+    trials = onset._Late(hidden, weight(hidden), fit(hidden, weight(hidden), [(replace(late, since=since), values)]), 0)
+    time = hidden.runs[0].time
+    each = trials.at_each(since, 0, float(time[0]))
+    some = np.arange(0, time.size, 97)
+    alone = np.array([trials.left((float(time[i]), 12.0)) for i in some])
+    assert each[some] == pytest.approx(alone, abs=1e-3 * np.ptp(alone))
+    assert float(time[np.argmin(each)]) == pytest.approx(31.0, abs=0.5)
+
+
 def test_an_onset_that_the_fitted_data_hardly_see_is_called_undetermined(problem: Problem) -> None:
     roles = split(problem)
     candidate, values = effect("slope_bias", torque=400.0)

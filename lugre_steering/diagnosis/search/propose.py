@@ -103,6 +103,22 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
     return Proposal(problem, current, seen[0].scores, ranked(_one_of_each(trials, current.cost), current.cost))
 
 
+def in_its_place(problem: Problem, weight: Array, seen: Proposal, leads: Trial) -> list[Trial]:
+    """Known rivals of what leads that nobody has tried to the end, from where it stands: all else is known there, as it was not before."""
+    *earlier, (champion, _) = leads.fit.effects
+    wanted = {*champion.effect.rivals} - {trial.candidate.effect.id for trial in seen.trials}
+    alike = [score for score in seen.scores if (score.candidate.bags, bool(score.candidate.since)) == (champion.bags, bool(champion.since))]
+    found = []
+    for name in sorted(wanted):
+        own = max((score for score in alike if score.candidate.effect.id == name), key=lambda score: score.explained, default=None)
+        if own is None or own.explained < LEADING * leads.score.explained:
+            continue
+        effects = [*earlier, (replace(own.candidate, since=champion.since), own.values)]
+        tried = fit(problem, weight, effects, leads.fit.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
+        found.append(refine(problem, weight, Trial(own, tried, tried.cost)))
+    return found
+
+
 def _one_of_each(trials: Sequence[Trial], before: float) -> list[Trial]:
     """Of what worlds claim of different recordings the simpler, unless the other takes clearly more of the energy ``before``."""
     chosen: dict[tuple[str, ...], Trial] = {}

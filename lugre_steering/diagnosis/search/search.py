@@ -18,6 +18,7 @@ from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
     SIZES,
     SURE,
+    TIE,
     as_far_as_it_may,
     clearest,
     left,
@@ -29,7 +30,7 @@ from lugre_steering.diagnosis.search.compare import (
     worlds,
 )
 from lugre_steering.diagnosis.search.locate import contribution
-from lugre_steering.diagnosis.search.propose import Proposal, closer, proposed
+from lugre_steering.diagnosis.search.propose import Proposal, closer, in_its_place, proposed
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
@@ -38,7 +39,7 @@ from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, refine
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -104,6 +105,8 @@ def search(
             problem, baseline = step.instead.problem, step.instead.current
         plain = problem.doubted(there.doubt, there.typical)
         there, found, current = (there, both, step.fit) if step.short else _pruned(plain, there, weight, both, step.fit)
+        if len(found) < len(both):
+            found[-1] = _told(found[-1], _rivals(there, noise, weight, split, current, found[-1], len(found) - 1))
         now, current = _freed(plain, there, weight, current, given)
         if waiting and len(found) < len(both):
             break
@@ -222,10 +225,10 @@ def _closest(
     """The best of all proposed beside ``current``, after a closer look in ``those`` worlds: the simplest that ties, with its rivals."""
     seen = [closer(world, weight, seen) for world in those]
     own = closer(clearest(weight, seen)[0], weight, seen)
-    rivals = tied(own.problem, weight, split, own.trials[0], own.trials[1:], own.before)
-    chosen, rivals = simplest(own.trials[0], rivals, own.before, own.problem.doubt)
-    there, best = settled(own.problem, weight, chosen.fit)
-    return there, best, Found(chosen.score, _names(rivals), tuple(own.trials), _taken(there, weight, current, best))
+    best, *others = (*own.trials, *in_its_place(own.problem, weight, own, own.trials[0]))
+    chosen, rivals = simplest(best, tied(own.problem, weight, split, best, others, own.before), own.before, own.problem.doubt)
+    there, result = settled(own.problem, weight, chosen.fit)
+    return there, result, Found(chosen.score, _names(rivals), (best, *others), _taken(there, weight, current, result))
 
 
 def _everywhere(problem: Problem, weight: Array, current: Fit, names: Sequence[Found]) -> Fit:
@@ -350,14 +353,15 @@ def _beside_given(problem: Problem, noise: Noise, weight: Array, without: Fit, g
 
 
 def _again(problem: Problem, weight: Array, beside: Fit, trial: Trial, champion: Candidate) -> Trial:
-    """An effect with all parts that its law had when it was tried, beside what a fit has; one that acted in part of the recordings does so
-    where the ``champion`` does now."""
+    """An effect with all parts that its law had when it was tried, and what others it needs now that more is known, beside what a fit has;
+    one that acted in part of the recordings does so where the ``champion`` does now."""
     candidate, values = trial.fit.effects[-1]
     if candidate.bags is not None or candidate.since:
         candidate = replace(candidate, bags=champion.bags, since=champion.since)
     effects = [*beside.effects, (candidate, values)]
     fitted = fit(problem, weight, effects, beside.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
-    return Trial(trial.score, fitted, fitted.cost)
+    again = Trial(trial.score, fitted, fitted.cost)
+    return again if fitted.cost < beside.cost + TIE * problem.doubt else refine(problem, weight, again)
 
 
 def _without_own_bends(
@@ -394,8 +398,10 @@ def _pruned(
         without = fit(bare, weight, rest, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
         if without.cost - current.cost < needed(problem, current, weight):
             dropped = kept.pop(index)
-            # Together they explained what the latest now explains alone.
-            kept[-1] = replace(kept[-1], gain=kept[-1].gain + dropped.gain)
+            # Together they explained what the latest now explains alone, or one that was tied with what goes.
+            last, own = kept[-1], kept[-1].score.candidate.effect.id
+            rivals = dict.fromkeys(name for name in (*last.rivals, dropped.score.candidate.effect.id, *dropped.rivals) if name != own)
+            kept[-1] = replace(last, gain=last.gain + dropped.gain, rivals=tuple(rivals), trials=(*last.trials, *dropped.trials))
             problem, current = bare, without
     return problem, kept, current
 
