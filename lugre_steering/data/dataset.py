@@ -28,6 +28,10 @@ AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
 
 
+CLOCK_S = 1e-3
+"""What is left of an offset between clocks after it was measured: they wander."""
+
+
 @dataclass(frozen=True)
 class Run:
     """One bag, resampled on a uniform clock of n samples; sides first, lines second, time last.
@@ -61,6 +65,8 @@ class Run:
     """Step of each pressure sensor [Pa] (lines,) that its noise does not dither; 0 elsewhere, empty if none has one."""
     on_receipt: bool = False
     """Whether stamps were late by chance: given on receipt, they do not know when the devices measured."""
+    clock_s: float = CLOCK_S
+    """Standard deviation of what torque and angles may still be apart once their clocks are set."""
 
     @property
     def torque_per_line(self) -> Array:

@@ -18,7 +18,7 @@ from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.refine import given_law
 from lugre_steering.effects import laws
-from lugre_steering.fitting.clocks import still_apart
+from lugre_steering.fitting.clocks import still_apart, still_unknown
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
@@ -66,9 +66,10 @@ def bent(problem: Problem, fitted: Fit) -> Bent:
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
-    words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in bags))
     columns.append(still_apart(problem, base))
-    return Bent(Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns)), words, tuple(freedoms))
+    words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in (*bags, *bags)))
+    freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
+    return Bent(freer.bent([still_unknown(problem, base)]), words, tuple(freedoms))
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import math
-
-from lugre_steering.chain.compiled import law
+from lugre_steering.chain.compiled import law, tanh
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.signs import SIGN_RATE_RAD_S
 
@@ -14,7 +12,7 @@ from lugre_steering.effects.signs import SIGN_RATE_RAD_S
 @law
 def loss(omega, sides, torque, flow, rate_scale, angle_unit):
     """torque (1 + flow |omega|) sgn(omega) [N m]: opposes motion, vanishes at rest, grows with the return flow."""
-    return torque / sides * math.tanh(omega / (SIGN_RATE_RAD_S * angle_unit + rate_scale)) * (1.0 + flow * abs(omega))
+    return torque / sides * tanh(omega / (SIGN_RATE_RAD_S * angle_unit + rate_scale)) * (1.0 + flow * abs(omega))
 
 
 EFFECT = Effect(

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import math
-
-from lugre_steering.chain.compiled import exp, law
+from lugre_steering.chain.compiled import exp, law, tanh
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.signs import SIGN_RATE_RAD_S
 
@@ -22,7 +20,7 @@ def loss(load, omega, turned, sides, coulomb, load_share, viscous, holding, brea
     The share ``holding`` of it is kept at rest by the seals; ``breakaway`` raises it at low rate (Stribeck); the sign
     changes over ``rate_scale``.
     """
-    moving = math.tanh(omega / (SIGN_RATE_RAD_S * angle_unit + rate_scale))
+    moving = tanh(omega / (SIGN_RATE_RAD_S * angle_unit + rate_scale))
     seal = max(-1.0, min(1.0, seal + turned / (SEAL_TRAVEL_RAD * angle_unit)))
     level = (coulomb / sides + load_share * abs(load)) * (1.0 + breakaway * exp(-((omega / STRIBECK_RAD_S) ** 2)))
     return viscous * omega + level * (holding * seal + (1.0 - holding) * moving), seal

@@ -21,8 +21,8 @@ def heat_out(temperature, energy, dt, time_constant, saturation_power, power):
     """The low-passed power P / sqrt(1 + P / saturation_power) for the next step; the rubber itself is not changed."""
     if dt > 0.0:
         decay = exp(-dt / time_constant)
-        now = energy / dt
-        now /= math.sqrt(1.0 + now / saturation_power)
+        now = energy * (1.0 / dt)  # no division waits for another: the energy is known last
+        now /= math.sqrt(1.0 + now * (1.0 / saturation_power))
         power = now + (power - now) * decay
     return temperature, power
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.dataset import CLOCK_S, prepare
 from lugre_steering.data.stamps import with_even_stamps
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Candidate, Effects, Problem, SheetValue, is_rig
+from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, SheetValue, is_rig
 from lugre_steering.fitting.split import CLUSTER_S
 from lugre_steering.recording import Array, Finding, Kind, Recording
 from lugre_steering.vehicle import Vehicle
@@ -37,7 +37,8 @@ ODDS = 3.0
 """Of one delay against clocks that happen to agree, from which it is one."""
 WORTH_SAYING_S = 2e-3
 APART_S = 0.015
-"""How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form."""
+"""How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form than the friction
+has: where it is the recording's own, they are not."""
 ROUNDS = 6
 SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
@@ -78,6 +79,11 @@ def synchronised(
         runs = [prepare(earlier(recording, float(shift)), vehicle) for recording, shift in zip(recordings, shifts, strict=True)]
         return Problem(vehicle, [replace(run, on_receipt=late) for run, late in zip(runs, received, strict=True)], calibrations)
 
+    def known(set_so: Synchronised, deviation: Array, least: float = CLOCK_S) -> Synchronised:
+        sure = np.clip(deviation, least, TYPICAL * APART_S)
+        runs = [replace(run, clock_s=float(own)) for run, own in zip(set_so.problem.runs, sure, strict=True)]
+        return replace(set_so, problem=Problem(vehicle, runs, calibrations))
+
     problem = prepared(np.zeros(len(recordings)))
     as_stamped = Synchronised(problem, np.zeros(len(recordings)), {})
     if is_rig(vehicle):  # its inertia, which the sheet lacks, would pass for an offset
@@ -86,25 +92,26 @@ def synchronised(
         return as_stamped
     start = _baseline(problem, effects, None)
     baseline, late = start, np.zeros(len(recordings))
-    deviation = np.zeros(len(recordings))
     for _ in range(ROUNDS):
         offsets = clock_offsets(problem, baseline)
+        deviation = np.array([offset.deviation_s for offset in offsets])
         # What is believed at all is then followed to its end.
-        step = np.array([offset.late_s if offset.believed or known else 0.0 for offset, known in zip(offsets, late, strict=True)])
+        step = np.array([offset.late_s if offset.believed or begun else 0.0 for offset, begun in zip(offsets, late, strict=True)])
         if np.abs(step).max() < SHORTEST_S:
             break
-        late, deviation = late + step, np.array([offset.deviation_s for offset in offsets])
+        late = late + step
         if np.abs(late).max() > LONGEST_S:
-            return as_stamped
+            return known(as_stamped, deviation)
         problem = prepared(late)
         baseline = _baseline(problem, effects, baseline)
-    machine = _alike(late, deviation) and not any(received)
-    if not late.any() or machine or _slow_sensor(as_stamped.problem, start, baseline, late):
-        return as_stamped
-    return Synchronised(problem, late, {
+    if _alike(late, deviation) and not any(received):
+        return known(as_stamped, deviation, SHORTEST_S)  # clocks that agree so well have not wandered
+    if not late.any() or _slow_sensor(as_stamped.problem, start, baseline, late):
+        return known(as_stamped, deviation)
+    return known(Synchronised(problem, late, {
         recording.name: clock_finding(vehicle, float(shift), float(spread))
         for recording, shift, spread in zip(recordings, late, deviation, strict=True) if abs(shift) > WORTH_SAYING_S
-    })  # fmt: skip
+    }), deviation)  # fmt: skip
 
 
 def slows(effect: Effect) -> bool:
@@ -196,6 +203,15 @@ def clock_finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
 
 def still_apart(problem: Problem, torque: Array) -> Array:
     """Columns (n, bags): what a torque (n,) changes by if the sensors of a bag are APART_S apart, whatever the friction is like."""
+    return APART_S * _per_second(problem, torque)
+
+
+def still_unknown(problem: Problem, torque: Array) -> Array:
+    """The same for as far as they may be apart by what is known of the clocks of each bag."""
+    return np.asarray(_per_second(problem, torque) * np.array([run.clock_s / TYPICAL for run in problem.runs]))
+
+
+def _per_second(problem: Problem, torque: Array) -> Array:
     parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)
     changes = np.concatenate([np.gradient(part, run.time) for run, part in parts])
-    return np.column_stack([APART_S * changes * (problem.bag == bag) for bag in range(len(problem.runs))])
+    return np.where(problem.bag[:, None] == np.arange(len(problem.runs)), changes[:, None], 0.0)

@@ -10,15 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.data.dataset import CLOCK_S
+from lugre_steering.fitting.problem import TYPICAL, Problem
 from lugre_steering.recording import Array
 
 HYSTERESIS = 5e-4
 """Of the range of a pressure sensor: half width of its loop."""
 SETTLING, SETTLING_S = 2e-3, (10.0, 30.0, 100.0)
 """Of the range: how far a zero may be off when a recording starts, and how long it takes."""
-CLOCK_S = 1e-3
-"""What is left of an offset between clocks after it was measured: they wander."""
 
 
 @njit(cache=True)
@@ -45,6 +44,15 @@ def sensor_columns(problem: Problem) -> list[tuple[slice, Array]]:
                 rows += [SETTLING * span * gain * np.exp(-elapsed / tau) for tau in SETTLING_S]
         columns += [(slice(problem.edges[bag], problem.edges[bag + 1]), row) for row in rows]
     return columns
+
+
+def with_sensors(problem: Problem) -> Problem:
+    """The problem with all these as bends of their own sizes."""
+    own = sensor_columns(problem)
+    columns = np.zeros((problem.measured.size, len(own)))
+    for k, (part, row) in enumerate(own):
+        columns[part, k] = row / TYPICAL
+    return problem.bent([columns])
 
 
 def beside_sensors(problem: Problem, residual: Array, weight: Array, weighted: Array) -> Array:
