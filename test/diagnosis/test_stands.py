@@ -25,7 +25,7 @@ SLOPE = effect("slope_bias", torque=60.0)
 
 
 @pytest.mark.parametrize(("there", "freed", "period_s", "bar", "named"), [
-    (60.0, True, 11.0, 10.0, True), (0.0, True, 11.0, 10.0, False), (60.0, False, 11.0, 10.0, False), (60.0, True, 16.0, 10.0, False),
+    (60.0, True, 11.0, 1.0, True), (0.0, True, 11.0, 1.0, False), (60.0, False, 11.0, 1.0, False), (60.0, True, 16.0, 1.0, False),
     (60.0, True, 11.0, 250.0, False),
 ])  # fmt: skip
 def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(
