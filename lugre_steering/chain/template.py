@@ -137,10 +137,10 @@ def wound_increment(p, s, theta, stiffness, length):
         else:
             low = d_theta
         d_theta -= error / (1.0 + slope * tangent)
+        if not low <= d_theta <= high:
+            d_theta = 0.5 * (low + high)
         if abs(error) < 1e-10:
             break
-        if not low < d_theta < high:  # between flanks without slope Newton would go from one end to the other for ever
-            d_theta = 0.5 * (low + high)
     return d_theta
 
 
