@@ -122,13 +122,14 @@ def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) ->
 def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]) -> float:
     """Energy that another form of the ``older`` effects of ``result`` may make; ``gains``: what each of the last of these took.
 
-    Shares of these, as beside a name its own law may bend along its coordinate, but no more than SHOWN by how far it does; and where time
-    or acceleration is that, of what every joint has too, of all that its torque does beyond a recalibration.
+    Shares of these, as beside a name its own law may bend along its coordinate, but no more than SHOWN by how far it does, unless time
+    or acceleration is that; then too, of what every joint has, of all that its torque does beyond a recalibration.
     """
     first, slow, found = older - len(gains), 0.0, 0.0
     for i, (candidate, _) in enumerate(result.effects[:older]):
         if _slow(candidate.effect):
-            slow += TAKEN_OF_SLOW * beyond_calibration(problem, result, contribution(problem, result, i))
+            took = gains[i - first] if i >= first else beyond_calibration(problem, result, contribution(problem, result, i))
+            slow += TAKEN_OF_SLOW * took
         elif i >= first:
             found += NAME_TAKEN * gains[i - first]
     own = slice(problem.nuisances - problem.shapes, problem.nuisances)
