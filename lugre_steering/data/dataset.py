@@ -29,7 +29,7 @@ AIR_S, AIR_STEP_K = 10.0, 0.25
 
 
 CLOCK_S = 1e-3
-"""What is left of an offset between clocks after it was measured: they wander."""
+"""What is left of an offset between clocks [s] after it was measured: they wander."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Run:
     on_receipt: bool = False
     """Whether stamps were late by chance: given on receipt, they do not know when the devices measured."""
     clock_s: float = CLOCK_S
-    """Standard deviation of what torque and angles may still be apart once their clocks are set."""
+    """Standard deviation [s] of what torque and angles may still be apart once their clocks are set."""
 
     @property
     def torque_per_line(self) -> Array:

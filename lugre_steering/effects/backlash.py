@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import math
-
 from lugre_steering.chain.compiled import law, tanh
 from lugre_steering.effects.entry import Effect, Parameter
 
@@ -17,8 +15,6 @@ FLANK_TORQUE_NM = 100.0
 def wind_up(torque, width, softness, torque_unit):
     """Angle lost [rad] = width / 2 tanh(M / flank torque), and its slope [rad/(N m)]: the flank changes where M changes sign."""
     flank = FLANK_TORQUE_NM * torque_unit + softness
-    if abs(torque) > 18.0 * flank:  # where tanh is 1 within rounding
-        return math.copysign(0.5 * width, torque), 0.0
     side = tanh(torque / flank)
     return 0.5 * width * side, 0.5 * width / flank * (1.0 - side * side)
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lugre_steering.chain.compiled import law
+from lugre_steering.chain.compiled import law, tanh
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.signs import SIGN_RATE_RAD_S
 from lugre_steering.recording import Array
@@ -154,9 +154,9 @@ def torque(cell, value, alpha):
 def loss(cell, value, omega, load):
     """f times the smooth sign of the rate, that times the load, the rate, or its square with its sign [N m]."""
     if cell[0] == _COULOMB:
-        return value * math.tanh(omega / SIGN_RATE_RAD_S), value
+        return value * tanh(omega / SIGN_RATE_RAD_S), value
     if cell[0] == _LOAD:
-        return value * abs(load) * math.tanh(omega / SIGN_RATE_RAD_S), value
+        return value * abs(load) * tanh(omega / SIGN_RATE_RAD_S), value
     if cell[0] == _VISCOUS:
         return value * omega, value
     return (value * omega * abs(omega) if cell[0] == _TURBULENT else 0.0), value

@@ -20,7 +20,7 @@ from typing import Any
 import yaml
 
 from lugre_steering import yaml_text
-from lugre_steering.chain.compiled import exp, law
+from lugre_steering.chain.compiled import exp, law, tanh
 from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
@@ -42,7 +42,7 @@ def _sign(x):
 
 
 _FUNCTIONS = {
-    "abs": abs, "sign": _sign, "sqrt": math.sqrt, "exp": exp, "log": math.log, "tanh": math.tanh, "sin": math.sin, "cos": math.cos,
+    "abs": abs, "sign": _sign, "sqrt": math.sqrt, "exp": exp, "log": math.log, "tanh": tanh, "sin": math.sin, "cos": math.cos,
     "min": min, "max": max,
 }  # fmt: skip
 

@@ -37,8 +37,8 @@ ODDS = 3.0
 """Of one delay against clocks that happen to agree, from which it is one."""
 WORTH_SAYING_S = 2e-3
 APART_S = 0.015
-"""How far torque and angles may still be apart once their clocks are set, which is done beside a law of another form than the friction
-has: where it is the recording's own, they are not."""
+"""How far torque and angles may still be apart once their clocks are set, as that is done beside a friction law of another form; nothing
+where the law is the recording's own."""
 ROUNDS = 6
 SLOWER = 0.6
 """Share of the cost with an offset below which a slow sensor explains it better."""
@@ -89,7 +89,7 @@ def synchronised(
     if is_rig(vehicle):  # its inertia, which the sheet lacks, would pass for an offset
         return as_stamped
     if any(slows(CATALOGUE[entry.id]) for entry in vehicle.effects):
-        return as_stamped
+        return known(as_stamped, np.full(len(recordings), np.inf))
     start = _baseline(problem, effects, None)
     baseline, late = start, np.zeros(len(recordings))
     for _ in range(ROUNDS):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What sound pressure sensors and clocks may add to a torque though no standstill shows it: hysteresis, a zero that settles, a clock.
 
-Each has the size that data sheets allow; what they explain is no structure.
+Each has the size that data sheets allow; what they explain is no structure, and no name.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from lugre_steering.data.dataset import CLOCK_S
 from lugre_steering.fitting.problem import TYPICAL, Problem
 from lugre_steering.recording import Array
 
@@ -31,11 +30,12 @@ def loop(pressure: Array, half_width: float) -> Array:
     return out
 
 
-def sensor_columns(problem: Problem) -> list[tuple[slice, Array]]:
-    """Torque [N m] of each at one standard deviation, and which samples it belongs to: it is zero elsewhere."""
+def sensor_columns(problem: Problem, *, clocks: bool = True) -> list[tuple[slice, Array]]:
+    """Torque [N m] of each at one standard deviation, with those of ``clocks`` or without, and which samples it belongs to: it is zero
+    elsewhere."""
     columns: list[tuple[slice, Array]] = []
     for bag, run in enumerate(problem.runs):
-        rows = [CLOCK_S * np.gradient(run.measured, run.time)]
+        rows = [run.clock_s * np.gradient(run.measured, run.time)] if clocks else []
         if problem.vehicle.hydraulics is not None:
             span = problem.vehicle.sensors.pressure_range_Pa
             elapsed = run.time - run.time[0]
@@ -47,8 +47,8 @@ def sensor_columns(problem: Problem) -> list[tuple[slice, Array]]:
 
 
 def with_sensors(problem: Problem) -> Problem:
-    """The problem with all these as bends of their own sizes."""
-    own = sensor_columns(problem)
+    """The problem with all these as bends of their own sizes; where it has bends, the clocks are among them."""
+    own = sensor_columns(problem, clocks=not problem.bends.shape[1])
     columns = np.zeros((problem.measured.size, len(own)))
     for k, (part, row) in enumerate(own):
         columns[part, k] = row / TYPICAL

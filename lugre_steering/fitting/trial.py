@@ -82,12 +82,7 @@ class Round:
 
     def _fitted(self, score: Score, start: Array | Fit, *, linearisations: int = START + GO_ON, worth: float = np.inf) -> Trial:
         """One joint fit of nuisances (from ``start``), earlier effects and the candidate, its shapes set free as well."""
-        candidate = score.candidate
-        shapes = dict(candidate.shapes)
-        free = tuple(
-            p.name for p in candidate.effect.parameters if p.name in candidate.free or (p.name in shapes and not p.optional)
-        )
-        effects = [*self.current.effects, (replace(candidate, free=free), score.values)]
+        effects = [*self.current.effects, (shaped(score.candidate), score.values)]
         result = fit(
             self.problem, self.weight, effects, start, linearisations=linearisations, tolerance=TRIAL_TOLERANCE, worth=worth
         )
@@ -146,6 +141,13 @@ class Round:
         moved = onset.placed(self.problem, self.weight, trial.fit, len(earlier), ends)
         result = fit(self.problem, self.weight, [*earlier, (candidate, moved)], trial.fit, linearisations=GO_ON, tolerance=TRIAL_TOLERANCE)
         return Trial(trial.score, result, result.cost) if result.cost < trial.cost else trial
+
+
+def shaped(candidate: Candidate) -> Candidate:
+    """A screened candidate with the shapes of its law free as well, but for optional parts."""
+    shapes = dict(candidate.shapes)
+    free = (p.name for p in candidate.effect.parameters if p.name in candidate.free or (p.name in shapes and not p.optional))
+    return replace(candidate, free=tuple(free))
 
 
 def worth_of(before: float, best: float) -> float:

@@ -15,6 +15,7 @@ from reference_model import ReferenceTrack, reference_torque
 from scipy.integrate import solve_ivp, trapezoid
 
 from lugre_steering.bench.kernel_c import CLoop
+from lugre_steering.chain.compiled import exp, tanh
 from lugre_steering.chain.heat import heat
 from lugre_steering.chain.lanes import LANES, torque_sets
 from lugre_steering.chain.step import new_state, run_side, torque_side
@@ -264,3 +265,10 @@ def test_lanes_fall_back_for_effects_and_other_exponents() -> None:
     together = torque_sets(many, rubber, time, theta, omega)
     for k in range(3):
         np.testing.assert_array_equal(together[:, k], torque_side(many[k : k + 1], rubber, time, theta, omega, alpha))
+
+
+def test_functions_of_our_own_are_those_of_the_library() -> None:
+    some = np.linspace(-700.0, 700.0, 20_001)
+    np.testing.assert_allclose([exp(x) for x in some], np.exp(some), rtol=4.5e-16, atol=0.0)
+    near = np.array([*np.linspace(-30.0, 30.0, 20_001), -np.inf, -800.0, 0.0, 1e-12, 800.0, np.inf])
+    np.testing.assert_allclose([tanh(x) for x in near], np.tanh(near), rtol=0.0, atol=3e-16)

@@ -205,10 +205,12 @@ def test_a_name_that_only_filled_in_for_the_shape_of_another_goes(problem: Probl
     both = fit(hidden, weight(hidden), [linear, quadratic])
     score = Score(linear[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     steps = [search.Found(replace(score, candidate=candidate), (), (), gain) for (candidate, _), gain in ((linear, 5.0), (quadratic, 2.0))]
+    steps[0] = replace(steps[0], rivals=("viscous_friction", "line_loss_quadratic"))
     there, kept, current = search._pruned(hidden, hidden, weight(hidden), steps, both)
     assert there.nuisances == current.x.size
     assert [candidate.effect.id for candidate, _ in current.effects] == ["line_loss_quadratic"]
     assert [(item.score.candidate.effect.id, item.gain) for item in kept] == [("line_loss_quadratic", 7.0)]
+    assert kept[0].rivals == ("line_loss_linear", "viscous_friction")  # which may explain it as well
 
 
 def test_a_name_does_not_go_because_its_own_bends_could_stand_in_for_it(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -511,6 +513,23 @@ def test_a_rival_comes_with_all_parts_of_its_law(problem: Problem, monkeypatch: 
     none = noise.Noise(np.full(hidden.measured.size, SIGMA), np.zeros((4, hidden.measured.size)), 0.0)
     search._rivals(hidden, none, seen, roles, own, item, 0)
     assert [(each.candidate.effect.id, each.candidate.free) for each in compared] == [("backlash", ("width", "softness"))]
+
+
+def test_a_known_rival_is_tried_where_the_leader_stands_with_the_shapes_of_its_law(problem: Problem) -> None:
+    """Payne softening for which several bristles led: its angle is no place of the grid, and that it is a rival the other one says."""
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [effect("payne_softening", amplitude=0.2, angle=0.034)]))
+    seen = weight(hidden)
+    current = fit(hidden, seen)
+    draws = SIGMA * np.random.default_rng(1).standard_normal((8, hidden.measured.size))
+    scores = sorted(fingerprint.screen(hidden, current, seen, draws), key=lambda score: -score.explained)
+    whole = [score for score in scores if score.candidate.bags is None and not score.candidate.since]
+    bristles = next(score for score in whole if score.candidate.effect.id == "distributed_contact")
+    leads = trial.Round(hidden, seen, current, scores).try_effect(bristles)
+    (found,) = propose.in_its_place(hidden, seen, propose.Proposal(hidden, current, tuple(scores), [leads]), leads)
+    assert found.candidate.effect.id == "payne_softening"
+    assert found.fit.effects[-1][1]["angle"] == pytest.approx(0.034, rel=0.1)
+    assert found.cost < leads.cost - 1e3
+    assert search.ranked([leads, found], current.cost)[0] is found
 
 
 def test_of_one_claim_about_different_recordings_the_simpler_is_kept_unless_the_other_takes_clearly_more() -> None:

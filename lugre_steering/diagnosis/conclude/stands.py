@@ -130,9 +130,11 @@ def _more_than_sensors(there: Finished) -> bool:
     x = np.append(final.x, np.zeros(problem.nuisances - final.x.size))
     beside = fit(problem, weight, final.effects, x, linearisations=6)
     for index, item in enumerate(there.found.found):
+        if item.given:
+            continue
         rest = [effect for i, effect in enumerate(beside.effects) if i != index]
         without = fit(problem, weight, rest, beside, linearisations=6)
-        if not item.given and without.cost - beside.cost < SURE * problem.doubt:
+        if without.cost - beside.cost < SURE * problem.doubt:
             return False
     return True
 

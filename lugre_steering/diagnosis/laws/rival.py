@@ -25,7 +25,7 @@ from lugre_steering.recording import Array
 OPPOSING = (
     "friction_level", "presliding_stiffness", "coulomb_friction", "load_friction", "viscous_loss", "turbulent_loss", "gain",
 )  # fmt: skip
-"""Channels whose torque is against the motion, as friction is."""
+"""Channels whose torque is against the motion, as friction is, or a share of the whole, of which friction is most."""
 TRUER = 0.5
 """Share of what another model leaves beyond noise that one must leave at most to be far truer."""
 
@@ -39,11 +39,10 @@ def room_for_laws(done: Finished) -> bool:
 
 
 def evident(done: Finished, alone: FoundLaws) -> bool:
-    """Whether laws take as much as a name must, beside the same freedoms, and are no more of these: where what is left is not loud, only
-    that tells of them, and friction along what its own law depends on is of that form which is not known."""
-    free = {Axis(freedom.coordinate) for freedom in done.compared.freedoms}
-    cells = [law_of(candidate.effect).cell for candidate, _ in alone.fitted.effects[alone.names :]]
-    if any(cell.channel in OPPOSING and cell.axis in free for cell in cells):
+    """Whether laws take as much as a name must, beside the same freedoms, and the first is no more of these: where what is left is not
+    loud, only that tells of them, and friction along what its own law depends on is of that form which is not known."""
+    first = law_of(alone.fitted.effects[alone.names][0].effect).cell
+    if first.channel in OPPOSING and first.axis in {Axis(freedom.coordinate) for freedom in done.compared.freedoms}:
         return False
     problem, weight, fitted = beside_form(done, alone)
     mine, base = _energies(done, [(problem, weight, fitted)])

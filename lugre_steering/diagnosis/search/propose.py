@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from lugre_steering.effects.registry import rivals
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
@@ -23,6 +24,7 @@ from lugre_steering.fitting.trial import (
     rank,
     ranked,
     refine,
+    shaped,
     worth_of,
 )
 from lugre_steering.recording import Array
@@ -106,14 +108,17 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
 def in_its_place(problem: Problem, weight: Array, seen: Proposal, leads: Trial) -> list[Trial]:
     """Known rivals of what leads that nobody has tried to the end, from where it stands: all else is known there, as it was not before."""
     *earlier, (champion, _) = leads.fit.effects
-    wanted = {*champion.effect.rivals} - {trial.candidate.effect.id for trial in seen.trials}
-    alike = [score for score in seen.scores if (score.candidate.bags, bool(score.candidate.since)) == (champion.bags, bool(champion.since))]
+    best = dict[str, Score]()
+    for score in sorted(seen.scores, key=lambda score: -score.explained):
+        if (score.candidate.bags, bool(score.candidate.since)) == (champion.bags, bool(champion.since)):
+            best.setdefault(score.candidate.effect.id, score)
+    least = LEADING * best[champion.effect.id].explained if champion.effect.id in best else 0.0
     found = []
-    for name in sorted(wanted):
-        own = max((score for score in alike if score.candidate.effect.id == name), key=lambda score: score.explained, default=None)
-        if own is None or own.explained < LEADING * leads.score.explained:
+    for name in sorted({*rivals(champion.effect)} - {trial.candidate.effect.id for trial in seen.trials}):
+        own = best.get(name)
+        if own is None or own.explained < least:
             continue
-        effects = [*earlier, (replace(own.candidate, since=champion.since), own.values)]
+        effects = [*earlier, (replace(shaped(own.candidate), since=champion.since), own.values)]
         tried = fit(problem, weight, effects, leads.fit.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
         found.append(refine(problem, weight, Trial(own, tried, tried.cost)))
     return found

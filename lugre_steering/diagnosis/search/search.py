@@ -39,7 +39,7 @@ from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, refine
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -225,7 +225,7 @@ def _closest(
     """The best of all proposed beside ``current``, after a closer look in ``those`` worlds: the simplest that ties, with its rivals."""
     seen = [closer(world, weight, seen) for world in those]
     own = closer(clearest(weight, seen)[0], weight, seen)
-    best, *others = (*own.trials, *in_its_place(own.problem, weight, own, own.trials[0]))
+    best, *others = ranked([*own.trials, *in_its_place(own.problem, weight, own, own.trials[0])], own.before)
     chosen, rivals = simplest(best, tied(own.problem, weight, split, best, others, own.before), own.before, own.problem.doubt)
     there, result = settled(own.problem, weight, chosen.fit)
     return there, result, Found(chosen.score, _names(rivals), (best, *others), _taken(there, weight, current, result))
@@ -361,7 +361,8 @@ def _again(problem: Problem, weight: Array, beside: Fit, trial: Trial, champion:
     effects = [*beside.effects, (candidate, values)]
     fitted = fit(problem, weight, effects, beside.x, linearisations=12, tolerance=TRIAL_TOLERANCE)
     again = Trial(trial.score, fitted, fitted.cost)
-    return again if fitted.cost < beside.cost + TIE * problem.doubt else refine(problem, weight, again)
+    tied_already = fitted.cost < beside.cost + TIE * problem.doubt  # the cost with the champion, whose fit it was
+    return again if tied_already else refine(problem, weight, again)
 
 
 def _without_own_bends(
@@ -398,10 +399,11 @@ def _pruned(
         without = fit(bare, weight, rest, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
         if without.cost - current.cost < needed(problem, current, weight):
             dropped = kept.pop(index)
-            # Together they explained what the latest now explains alone, or one that was tied with what goes.
-            last, own = kept[-1], kept[-1].score.candidate.effect.id
-            rivals = dict.fromkeys(name for name in (*last.rivals, dropped.score.candidate.effect.id, *dropped.rivals) if name != own)
-            kept[-1] = replace(last, gain=last.gain + dropped.gain, rivals=tuple(rivals), trials=(*last.trials, *dropped.trials))
+            # Together they explained what the latest now explains alone; what goes may too, or what tied with it.
+            last, standing = kept[-1], {candidate.effect.id for candidate, _ in rest}
+            rivals = dict.fromkeys((dropped.score.candidate.effect.id, *last.rivals, *dropped.rivals))
+            told = tuple(name for name in rivals if name not in standing)[:MOST_RIVALS]
+            kept[-1] = replace(last, gain=last.gain + dropped.gain, rivals=told, trials=(*last.trials, *dropped.trials))
             problem, current = bare, without
     return problem, kept, current
 
@@ -412,11 +414,11 @@ def _freed(plain: Problem, problem: Problem, weight: Array, current: Fit, given:
     return settled(freed, weight, fit(freed, weight, current.effects, x))
 
 
-def _shaped(plain: Problem, problem: Problem, current: Fit, names: Iterable[int]) -> tuple[Problem, Array]:
+def _shaped(plain: Problem, problem: Problem, current: Fit, names: Sequence[int]) -> tuple[Problem, Array]:
     """A problem where the laws of some effects of a fit may bend too, and where its fit there begins."""
     shapes = [flexible.bends(problem, current, i) for i in names]
     columns = [BENT * shape for shape in shapes if shape.shape[1] >= flexible.FEWEST]
-    if plain.bends.shape[1]:
-        columns.append(still_apart(problem, sum((contribution(problem, current, i) for i in names), np.zeros(problem.measured.size))))
+    if plain.bends.shape[1] and names:
+        columns.append(still_apart(problem, np.sum([contribution(problem, current, i) for i in names], axis=0)))
     shaped = plain.bent(columns)
     return shaped, np.append(current.x[: plain.nuisances], np.zeros(shaped.nuisances - plain.nuisances))
