@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from lugre_steering.fitting.problem import TYPICAL, Problem
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
 HYSTERESIS = 5e-4
@@ -47,11 +47,11 @@ def sensor_columns(problem: Problem, *, clocks: bool = True) -> list[tuple[slice
 
 
 def with_sensors(problem: Problem) -> Problem:
-    """The problem with all these as bends of their own sizes; where it has bends, the clocks are among them."""
+    """The problem with all these as bends, at their most; where it has bends, the clocks are among them."""
     own = sensor_columns(problem, clocks=not problem.bends.shape[1])
     columns = np.zeros((problem.measured.size, len(own)))
     for k, (part, row) in enumerate(own):
-        columns[part, k] = row / TYPICAL
+        columns[part, k] = row
     return problem.bent([columns])
 
 

@@ -269,6 +269,6 @@ def test_lanes_fall_back_for_effects_and_other_exponents() -> None:
 
 def test_functions_of_our_own_are_those_of_the_library() -> None:
     some = np.linspace(-700.0, 700.0, 20_001)
-    np.testing.assert_allclose([exp(x) for x in some], np.exp(some), rtol=4.5e-16, atol=0.0)
+    assert np.all(np.abs(np.array([exp(x) for x in some]) - np.exp(some)) <= 3.0 * np.spacing(np.exp(some)))
     near = np.array([*np.linspace(-30.0, 30.0, 20_001), -np.inf, -800.0, 0.0, 1e-12, 800.0, np.inf])
     np.testing.assert_allclose([tanh(x) for x in near], np.tanh(near), rtol=0.0, atol=3e-16)

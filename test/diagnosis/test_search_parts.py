@@ -244,6 +244,22 @@ def test_a_name_of_no_sure_size_goes_unless_it_is_given(problem: Problem, given:
     assert [candidate.effect.id for candidate, _ in current.effects] == names
 
 
+@pytest.mark.parametrize(("range_bar", "names"), [(10.0, ["slope_bias", "viscous_friction"]), (250.0, ["viscous_friction"])])
+def test_what_zeros_of_sensors_may_be_is_no_name(slower: Problem, range_bar: float, names: list[str]) -> None:
+    """A constant in recordings of a minute, where zeros settle by as much, slowly; a loss is none."""
+    sheet = slower.vehicle.replace(sensors=replace(slower.vehicle.sensors, pressure_range_Pa=1e5 * range_bar))
+    hidden = [effect("slope_bias", torque=60.0), effect("viscous_friction", sigma_2=3e3)]
+    problem = with_torque(Problem(sheet, slower.runs), slower.predict_all(slower.start(), hidden))
+    current = fit(problem, weight(problem), hidden)
+    score = Score(hidden[0][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    found = [search.Found(replace(score, candidate=candidate), (), (), 1.0) for candidate, _ in hidden]
+    while (index := search._of_sensors(problem, weight(problem), current, found)) is not None:
+        problem, current = search._spared(problem, problem, weight(problem), current, range(len(found)), index)
+        del found[index]
+    assert [item.score.candidate.effect.id for item in found] == names
+    assert [candidate.effect.id for candidate, _ in current.effects] == names
+
+
 @pytest.mark.parametrize("given", [False, True])
 def test_a_value_is_no_surer_than_the_form_of_its_law(problem: Problem, given: bool) -> None:
     """White noise leaves a small part of a loss in doubt; that of a name may be off by the share that laws have wrong."""

@@ -24,20 +24,15 @@ NOTHING = small_problem(33.0)
 SLOPE = effect("slope_bias", torque=60.0)
 
 
-@pytest.mark.parametrize(("there", "freed", "period_s", "bar", "named"), [
-    (60.0, True, 11.0, 1.0, True), (0.0, True, 11.0, 1.0, False), (60.0, False, 11.0, 1.0, False), (60.0, True, 16.0, 1.0, False),
-    (60.0, True, 11.0, 250.0, False),
+@pytest.mark.parametrize(("there", "freed", "period_s", "named"), [
+    (60.0, True, 11.0, True), (0.0, True, 11.0, False), (60.0, False, 11.0, False), (60.0, True, 16.0, False),
 ])  # fmt: skip
-def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(
-    there: float, freed: bool, period_s: float, bar: float, named: bool
-) -> None:
+def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(there: float, freed: bool, period_s: float, named: bool) -> None:
     """A friction level that waves by 60 sigma hides a slope of less than one on held-out data, but not beside that freedom; where no
-    slope is, none is named; nor where the waves lead its size so far astray that a vehicle file would get worse by it; nor where
-    sound sensors, of so wide a range that their zeros settle by as much, may be what it is."""
-    sheet = replace(NOTHING.vehicle, sensors=replace(NOTHING.vehicle.sensors, pressure_range_Pa=1e5 * bar))
+    slope is, none is named; nor where the waves lead its size so far astray that a vehicle file would get worse by it."""
     waves = 60.0 * SIGMA * np.concatenate([np.sin(2.0 * np.pi * run.time / period_s) for run in NOTHING.runs])
     slope = [(SLOPE[0], {"torque": there})]
-    problem = with_torque(Problem(sheet, NOTHING.runs), NOTHING.predict_all(NOTHING.start(), slope) + waves)
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start(), slope) + waves)
     roles, noise = split(problem), Noise(np.full(problem.valid.size, SIGMA), np.zeros((1, problem.valid.size)), 0.0)
     fitted = np.where(roles.fit, weight(problem), 0.0)
 

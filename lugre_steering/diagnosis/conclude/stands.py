@@ -25,11 +25,9 @@ from lugre_steering.diagnosis.laws.rival import (
     room_for_laws,
 )
 from lugre_steering.diagnosis.result import Verdict
-from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, is_rig
-from lugre_steering.fitting.sensors import with_sensors
 from lugre_steering.fitting.sheet import LEVELS, at_bounds
 
 SURELY = 2.0
@@ -119,24 +117,7 @@ def _tested(done: Finished, seed: int) -> _Tested:
     together = _of_one_vehicle([candidate for candidate, _ in found.final.effects], len(problem.runs))
     there_too = not _missed_by(problem, found.baseline, found.final)
     named = bool(found.found) and harmless and surely and clock is None and not stuck and together and there_too
-    named = named and _more_than_sensors(there)
     return _Tested(named, clock, judged, form)
-
-
-def _more_than_sensors(there: Finished) -> bool:
-    """Whether every name is as evident beside what sound sensors and clocks may add, each in the size that data sheets allow."""
-    final, weight = there.found.final, there.fitted
-    problem = with_sensors(there.problem)
-    x = np.append(final.x, np.zeros(problem.nuisances - final.x.size))
-    beside = fit(problem, weight, final.effects, x, linearisations=6)
-    for index, item in enumerate(there.found.found):
-        if item.given:
-            continue
-        rest = [effect for i, effect in enumerate(beside.effects) if i != index]
-        without = fit(problem, weight, rest, beside, linearisations=6)
-        if without.cost - beside.cost < SURE * problem.doubt:
-            return False
-    return True
 
 
 def _missed_by(problem: Problem, baseline: Fit, final: Fit) -> bool:

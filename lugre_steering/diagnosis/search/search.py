@@ -38,6 +38,7 @@ from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
+from lugre_steering.fitting.sensors import with_sensors
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine
 from lugre_steering.recording import Array
@@ -124,6 +125,9 @@ def search(
             found, current = _given_beside(now, noise, weight, split, fitted, sure_ones)
             now, current = settled(now, weight, current)
         given = sum(item.given for item in found)
+    while (index := _of_sensors(now, weight, current, found)) is not None:
+        now, current = _spared(problem, now, weight, current, range(given, len(found)), index)
+        found = [item for i, item in enumerate(found) if i != index]
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
             bare, fitted = _without_own_bends(problem, now, weight, current, range(given, len(found)), i)
@@ -205,6 +209,23 @@ def _of_sure_size(problem: Problem, weight: Array, current: Fit, found: Sequence
             return kept, current
         del kept[least]
         current = fit(problem, weight, [own for i, own in enumerate(current.effects) if i != least], current)
+
+
+def _of_sensors(problem: Problem, weight: Array, current: Fit, found: Sequence[Found]) -> int | None:
+    """Which name of a fit, if any, is the least evident of those that sound sensors may be as well, in the sizes that data sheets allow."""
+    names = [i for i, item in enumerate(found) if not item.given]
+    if not names:
+        return None
+    there = with_sensors(problem)
+    beside = fit(there, weight, current.effects, np.append(current.x, np.zeros(there.nuisances - current.x.size)), linearisations=6)
+
+    def taken(index: int) -> float:
+        rest = [effect for i, effect in enumerate(beside.effects) if i != index]
+        return fit(there, weight, rest, beside, linearisations=6).cost - beside.cost
+
+    takes = {i: taken(i) for i in names}
+    least = min(names, key=lambda i: takes[i])
+    return least if takes[least] < SURE * problem.doubt else None
 
 
 def _size_in_deviations(problem: Problem, current: Fit, index: int) -> float:
@@ -377,6 +398,15 @@ def _without_own_bends(
     return bare, fit(bare, weight, current.effects, x)
 
 
+def _spared(
+    plain: Problem, problem: Problem, weight: Array, current: Fit, names: Iterable[int], index: int
+) -> tuple[Problem, Fit]:
+    """The fit without one of the ``names`` and without its bends, with the problem of that fit; ``plain``: without bends of any name."""
+    rest = [effect for i, effect in enumerate(current.effects) if i != index]
+    bare, x = _shaped(plain.doubted(problem.doubt, problem.typical), problem, current, [i for i in names if i != index])
+    return bare, fit(bare, weight, rest, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
+
+
 def _told(item: Found, rivals: Sequence[Trial]) -> Found:
     """An effect with other rivals, and how these fit."""
     return replace(item, rivals=tuple(trial.candidate.effect.id for trial in rivals), trials=(*rivals, *item.trials))
@@ -393,14 +423,12 @@ def _pruned(
     for index in range(len(kept) - 2, -1, -1):
         if kept[index].given:
             continue
-        rest = [effect for i, effect in enumerate(current.effects) if i != index]
-        others = [i for i in range(len(kept) - 1) if i != index and not kept[i].given]
-        bare, x = _shaped(plain, problem, current, others)
-        without = fit(bare, weight, rest, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
+        earlier = [i for i, item in enumerate(kept[:-1]) if not item.given]
+        bare, without = _spared(plain, problem, weight, current, earlier, index)
         if without.cost - current.cost < needed(problem, current, weight):
             dropped = kept.pop(index)
             # Together they explained what the latest now explains alone; what goes may too, or what tied with it.
-            last, standing = kept[-1], {candidate.effect.id for candidate, _ in rest}
+            last, standing = kept[-1], {candidate.effect.id for candidate, _ in without.effects}
             rivals = dict.fromkeys((dropped.score.candidate.effect.id, *last.rivals, *dropped.rivals))
             told = tuple(name for name in rivals if name not in standing)[:MOST_RIVALS]
             kept[-1] = replace(last, gain=last.gain + dropped.gain, rivals=told, trials=(*last.trials, *dropped.trials))
