@@ -11,6 +11,7 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits
+from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.statement import _gain, at_end, calibrations_at_bounds
 from lugre_steering.diagnosis.finished import Finished
@@ -54,6 +55,17 @@ def test_the_line_that_is_named_stands_alone_in_the_evidence(problem: Problem) -
     rows = {row.label: row.verdict for row in evidence(finished(hidden, baseline, tuple(scores)), [entry])}
     assert {label for label, verdict in rows.items() if verdict == "named"} == {"pressure_offset[main_a]"}
     assert {f"pressure_offset[{line}]" for line in ("main_a", "main_b", "aux_a", "aux_b")} <= set(rows)
+
+
+@pytest.mark.parametrize("free", [("offset",), ()])
+def test_the_error_of_a_line_is_written_though_its_value_was_held(problem: Problem, free: tuple[str, ...]) -> None:
+    """As names are beside laws when the form of the friction was fitted last."""
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [OFFSET]))
+    own = replace(OFFSET[0], free=free), OFFSET[1]
+    entry = named("pressure_offset", "main_a", 3e5, "Pa")
+    written = augmented_vehicle(finished(hidden, fit(hidden, weight(hidden))), fit(hidden, weight(hidden), [own]), [entry], 80.0)
+    (found,) = written.effects
+    assert (found.id, found.parameters) == ("pressure_offset", {"main_a": pytest.approx(3e5, rel=0.05)})
 
 
 def test_a_name_keeps_its_capital_where_recalibration_stops_at_a_bound(problem: Problem) -> None:

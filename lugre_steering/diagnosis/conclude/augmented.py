@@ -37,7 +37,8 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
             if ends[low] < ends[high]:  # else everywhere
                 keep |= ends
         if candidate.effect.per_line:
-            keep = {candidate.line: float(values[candidate.free[0]])}
+            (error,) = candidate.effect.amplitudes
+            keep = {candidate.line: float(values[error])}
         else:  # found again: nothing of its old values stays
             entries = [entry for entry in entries if entry.id != candidate.effect.id]
         if keep:
