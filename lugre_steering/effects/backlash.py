@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from lugre_steering.chain.compiled import law, tanh
+import math
+
+from lugre_steering.chain.compiled import law
 from lugre_steering.effects.entry import Effect, Parameter
 
 FLANK_TORQUE_NM = 100.0
@@ -15,7 +17,7 @@ FLANK_TORQUE_NM = 100.0
 def wind_up(torque, width, softness, torque_unit):
     """Angle lost [rad] = width / 2 tanh(M / flank torque), and its slope [rad/(N m)]: the flank changes where M changes sign."""
     flank = FLANK_TORQUE_NM * torque_unit + softness
-    side = tanh(torque / flank)
+    side = math.tanh(torque / flank)
     return 0.5 * width * side, 0.5 * width / flank * (1.0 - side * side)
 
 
