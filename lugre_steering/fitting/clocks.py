@@ -212,6 +212,7 @@ def still_unknown(problem: Problem, torque: Array) -> Array:
 
 
 def _per_second(problem: Problem, torque: Array) -> Array:
+    """Columns (n, bags): slope of a torque (n,) by the time [N m/s] in one bag, zero in all others."""
     parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)
     changes = np.concatenate([np.gradient(part, run.time) for run, part in parts])
     return np.where(problem.bag[:, None] == np.arange(len(problem.runs)), changes[:, None], 0.0)

@@ -31,8 +31,7 @@ def loop(pressure: Array, half_width: float) -> Array:
 
 
 def sensor_columns(problem: Problem, *, clocks: bool = True) -> list[tuple[slice, Array]]:
-    """Torque [N m] of each at one standard deviation, with those of ``clocks`` or without, and which samples it belongs to: it is zero
-    elsewhere."""
+    """Torque [N m] of each in its size, with those of ``clocks`` or without, and which samples it belongs to: it is zero elsewhere."""
     columns: list[tuple[slice, Array]] = []
     for bag, run in enumerate(problem.runs):
         rows = [run.clock_s * np.gradient(run.measured, run.time)] if clocks else []
@@ -47,7 +46,7 @@ def sensor_columns(problem: Problem, *, clocks: bool = True) -> list[tuple[slice
 
 
 def with_sensors(problem: Problem) -> Problem:
-    """The problem with all these as bends, at their most; where it has bends, the clocks are among them."""
+    """The problem with all these as bends, their sizes the most that they may be; where it has bends, the clocks are among them."""
     own = sensor_columns(problem, clocks=not problem.bends.shape[1])
     columns = np.zeros((problem.measured.size, len(own)))
     for k, (part, row) in enumerate(own):
@@ -56,7 +55,7 @@ def with_sensors(problem: Problem) -> Problem:
 
 
 def beside_sensors(problem: Problem, residual: Array, weight: Array, weighted: Array) -> Array:
-    """Standardised residual (n,) without what sensors and clocks explain of it at their sizes, the baseline moving along.
+    """Standardised residual (n,) without what sensors and clocks explain of it, their sizes standard deviations, the baseline moving along.
 
     ``weight`` (n,) one over sigma where valid, ``weighted`` (n, p) the baseline's own columns times the weight of its fit.
     """
