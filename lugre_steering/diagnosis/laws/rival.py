@@ -18,7 +18,7 @@ from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.sheet import at_bounds
 from lugre_steering.recording import Array
 
@@ -109,10 +109,16 @@ def _swapped(done: Finished, alone: FoundLaws, index: int, seed: int) -> FoundLa
 
 
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:
-    """Names win a draw, unless they are more in number: several may fill in for one thing."""
+    """Names win a draw, unless they are more and have more free values: several may fill in for one thing."""
     there, count = done.compared, sum(not item.given for item in done.found.found)
-    mine, names, base = _energies(done, [beside_form(done, laws), (there.problem, there.fitted, there.found.final)])
-    return mine < names - MARGIN * (base - names) * (count <= len(laws.gains))
+    final = there.found.final
+    mine, names, base = _energies(done, [beside_form(done, laws), (there.problem, there.fitted, final)])
+    plainer = count <= len(laws.gains) or _values(final.effects[-count:]) < _values(laws.fitted.effects[laws.names :])
+    return mine < names - MARGIN * (base - names) * plainer
+
+
+def _values(effects: Effects) -> int:
+    return sum(len(candidate.free) for candidate, _ in effects)
 
 
 def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> list[float]:
@@ -123,7 +129,7 @@ def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> l
     energies = []
     for problem, result in (*known, (there.problem, there.found.baseline)):
         problem, result = settled(problem, weight, fit(problem, weight, result.effects, result.x), least)
-        energies.append(left(problem, result) + PER_VALUE * least * sum(len(candidate.free) for candidate, _ in result.effects))
+        energies.append(left(problem, result) + PER_VALUE * least * _values(result.effects))
     return energies
 
 

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every cell by projected least squares beside a linear recalibration, judged by what it foretells of blocks left out.
 
-Errors are averaged over stretches first: laws are slow. Normal equations per fold hold all that is needed, also for errors
-that hide nothing, which go through the very same search.
+Errors are averaged over stretches first: laws are slow. Errors that hide nothing go through the very same search.
 """
 
 from __future__ import annotations
@@ -15,19 +14,20 @@ from itertools import product
 
 import numpy as np
 from scipy import stats
+from scipy.linalg import block_diag
 
 from lugre_steering.diagnosis.laws.cells import HATS, Cell, Traces
+from lugre_steering.diagnosis.laws.folds import FOLDS, Beside, smoothed
 from lugre_steering.fitting.fit import Fit, normalised
 from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array, IntArray
 
 RATE_HZ, MOST_ROWS = 20.0, 8000
-FOLDS, FOLD_CLUSTERS = 5, 2
-"""Folds of the cross-validation, in stretches of so many clusters (``fitting.split``)."""
+FOLD_CLUSTERS = 2
+"""Clusters (``fitting.split``) of a stretch that is left out as a whole."""
 SMOOTHING = (1e-4, 1e-2, 1.0)
 """Weights of the second differences of a free f, as shares of its own energy."""
-RIDGE = 1e-6
 FREE = 30.0
 """Length of the columns of what is named, in noise standard deviations: so long that priors of one leave it free."""
 PERMUTED = 16
@@ -109,15 +109,16 @@ class Screen:
         self.errors = np.column_stack([own, self.rows.mean(draws.T), _permuted(own[:, 0], self.rows.fold, seed)])
 
     @cached_property
-    def left(self) -> Array:
-        """Energy (k,) of each of the errors that a linear recalibration leaves of blocks left out."""
-        return _left(self.nuisance, np.zeros((self.rows.fold.size, 0)), self.errors, self.rows.fold, SMOOTHING[:1])
+    def beside(self) -> Beside:
+        """The linear recalibration beside which cells are judged on stretches left out."""
+        return Beside(self.nuisance, self.errors, self.rows.fold)
 
     def pieces(self, traces: Traces, cell: Cell) -> Array:
         """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
         columns, m = self.rows.mean(traces.columns(cell, traces.pieces(cell))), self.nuisance.shape[1]
-        gram, right, _ = _normal(np.column_stack([self.nuisance, columns]), self.errors[:, :1])
-        return np.asarray(np.linalg.solve(gram + _penalty(gram, m, SMOOTHING[0]), right)[m:, 0])
+        both = np.column_stack([self.nuisance, columns])
+        prior = block_diag((1.0 + 1e-9) * np.eye(m), smoothed(columns.T @ columns, SMOOTHING[0]))
+        return np.asarray(np.linalg.solve(both.T @ both + prior, both.T @ self.errors[:, 0])[m:])
 
     def black_box(self, seed: int) -> float:
         """Energy that any smooth function of all coordinates together, or of the few of STATE, foretells of blocks left out, whatever it
@@ -136,7 +137,7 @@ class Screen:
         moved = rows[:, rows.std(axis=0) > 1e-9 * np.abs(rows).max(axis=0)]
         turned, extent, _ = np.linalg.svd(stats.zscore(moved), full_matrices=False)
         apart = turned[:, extent**2 > TOLD * float(np.sum(extent**2))] * np.sqrt(len(rows))
-        own, nothing = self.errors[:, :1], np.zeros((len(rows), 0))
+        own = self.errors[:, :1]
         unit = self.rows.mean(np.ones((self.rows.take.size, 1)))
         amplitude = float(np.sqrt(np.mean(own**2) / np.mean(unit**2)))
         rng = np.random.default_rng(seed)
@@ -145,14 +146,14 @@ class Screen:
         def left(reach: float, size: float) -> float:
             drawn = np.cos(apart @ waves / (reach * np.sqrt(apart.shape[1])) + phase) * np.sqrt(2.0 / FEATURES)
             both = np.column_stack([self.nuisance, size * amplitude * unit * drawn])
-            return float(_left(both, nothing, own, self.rows.fold, SMOOTHING[:1])[0])
+            return float(Beside(both, own, self.rows.fold).left[0])
 
         least = min(in_threads(lambda one: left(*one), list(product(REACHES, SIZES))))
-        return max(float(self.left[0]) - least, 0.0)
+        return max(float(self.beside.left[0]) - least, 0.0)
 
     def search(self, near: Traces | None = None, like: Cell | None = None) -> list[Screened]:
         """All cells, best first; or of other traces at the same fit those of the channel and the pieces of one."""
-        traces = near or self.traces
+        traces, beside = near or self.traces, self.beside
         cells = [cell for cell in traces.cells() if like is None or _alike(cell, like)]
 
         def one(cell: Cell, pieces: Sequence[Array]) -> Screened:
@@ -161,7 +162,7 @@ class Screen:
             if norm < 1e-12:
                 return Screened(cell, 0.0, np.zeros(self.errors.shape[1] - 1))
             smoothing = SMOOTHING if cell.pieces > HATS else SMOOTHING[:1]
-            gains = self.left - _left(self.nuisance, columns / norm, self.errors, self.rows.fold, smoothing)
+            gains = beside.left - beside.left_with(columns / norm, smoothing)
             return Screened(cell, float(gains[0]), gains[1:])
 
         def of_one_basis(alike: Sequence[Cell]) -> list[Screened]:
@@ -188,38 +189,6 @@ def _permuted(errors: Array, fold: IntArray, seed: int) -> Array:
         order = rng.permutation(len(stretches))
         drawn.append(np.concatenate([stretches[i] * rng.choice((-1.0, 1.0)) for i in order]))
     return np.column_stack(drawn)
-
-
-def _normal(both: Array, errors: Array) -> tuple[Array, Array, Array]:
-    """Normal equations of errors (n, k) on columns (n, p): matrix, right sides, energies."""
-    return both.T @ both, both.T @ errors, np.sum(errors**2, axis=0)
-
-
-def _penalty(gram: Array, m: int, smoothing: float) -> Array:
-    """What is added to normal equations: priors of the first ``m`` columns; for the others second differences, a little ridge."""
-    p = gram.shape[0] - m
-    penalty = 1e-9 * np.eye(m + p)
-    penalty[:m, :m] = np.eye(m)
-    if p:
-        second = np.diff(np.eye(p), 2, axis=0) if p > 2 else np.zeros((0, p))
-        penalty[m:, m:] += (smoothing * second.T @ second + RIDGE * np.eye(p)) * max(float(np.trace(gram[m:, m:])), 1e-30) / p
-    return penalty
-
-
-def _left(beside: Array, columns: Array, errors: Array, fold: IntArray, smoothing: Sequence[float]) -> Array:
-    """Energy (k,) of errors (n, k) that columns and recalibration, fitted without it, leave of each fold in turn: the least of all
-    ``smoothing``."""
-    both = np.column_stack([beside, columns])
-    folds = [_normal(both[fold == k], errors[fold == k]) for k in range(FOLDS + 1)]
-    gram = np.sum([g for g, _, _ in folds], axis=0)
-    right = np.sum([r for _, r, _ in folds], axis=0)
-    left = np.zeros((len(smoothing), errors.shape[1]))
-    for share, total in zip(smoothing, left, strict=True):
-        penalty = _penalty(gram, beside.shape[1], share)
-        for g, r, energy in folds[:FOLDS]:
-            values = np.linalg.solve(gram - g + penalty, right - r)
-            total += energy - 2.0 * np.sum(values * r, axis=0) + np.sum(values * (g @ values), axis=0)
-    return np.asarray(left.min(axis=0))
 
 
 def bar(found: Sequence[Screened]) -> float:

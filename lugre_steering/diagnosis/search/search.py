@@ -126,7 +126,8 @@ def search(
             now, current = settled(now, weight, current)
         given = sum(item.given for item in found)
     while (index := _of_sensors(now, weight, current, found)) is not None:
-        now, current = _spared(problem, now, weight, current, range(given, len(found)), index)
+        bare, without = _spared(problem, now, weight, current, range(given, len(found)), index)
+        now, current = settled(bare, weight, without)  # what it took in vain is in doubt again
         found = [item for i, item in enumerate(found) if i != index]
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
@@ -290,17 +291,18 @@ def _in_place(
     if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
     current, clearly_less = _settled_in(exact, weight, free.effects, free.x), left(there, free) - SURE * there.doubt
+    stands = may_differ(there, free, len(free.effects), [item.gain for item in found if not item.given])
     while left(exact, current) > clearly_less:
         own = _round(exact, noise, weight, current, True, progress) if len(found) < MAX_EFFECTS else None
         if own is None or not own.trials:
             return None
         _, current, name = _simplest(own, weight, split)
-        if name.gain < needed(exact, current, weight):
+        if name.gain < needed(exact, current, weight, stands):
             return None
         found = [*found, name]
     if len(found) == len(sure[0]):
         return None
-    least = needed(exact, current, weight)
+    least = needed(exact, current, weight, stands)
     for index in range(len(found)):
         rest = [own for i, own in enumerate(current.effects) if i != index]
         if _settled_in(exact, weight, rest, current.x).cost - current.cost < least:
