@@ -23,6 +23,8 @@ RATE_TIME_CONSTANT_S = 0.04
 USUAL_ACCELERATION_RAD_S2 = 0.11
 """Noise of the rate falls with the filter time, its lag grows with the acceleration: cleaner sensors get a faster filter,
 sqrt(sigma / acceleration), up to RATE_TIME_CONSTANT_S."""
+NO_RATE_RAD_S = 1e-7
+"""Rate that counts as none."""
 PROGRESS_TIME_CONSTANT_S = 0.05
 GIVE_BACK = 0.5
 """Share of the travel that may be used to take back lag compensation."""
@@ -50,10 +52,10 @@ def running_maximum_excess(kappa):
 
 
 @inner
-def follow(s, dt, measured, measured_rate, sigma):
+def follow(s, dt, measured, measured_rate, sigma, angle_unit):
     """Advance the motion state ``s`` by one sample: angle [rad] after ``dt`` [s], its noise ``sigma`` [rad] (0: none).
 
-    ``measured_rate`` [rad/s] is used instead of the differentiated angle when it is a number.
+    ``measured_rate`` [rad/s] is used instead of the differentiated angle when it is a number; ``angle_unit`` is the size of the travel.
     """
     if s.started == 0.0:
         s.started = 1.0
@@ -80,9 +82,9 @@ def follow(s, dt, measured, measured_rate, sigma):
     s.theta += step
 
     rate = step / dt if math.isnan(measured_rate) else measured_rate
-    gain = dt / (min(RATE_TIME_CONSTANT_S, math.sqrt(sigma / USUAL_ACCELERATION_RAD_S2)) + dt)
+    gain = dt / (min(RATE_TIME_CONSTANT_S, math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * angle_unit))) + dt)
     change = (rate - s.omega) * gain
     s.omega += change
-    if abs(s.omega) < 1e-7 and step == 0.0:
+    if abs(s.omega) < NO_RATE_RAD_S * angle_unit and step == 0.0:
         s.omega = 0.0
     s.alpha += (change / dt - s.alpha) * gain

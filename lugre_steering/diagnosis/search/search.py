@@ -290,7 +290,7 @@ def _in_place(
     exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
     if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
-    current, clearly_less = _settled_in(exact, weight, free.effects, free.x), left(there, free) - SURE * there.doubt
+    current, clearly_less = _settled_in(exact, weight, free.effects, free.x), left(there, free) - TIE * there.doubt
     stands = may_differ(there, free, len(free.effects), [item.gain for item in found if not item.given])
     while left(exact, current) > clearly_less:
         own = _round(exact, noise, weight, current, True, progress) if len(found) < MAX_EFFECTS else None
