@@ -282,6 +282,11 @@ class Estimator:
         _set_options(self._core.config, self._parameters, options)
         self.options = options
 
+    @property
+    def rate_limit(self) -> float:
+        """Fastest change of the feed-forward of each side [N m/s]: the option's, or what the vehicle makes of its default."""
+        return float(self._core.config[0]["rate_limit"])
+
     def set_released(self, feed_forward: Sequence[float]) -> None:
         """The feed-forward [N m] of each side was last this; it comes back from there over the recovery ramp."""
         self._core.released[: len(feed_forward)] = feed_forward

@@ -17,7 +17,6 @@ pytest.importorskip("rclpy")
 
 import itertools
 
-from builtin_interfaces.msg import Time
 from live_harness import (
     PATIENCE_S,
     SECOND,
@@ -283,8 +282,33 @@ def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> 
         steady.steer(30, 0.0, age_ns=round((timeout_s + 0.3) * SECOND))  # too old on arrival: an estimate, but nothing to act upon
         world.wait(lambda: len(world.heard["torque"]) == steady.pairs)
         assert len(commands) == before
-        told = "withheld: commands: stamps are not close to the clock"
+        assert len(feed_forward) == len(commands)
+        told = "withheld: feed-forward: stamps are not close to the clock"
         world.status("outputs", lambda s: s.values.get(told) == "30")
+        last = feed_forward[-1].effort[0]
+        steady.steer(30, 0.0)
+        world.wait(lambda: len(feed_forward) == before + 30)
+        assert feed_forward[before].effort[0] == pytest.approx(last, abs=STEP_NM)  # what nobody heard is not where it goes on from
+
+
+STEP_NM = 0.05 * math.degrees(5393.7)
+"""No step of the feed-forward is larger: 0.05 s of the limit of rate."""
+
+
+def test_feed_forward_of_old_stamps_is_led_to_zero_if_so_wanted() -> None:
+    arguments = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.3", "-p", "when_stale:=zero")
+    with LiveNode(*arguments), World(load(VEHICLE)) as world:
+        commands, feed_forward, steady = world.heard["feed_forward/commands"], world.heard["feed_forward"], Steady(world)
+        while not commands or abs(commands[-1].data[0]) < 5e3:
+            steady.steer(20, 0.05)
+        while commands[-1].data[0] != 0.0 or feed_forward[-1].effort[0] != 0.0:
+            steady.steer(20, 0.0, age_ns=SECOND)
+        heard = len(commands), len(feed_forward)
+        steady.steer(30, 0.0, age_ns=SECOND)
+        world.wait(lambda: len(world.heard["torque"]) == steady.pairs)
+        assert (len(commands), len(feed_forward)) == heard  # zero has been said: silence
+        steps = [abs(b.effort[0] - a.effort[0]) for a, b in itertools.pairwise(feed_forward)]
+        assert max(steps) < STEP_NM
 
 
 @pytest.mark.parametrize("cause", ["a clock set back", "an exception"])
@@ -402,12 +426,7 @@ def test_simulated_time() -> None:
     vehicle = load(VEHICLE)
     arguments = ("-p", "use_sim_time:=true", "-p", "publish_commands:=true")
     with LiveNode(*arguments), World(vehicle) as world:
-
-        def set_clock() -> bool:
-            world.clock.publish(Clock(clock=Time(sec=100)))
-            return bool(world.heard["diagnostics"][-1].header.stamp.sec == 100)
-
-        world.wait(set_clock)
+        world.set_clock(100 * SECOND)
         for i in range(100):
             stamp_ns = 100 * SECOND + i * 10_000_000
             world.clock.publish(Clock(clock=to_time(stamp_ns)))
