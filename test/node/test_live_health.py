@@ -301,8 +301,9 @@ def test_feed_forward_of_old_stamps_is_led_to_zero_if_so_wanted() -> None:
         commands, feed_forward, steady = world.heard["feed_forward/commands"], world.heard["feed_forward"], Steady(world)
         while not commands or abs(commands[-1].data[0]) < 5e3:
             steady.steer(20, 0.05)
-        while commands[-1].data[0] != 0.0 or feed_forward[-1].effort[0] != 0.0:
-            steady.steer(20, 0.0, age_ns=SECOND)
+        for late in range(200):  # a clock that goes at half speed
+            steady.steer(1, 0.0, age_ns=late * SECOND // 200)
+        world.wait(lambda: commands[-1].data[0] == 0.0 == feed_forward[-1].effort[0])
         heard = len(commands), len(feed_forward)
         steady.steer(30, 0.0, age_ns=SECOND)
         world.wait(lambda: len(world.heard["torque"]) == steady.pairs)
