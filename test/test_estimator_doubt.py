@@ -661,6 +661,27 @@ def test_a_refused_command_takes_the_feed_forward_to_zero() -> None:
     assert told[100][0] == ["time jumped"]
 
 
+@pytest.mark.parametrize(
+    ("header", "after", "joints", "reason"),
+    [
+        ((T0 // SECOND, SECOND), (1, 0), ["left", "right"], "nanoseconds of a second or more"),
+        ((T0 // SECOND, 0), (1, SECOND), ["left", "right"], "nanoseconds of a second or more"),
+        ((T0 // SECOND, 0), (3600, 0), ["left", "right"], "begins more than 60 s ahead"),
+        ((T0 // SECOND, 0), (1, 0), ["left", "left", "right"], "joint left named more than once"),
+    ],
+)
+def test_a_plan_whose_times_or_joints_cannot_be_is_refused(
+    header: tuple[int, int], after: tuple[int, int], joints: list[str], reason: str
+) -> None:
+    def time_of(given: tuple[int, int]) -> SimpleNamespace:
+        return SimpleNamespace(sec=given[0], nanosec=given[1])
+
+    point = SimpleNamespace(positions=[0.0] * len(joints), time_from_start=time_of(after))
+    message = SimpleNamespace(joint_names=joints, points=[point], header=SimpleNamespace(stamp=time_of(header)))
+    with pytest.raises(DataError, match=reason):
+        planned_angles(message, ["left", "right"], T0)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("begin_s", [5.0, 6.0, 6.7])
 def test_a_clock_set_back_takes_the_feed_forward_to_zero_until_the_bristle_is_known_and_keeps_the_heat(begin_s: float) -> None:
     """An hour, in mid-stroke; the joint goes on as if nothing had been."""

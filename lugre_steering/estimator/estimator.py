@@ -266,13 +266,17 @@ class Estimator:
         """Begin with such a memory, before the first sample; ``DataError`` if it is of another model."""
         recall(self._core, self._composition, self.vehicle.sides, memory)
 
+    def check_continued(self, vehicle: Vehicle) -> None:
+        """``DataError`` if a file has other sides or inputs, so that no estimator of it can go on where this one is."""
+        if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
+            raise DataError("it has other sides, topics or joints")
+
     def continued(self, vehicle: Vehicle) -> Estimator:
         """An estimator with the model of another file of this vehicle that goes on where this one is, no sample lost.
 
         ``DataError`` if that file has other sides or inputs.
         """
-        if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
-            raise DataError("it has other sides, topics or joints")
+        self.check_continued(vehicle)
         new = Estimator(vehicle, self.options)
         hand_over(self._core, self._composition, new._core, new._composition)
         return new

@@ -62,6 +62,7 @@ class Session:
         self._fed_ns = 0  # monotonic time of the sample that gave the newest feed-forward
         self._doubts = 0
         self.news = False  # the doubts have changed since the last report, or the node has been switched on or off
+        self.before_first: Callable[[int], None] | None = None  # to be called once, with the stamp of the first sample
         self._now_ns: Callable[[], int] = time.time_ns
         self.choose_clock()
         self._inputs = Inputs(
@@ -100,11 +101,16 @@ class Session:
         self.health.set_timeouts(settings.angle_timeout_s, settings.pressure_timeout_s)
         self.outputs.set_ramp(settings, self.estimator.rate_limit)
 
-    def reload(self, vehicle: Vehicle) -> None:
-        """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
+    def prepare(self, vehicle: Vehicle) -> None:
+        """Compile what another file of the same vehicle needs, in any thread; ``DataError`` if it is of another one."""
         tell_compiling(self._node.get_logger().info)
+        self.estimator.check_continued(vehicle)
+        warm_up(vehicle, self.settings.options)
+
+    def reload(self, vehicle: Vehicle, file: Path) -> None:
+        """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
         self.estimator = self.estimator.continued(vehicle)
-        self.vehicle, self._sheet = vehicle, source(self.settings.vehicle_file)
+        self.vehicle, self._sheet = vehicle, source(file)
         self.watch = Watch(vehicle)
         self.health.set_vehicle(vehicle)
         self.outputs.set_ramp(self.settings, self.estimator.rate_limit)
@@ -134,18 +140,21 @@ class Session:
         self.simulated = bool(clock.ros_time_is_active)
         self._now_ns = (lambda: int(clock.now().nanoseconds)) if self.simulated else time.time_ns
 
-    def window(self, reason: str) -> Callable[[], Path] | None:
-        """What writes the samples of the time since the mismatch began, and of some time before; None without a folder for them."""
+    def window(self, reason: str) -> Callable[[], tuple[Path, float]] | None:
+        """Mark this moment in the report. What writes the samples of the time since the mismatch began, and of some time before, and says
+        where and how much time [s] they hold; None without a folder for them."""
+        self.health.mark, self.news = f"{self._torque_ns * 1e-9:.3f} s: {reason}", True
         folder = self.settings.watch_folder
         if folder is None or self.samples is None:
             return None
         options, sheet = {"watch_before_s": self.settings.watch_before_s}, self._sheet
         since_ns = (self.watch.since_ns or self._torque_ns) - round(self.settings.watch_before_s * 1e9)
-        rows, vehicle, file = self.samples.since(since_ns), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
+        kept, vehicle, file = self.samples.copy(), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
 
-        def write() -> Path:
+        def write() -> tuple[Path, float]:
+            rows = kept[kept["stamp_ns"] >= since_ns]
             write_window(file, vehicle, reason, rows, made("node", options, sheet))
-            return file
+            return file, float(np.ptp(rows["stamp_ns"])) * 1e-9 if rows.size else 0.0
 
         return write
 
@@ -180,6 +189,9 @@ class Session:
         health.arrivals[channel] += 1
         health.arrived_ns[channel] = now_ns
         health.behind_ns[channel] = now_ns - stamp_ns
+        if self.before_first is not None:
+            self.before_first(stamp_ns)
+            self.before_first = None
         estimates, residuals = self.estimator.push(channel, stamp_ns, value, rate)
         if self.samples is not None:
             self.samples.add(channel, stamp_ns, value, rate)

@@ -129,7 +129,8 @@ def test_a_model_that_no_longer_matches_is_told_with_the_time_since() -> None:
     health.mismatch_s = 12.3
     status = next(s for s in health.statuses(1, 1, 1.0, {}, 0) if s.name.endswith("residual"))
     assert status.level == WARN
-    assert "since 12 s the residual is not what it was: the model no longer matches; diagnose" in status.message
+    assert status.message == "the residual is not what it was: the model no longer matches; diagnose"
+    assert {pair.key: pair.value for pair in status.values}["no longer matches since [s]"] == "12.3"
 
 
 def test_every_rejection_is_counted_by_channel_and_reason() -> None:
@@ -347,6 +348,24 @@ def outputs_of(health: Health) -> tuple[bytes, str]:
     """Level and message of the next report, a second after the one before."""
     status = list(health.statuses(0, 0, 1.0, {}, 0))[-1]
     return status.level, status.message
+
+
+def test_an_exception_that_is_over_is_counted_in_the_message() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    health.fault(ZeroDivisionError("made to fail"), -5 * SECOND)
+    assert outputs_of(health) == (ERROR, "exception: ZeroDivisionError: made to fail")
+    assert outputs_of(health) == (WARN, "1 exception so far: ZeroDivisionError: made to fail")
+
+
+def test_silence_of_all_pressures_is_told_as_what_it_means() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    labels = {f"input {i}": {"accepted": 0} for i in range(7)}
+    health.arrivals, health.arrived_ns = [1] * 7, [SECOND] * 7
+    for silent in (range(2, 5), range(2, 6)):
+        health.arrived_ns = [SECOND - 600_000_000 * (i in silent) for i in range(7)]
+        status = next(health.statuses(SECOND, 1, 1.0, labels, 0))
+        assert status.level == WARN
+        assert ("no measured torque" in status.message) == (len(silent) == 4)
 
 
 def test_angles_without_a_torque_are_an_error() -> None:
