@@ -241,7 +241,7 @@ class Health:
                 having.setdefault(f"stamps are not close to the clock{hint}", []).append(label)
                 level = max(level, WARN)
         troubles = [f"{', '.join(inputs)} {what}" for what, inputs in having.items()]
-        measuring = [label for label, kind in zip(labels, self._kinds, strict=True) if kind in (Kind.PRESSURE, Kind.TORQUE)]
+        measuring = [label for i, label in enumerate(labels) if self._kinds[i] in (Kind.PRESSURE, Kind.TORQUE)]
         if measuring and set(measuring) <= {label for what in (STALE, "missing") for label in having.get(what, [])}:
             troubles.append(UNCHECKED)
         if self.namesakes > 0:
