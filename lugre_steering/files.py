@@ -153,13 +153,18 @@ def _try_lock(descriptor: int) -> bool:
     return True
 
 
+def refuse_irregular(file: Path) -> None:
+    """``OSError`` for a device, a pipe or a folder, whose reading might never end; not for a file that is not there."""
+    if file.exists() and not file.is_file():
+        raise OSError(errno.EINVAL, "is no regular file", str(file))
+
+
 def read_text(file: Path, longest: int) -> str:
     """The text of a file that somebody names: no device or pipe, which might never end, and at most ``longest`` bytes.
 
     ``OSError`` or ``ValueError`` (also if it is not UTF-8).
     """
-    if file.exists() and not file.is_file():
-        raise OSError(errno.EINVAL, "is no regular file", str(file))
+    refuse_irregular(file)
     with file.open("rb") as stream:
         content = stream.read(longest + 1)
     if len(content) > longest:

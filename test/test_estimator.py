@@ -415,7 +415,8 @@ def test_jump_back_in_time_starts_anew_once_confirmed() -> None:
     assert 1 <= lost <= 2
     assert abs(estimates["torque"][restart - 1, 0]) > 5000.0
     assert abs(estimates["torque"][restart, 0]) < 50.0  # bristles relaxed again
-    np.testing.assert_allclose(estimates["total"][-1], alone["total"][-1], rtol=5e-3)
+    np.testing.assert_allclose(estimates["total"][-1], alone["total"][-1], rtol=2e-2)  # on rubber as warm as it had become
+    assert np.all(estimates["temperature"][-1] > alone["temperature"][-1] + 0.5)
     assert np.all(np.diff(residuals["stamp_ns"][-alone_residuals.size + 10 :]) > 0)
     assert rejected(estimator)["angle/left"]["time_jump"] == 1
 

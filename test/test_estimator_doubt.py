@@ -656,9 +656,64 @@ def test_a_refused_command_takes_the_feed_forward_to_zero() -> None:
     drive(range(550, 552))
     assert told[452][0] == []
     estimator.refuse_plan()
-    drive(range(100, 200))  # time is set back, and all begins anew
+    drive(range(100, 200))  # time is set back, and plans are forgotten
     assert estimator.restarts == 1
-    assert told[100][0] == []
+    assert told[100][0] == ["time jumped"]
+
+
+@pytest.mark.parametrize(
+    ("header", "after", "joints", "reason"),
+    [
+        ((T0 // SECOND, SECOND), (1, 0), ["left", "right"], "nanoseconds of a second or more"),
+        ((T0 // SECOND, 0), (1, SECOND), ["left", "right"], "nanoseconds of a second or more"),
+        ((T0 // SECOND, 0), (3600, 0), ["left", "right"], "begins more than 60 s ahead"),
+        ((T0 // SECOND, 0), (1, 0), ["left", "left", "right"], "joint left named more than once"),
+    ],
+)
+def test_a_plan_whose_times_or_joints_cannot_be_is_refused(
+    header: tuple[int, int], after: tuple[int, int], joints: list[str], reason: str
+) -> None:
+    def time_of(given: tuple[int, int]) -> SimpleNamespace:
+        return SimpleNamespace(sec=given[0], nanosec=given[1])
+
+    point = SimpleNamespace(positions=[0.0] * len(joints), time_from_start=time_of(after))
+    message = SimpleNamespace(joint_names=joints, points=[point], header=SimpleNamespace(stamp=time_of(header)))
+    with pytest.raises(DataError, match=reason):
+        planned_angles(message, ["left", "right"], T0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("begin_s", [5.0, 6.0, 6.7])
+def test_a_clock_set_back_takes_the_feed_forward_to_zero_until_the_bristle_is_known_and_keeps_the_heat(begin_s: float) -> None:
+    """An hour, in mid-stroke; the joint goes on as if nothing had been."""
+
+    def angle_at(side: int, t: float) -> float:
+        return (1.0, 0.95)[side] * 0.3 * math.sin(0.7 * t)
+
+    estimator, never, rows = Estimator(VEHICLE), Estimator(VEHICLE), []
+    for i in range(1600):
+        t = 0.01 * i
+        back_ns = 3600 * SECOND if t >= begin_s else 0
+        for side in (0, 1):
+            rows += [(t, row.copy(), doubts(row)) for row in estimator.push(side, T0 + i * PERIOD_NS - back_ns, angle_at(side, t))[0]]
+    assert estimator.restarts == 1
+    before = [row for t, row, _ in rows if t < begin_s]
+    after = [(t, row, said) for t, row, said in rows if t >= begin_s]
+    assert max(before[-1]["temperature"]) - min(before[0]["temperature"]) > 1.0
+    np.testing.assert_allclose(after[0][1]["temperature"], before[-1]["temperature"], atol=0.1)
+    told = [t for t, _, said in after if said]
+    assert after[0][2] == ["time jumped"]
+    assert {text for _, _, said in after for text in said} == {"time jumped"}
+    assert 0.1 < told[-1] - begin_s < 3.0
+    zero = [t for t, row, _ in after if not row["feed_forward"].any()]
+    assert zero[0] < begin_s + 0.3
+    assert zero[-1] == pytest.approx(told[-1], abs=0.02)
+    sides = [(side, i) for i in range(1600) for side in (0, 1)]
+    sound = [row for side, i in sides for row in never.push(side, T0 + i * PERIOD_NS, angle_at(side, 0.01 * i))[0].copy()]
+    known = [abs(row["torque"] - sound[round(100 * t)]["torque"]).max() for t, row, _ in after if t > told[-1]]
+    assert max(known) < 0.06 * STATIC_NM
+    steps = np.diff([row["feed_forward"] for _, row, _ in rows], axis=0)
+    assert np.abs(steps).max() < 0.0101 * STIFFNESS
+    assert after[-1][1]["feed_forward"] == pytest.approx(after[-1][1]["torque"])
 
 
 def test_the_inertia_of_a_plan_counts() -> None:

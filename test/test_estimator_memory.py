@@ -20,6 +20,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.state_file import Ownership, read_state, write_state
 from lugre_steering.vehicle import EffectEntry, Vehicle, load
+from lugre_steering.watch.window import read_window
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
 T0 = 1_790_000_000_000_000_000
@@ -67,6 +68,14 @@ def test_heat_is_aged_by_the_cooling_law() -> None:
     assert excess > 5.0
     assert float(hour[0]["temperature"][0]) - 15.0 == pytest.approx(excess * math.exp(-rate * (3600.0 - 30.0)), rel=1e-3)
     assert float(hour[0]["total"]) == pytest.approx(float(last["total"]), rel=0.15)  # stiffer, as it is colder
+
+
+def test_a_pipe_in_place_of_the_file_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "state.json")
+    with pytest.raises(DataError, match="is no regular file"):
+        read_state(tmp_path / "state.json", VEHICLE, T0, 3600.0)
+    with pytest.raises(DataError, match="is no regular file"):
+        read_window(tmp_path / "state.json", VEHICLE.channels)
 
 
 @pytest.mark.parametrize("spoil", ["cut", "flip", "other vehicle", "old", "ahead", "not JSON", "missing", "no stamp"])

@@ -18,7 +18,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -49,12 +49,18 @@ RATED_S = 15.0
 """More motion than rates must go with before they count as a witness."""
 TOLD_S, RECOVERED_S = 0.2, 1.0
 NEAR = 0.05
+SENT_S = 0.005
+"""From the moment for which a command is made until it is sent no more than this passes."""
 NOTHING: tuple[str, ...] = ()
 """Nothing need be told."""
 ANEW = ("clock an hour ahead", "clock an hour back")
 """After these the estimator begins anew, and so does what it is compared with."""
 CONTRADICTED, THREE, SIMULATED = "rate against angle", "three nodes of one name", "simulated time"
+LIMITED = "slower"
 ARGUMENTS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5", "-p", "max_rate_rad_s:=2.0")
+SLOWER = ("both angles frozen", "both angles dropped", "everything dropped", "stamps 0.5 s behind", "angles in degrees")
+SLOWER_NM_S = 1e5
+"""A limit of rate a third of the default: the strokes keep to it, the ramp to zero alone would not."""
 
 
 def _of(vehicle: Vehicle, kinds: tuple[Kind, ...], change: Callable[[int, Sample], Any], only: int | None = None) -> Fault:
@@ -207,15 +213,18 @@ class Score:
 class Campaign:
     """One node and its neighbour; faults one after the other."""
 
-    def __init__(self, folder: Path, seed: int, simulated: bool = False) -> None:
+    def __init__(self, folder: Path, seed: int, simulated: bool = False, limited: bool = False) -> None:
+        """``limited``: other parameters than the defaults, a lower limit of rate and ``when_stale: zero``."""
         self.vehicle_file = config_folder() / "test_vehicle.yaml"
         self.vehicle = load(self.vehicle_file)
         self.log, self.rng = folder / "node.log", np.random.default_rng(seed)
         parameters = baseline_parameters(self.vehicle)
         self.friction = float(parameters["static_torque"]) * len(self.vehicle.sides)
         self.limit = 3.0 * float(parameters["static_torque"])
-        self.slope = float(parameters["sigma_0"])
-        self.arguments = (*ARGUMENTS, "-p", f"use_sim_time:={'true' if simulated else 'false'}")
+        self.slope = SLOWER_NM_S if limited else float(parameters["sigma_0"])
+        self.arguments: tuple[str, ...] = (*ARGUMENTS, "-p", f"use_sim_time:={'true' if simulated else 'false'}")
+        if limited:
+            self.arguments += ("-p", f"feed_forward_rate_limit_Nm_s:={SLOWER_NM_S}", "-p", "when_stale:=zero")
         self.node = NodeProcess(self.vehicle_file, self.log, *self.arguments)
         self.neighbour = Neighbour(self.vehicle, seed, simulated=simulated)
         self.neighbour.wait_for_node()
@@ -255,7 +264,6 @@ class Campaign:
         when = [ns for ns, text in told if ns >= begin_ns and any(word in text for word in words)]
         commands = neighbour.commands[mark[0] :]
         steps = [abs(b - a) for (_, a), (_, b) in itertools.pairwise(commands)]
-        reach = [self.slope * max(0.05, tb - ta) for (ta, _), (tb, _) in itertools.pairwise(commands)]
         values = [value for _, value in (*commands, *neighbour.torque, *neighbour.feed_forward)]
         wanted = dict(neighbour.left)
         now_ns = neighbour.now_ns()  # stamps may have been ahead of it
@@ -264,7 +272,7 @@ class Campaign:
         return Score(
             fault=name,
             finite=all(map(math.isfinite, values)),
-            inside_limits=all(abs(value) <= self.limit for _, value in commands) and all(map(float.__le__, steps, reach)),
+            inside_limits=all(abs(value) <= self.limit for _, value in commands) and keep_to_rate(commands, self.slope),
             told_s=(min(when) - begin_ns) / SECOND if when else (math.nan if words else 0.0),
             recovered_s=self._recovered_s(end_ns),
             held_back_s=(max(held, default=end_ns) - end_ns) / SECOND,
@@ -288,6 +296,12 @@ class Campaign:
         replayed = torques(self.vehicle, list(self.neighbour.sent))  # more is being sent
         off = [abs(value - replayed[ns]) for ns, value in self.neighbour.torque if ns > end_ns and ns in replayed]
         return max(off, default=math.nan)
+
+
+def keep_to_rate(commands: Sequence[tuple[float, float]], limit_Nm_s: float) -> bool:
+    """Whether commands (time [s], value [N m]) go nowhere faster than the limit, from one to the next and over ten of them."""
+    pairs = itertools.chain(itertools.pairwise(commands), zip(commands, commands[10:], strict=False))
+    return all(abs(b - a) <= limit_Nm_s * (later - sooner + SENT_S) for (sooner, a), (later, b) in pairs)
 
 
 def torques(vehicle: Vehicle, samples: list[Sample]) -> dict[int, float]:
@@ -458,6 +472,17 @@ def simulated_time(folder: Path, seed: int) -> Iterator[Score]:
         campaign.close()
 
 
+def slower(folder: Path, seed: int) -> Iterator[Score]:
+    """Faults that take the feed-forward away and give it back, with parameters other than the defaults."""
+    campaign = Campaign(folder, seed, limited=True)
+    try:
+        for name, (fault, words) in faults_of(campaign.vehicle, campaign.rng).items():
+            if name in SLOWER:
+                yield replace(campaign.samples(name, fault, words), fault=f"{LIMITED}: {name}")
+    finally:
+        campaign.close()
+
+
 def whole(folder: Path, seed: int, only: str, others: dict[str, Any]) -> Iterator[Score]:
     """All faults with ``only`` in their names, one after the other; what is no score goes into ``others``, if none is left out."""
     campaign = Campaign(folder, seed)
@@ -480,6 +505,8 @@ def whole(folder: Path, seed: int, only: str, others: dict[str, Any]) -> Iterato
         campaign.close()
     if only in SIMULATED:
         yield from simulated_time(folder, seed)
+    if only in LIMITED:
+        yield from slower(folder, seed)
 
 
 HEAD = f"{'fault':28} {'told s':>7} {'back s':>7} {'free s':>7} {'step N m':>9} {'off replay':>11}  passed"

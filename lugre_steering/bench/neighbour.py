@@ -162,13 +162,14 @@ class Neighbour:
         self._planner = rclpy.create_node("planner", context=self._planning)
         self.command = self._planner.create_publisher(JointTrajectory, "steering/command", 10)
 
-        def listen(kind: type, topic: str, keep: Callable[[Any], None]) -> None:
+        def listen(kind: type, topic: str, keep: Callable[..., None]) -> None:
             self.node.create_subscription(kind, topic, keep, QoSProfile(depth=1000))
 
         listen(WrenchStamped, f"/{NODE}/torque", lambda m: self.torque.append((_ns(m.header.stamp), m.wrench.torque.z)))
         listen(JointState, f"/{NODE}/feed_forward", lambda m: self.feed_forward.append((_ns(m.header.stamp), m.effort[0])))
         listen(JointState, f"/{NODE}/estimate", lambda m: self.left.append((_ns(m.header.stamp), m.effort[0])))
-        listen(Float64MultiArray, f"/{NODE}/feed_forward/commands", lambda m: self.commands.append((time.time(), m.data[0])))
+        # At the time of sending: how fast they change must not depend on when this busy process hears them.
+        listen(Float64MultiArray, f"/{NODE}/feed_forward/commands", self._keep_command)
         listen(DiagnosticArray, "/diagnostics", self._keep_told)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -245,6 +246,9 @@ class Neighbour:
             message = Clock()
             message.clock.sec, message.clock.nanosec = divmod(stamp_ns, SECOND)
             self._clock.publish(message)
+
+    def _keep_command(self, message: Any, info: Any) -> None:
+        self.commands.append((info["source_timestamp"] / SECOND, message.data[0]))
 
     def _keep_told(self, message: Any) -> None:
         text = "; ".join(status.message for status in message.status)

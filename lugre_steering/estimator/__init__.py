@@ -13,8 +13,9 @@ Rules of time (header stamps only, never arrival times):
   linearly, never held or extrapolated, and not across a gap.
 * Duplicate, backward, zero, not finite, absurd and jumping samples are rejected and counted by reason. A jump is
   believed when the next sample of the same channel confirms it and, for an angle, the other side is there or jumps as
-  well. A jump of both sides back in time starts the estimator anew; a side or line that jumps back alone loses its own
-  samples in waiting, nothing else. So does a torque that is no finite number start it anew; ``restart`` counts them.
+  well. At a jump of both sides back in time the estimator begins again with the heat and memories that it has, its bristles
+  not known; a side or line that jumps back alone loses its own samples in waiting, nothing else. A torque that is no finite
+  number starts it anew, without any past; ``restart`` counts both.
 * A confirmed jump of an angle moves the angle of the model, not its contact: it is never slip and never heat (``doubt``).
 * The feed-forward keeps to limits of value and rate, and goes to zero over a ramp while anything speaks against it
   (``doubts`` of the estimate says what): a jump, a frozen or noisy angle, a residual that is not plausible, a plan that is

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from lugre_steering.chain.compiled import inner
-from lugre_steering.chain.doors import row
+from lugre_steering.chain.doors import copy_row, row
 from lugre_steering.chain.layout import STATE
 from lugre_steering.estimator.doubt import leapt, reachable, runs
 from lugre_steering.estimator.layout import (
@@ -61,10 +61,21 @@ def _begin_side(core, side):
 
 
 @inner
-def restart(core, k):
-    """Forget the past, except the counters; counted for channel ``k``, like the torques that still lack pressures."""
-    for side in range(core.motion.size):  # slice assignment would compile for ten seconds more
-        _begin_side(core, side)
+def _set_side_back(core, side):
+    """Forget the samples of one side. What it has been through stays, in doubt that which is trusted, but for the bristle."""
+    state, g, nothing = row(core.state, side, STATE), core.guard[side], core.nothing[0]
+    if g.shadow_ns != 0:
+        saturated = state.saturated
+        copy_row(core.state, side, core.shadow, side)
+        state.saturated = saturated
+    fastest = g.fastest
+    core.motion[side], core.trust[side], core.guard[side] = nothing.motion, nothing.trust, nothing.guard
+    g.fastest, g.set_back = fastest, state.started != 0.0
+
+
+@inner
+def _forget_samples(core, k):
+    """Forget all samples, except their counters; counted for channel ``k``, like the torques that still lack pressures."""
     for i in range(core.channels.size):
         _clear(core.channels[i])
     c = core.config[0]
@@ -75,6 +86,24 @@ def restart(core, k):
     c.pending_count = 0
     c.plan_size = 0
     c.plan_refused_ns = 0
+    c.residual_ns = 0
+    c.agreed_ns = 0
+
+
+@inner
+def restart(core, k):
+    """Forget the past, as a torque of channel ``k`` is no finite number."""
+    for side in range(core.motion.size):  # slice assignment would compile for ten seconds more
+        _begin_side(core, side)
+    _forget_samples(core, k)
+
+
+@inner
+def _set_back(core, k):
+    """Begin anew with the time of channel ``k``."""
+    for side in range(core.motion.size):
+        _set_side_back(core, side)
+    _forget_samples(core, k)
 
 
 _DOUBTED, _SHARED, _THERE = range(3)
@@ -144,7 +173,7 @@ def _jump_in_time(core, k, stamp_ns, value, follows_suspect):
     if stamp_ns > ch.last_ns:
         return _GOES_ON
     if other_side == _SHARED:
-        restart(core, k)
+        _set_back(core, k)
         return ACCEPTED
     if ch.kind != Kind.ANGLE:
         _clear(ch)

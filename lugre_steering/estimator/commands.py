@@ -11,14 +11,14 @@ from lugre_steering.estimator.release import LONGEST_S
 
 class CommandRamp:
     """Leads each command from the last one published to the wanted one, over a fixed time after every interruption: a
-    silence, or ``restart``.
+    silence, or ``restart``; never faster than the limit of rate.
 
     An effort controller may hold the last command it got; the topic therefore continues where it stopped. Before the
     first command a controller has none: the ramp starts at zero.
     """
 
-    def __init__(self, timeout_s: float, ramp_s: float, joints: int) -> None:
-        self.set_times(timeout_s, ramp_s)
+    def __init__(self, timeout_s: float, ramp_s: float, rate_limit_Nm_s: float, joints: int) -> None:
+        self.set_limits(timeout_s, ramp_s, rate_limit_Nm_s)
         self.published = [0.0] * joints
         self._start = self.published
         self._start_ns = 0
@@ -29,9 +29,9 @@ class CommandRamp:
         self.published = list(values)
         self._last_ns = None
 
-    def set_times(self, timeout_s: float, ramp_s: float) -> None:
-        """Other times, from the next ramp on."""
-        self._timeout_ns, self._ramp_ns = round(timeout_s * 1e9), round(ramp_s * 1e9)
+    def set_limits(self, timeout_s: float, ramp_s: float, rate_limit_Nm_s: float) -> None:
+        """Other times, from the next ramp on, and another limit of rate [N m/s]."""
+        self._timeout_ns, self._ramp_ns, self._rate_limit = round(timeout_s * 1e9), round(ramp_s * 1e9), rate_limit_Nm_s
 
     def restart(self) -> None:
         """Begin the next ramp with the next command, however soon it comes."""
@@ -39,14 +39,15 @@ class CommandRamp:
 
     def __call__(self, now_ns: int, wanted: Sequence[float]) -> list[float]:
         """The command [N m] of each joint to publish now."""
-        if self._last_ns is None or not 0 <= now_ns - self._last_ns <= self._timeout_ns:
+        passed_ns = 0 if self._last_ns is None else now_ns - self._last_ns
+        if self._last_ns is None or not 0 <= passed_ns <= self._timeout_ns:
             self._start, self._start_ns = self.published, now_ns
         self._last_ns = now_ns
         since = now_ns - self._start_ns
         weight = since / self._ramp_ns if since < self._ramp_ns else 1.0
-        self.published = [
-            a + weight * (b - a) if weight < 1.0 else b for a, b in zip(self._start, wanted, strict=True)
-        ]
+        reach = self._rate_limit * min(LONGEST_S, max(0.0, passed_ns * 1e-9))
+        towards = (a + weight * (b - a) if weight < 1.0 else b for a, b in zip(self._start, wanted, strict=True))
+        self.published = [max(last - reach, min(last + reach, to)) for last, to in zip(self.published, towards, strict=True)]
         return self.published
 
 

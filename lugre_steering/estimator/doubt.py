@@ -74,13 +74,13 @@ DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
     "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
-    "command refused",
+    "command refused", "time jumped",
 )  # fmt: skip
 (
-    JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED,
+    JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED, SET_BACK,
 ) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
-INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY
+INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK
 """What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
@@ -105,6 +105,7 @@ GUARD = np.dtype(
         ("still_other", np.float64),  # angle of the other side then, followed slowly [rad]; NaN: none yet
         ("apart", np.int64),  # samples in a row for which the other side was away from there
         ("unseen_ns", np.int64),  # stamp of the end of unseen motion after which the bristle is not known yet; 0: it is
+        ("set_back", np.bool_),  # it is not known because the clock was set back
         ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not
         ("frozen_at", np.float64),  # reading then [rad]
         ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault
@@ -239,7 +240,7 @@ def angle_doubts(core, side, dt, stamp_ns):
     if g.frozen_ns != 0:
         found |= FROZEN
     if g.unseen_ns != 0:
-        found |= UNSEEN
+        found |= SET_BACK if g.set_back else UNSEEN
     if noisy(core, side):
         found |= NOISY
     if core.trust[side].contradicts:
@@ -350,13 +351,33 @@ def comes_back(core, side, stamp_ns, value):
 
 
 @inner
+def _carry(core, side, stamp_ns, value):
+    """The contact goes along with the angle to ``value`` [rad], without slip; how its bristle is then, nobody knows."""
+    c, p = core.config[0], row(core.parameters, side, BASELINE)
+    state, trial = row(core.state, side, STATE), row(core.scratch_state, 0, STATE)
+    copy_row(core.scratch_state, 0, core.state, side)
+    call_step(c.step_door, p, trial, core.rubber, core.scratch_output[0], 0.0, value, 0.0, 0.0, c.effects)
+    turned = trial.theta - state.theta
+    state.theta += turned
+    state.contact_angle += turned
+    part(core, side, stamp_ns, value, math.inf)
+
+
+@inner
+def begin_again(core, side, stamp_ns, value):
+    """The first reading [rad] of a side after its clock was set back: heat and memories are as they were, the bristle is lost."""
+    _carry(core, side, stamp_ns, value)
+    row(core.state, side, STATE).z = 0.0
+
+
+@inner
 def re_anchor(core, side, ch, stamp_ns, value, running):
     """The angle of a side jumps to ``value`` [rad], confirmed: no slip, no heat, unless the joint has really gone there.
 
     That it has, after it was frozen, and where the shadow can have got to; not if it is ``running`` on from an earlier jump.
     """
     g, c, out, motion = core.guard[side], core.config[0], core.output[side], core.motion[side]
-    p, state, trial = row(core.parameters, side, BASELINE), row(core.state, side, STATE), row(core.scratch_state, 0, STATE)
+    p, state = row(core.parameters, side, BASELINE), row(core.state, side, STATE)
     if g.shadow_ns == 0:
         g.shadow_unseen = g.unseen_ns != 0
     if g.shadow_ns == 0 and g.leap_ns == 0:
@@ -383,12 +404,7 @@ def re_anchor(core, side, ch, stamp_ns, value, running):
         lose_sight(core, side, stamp_ns, value, unseen_s)
         call_step(c.step_door, p, state, core.rubber, out, passed, value, rate, 0.0, c.effects)
     else:
-        copy_row(core.scratch_state, 0, core.state, side)
-        call_step(c.step_door, p, trial, core.rubber, core.scratch_output[0], 0.0, value, 0.0, 0.0, c.effects)
-        turned = trial.theta - state.theta
-        state.theta += turned
-        state.contact_angle += turned
-        part(core, side, stamp_ns, value, math.inf)
+        _carry(core, side, stamp_ns, value)
         call_step(c.step_door, p, state, core.rubber, out, passed, value, 0.0, 0.0, c.effects)
     g.absurd, g.frozen_ns = False, 0
     _stand(g, stamp_ns, value)

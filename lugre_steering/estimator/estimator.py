@@ -266,13 +266,17 @@ class Estimator:
         """Begin with such a memory, before the first sample; ``DataError`` if it is of another model."""
         recall(self._core, self._composition, self.vehicle.sides, memory)
 
+    def check_continued(self, vehicle: Vehicle) -> None:
+        """``DataError`` if a file has other sides or inputs, so that no estimator of it can go on where this one is."""
+        if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
+            raise DataError("it has other sides, topics or joints")
+
     def continued(self, vehicle: Vehicle) -> Estimator:
         """An estimator with the model of another file of this vehicle that goes on where this one is, no sample lost.
 
         ``DataError`` if that file has other sides or inputs.
         """
-        if vehicle.channels != self.channels or vehicle.sides != self.vehicle.sides:
-            raise DataError("it has other sides, topics or joints")
+        self.check_continued(vehicle)
         new = Estimator(vehicle, self.options)
         hand_over(self._core, self._composition, new._core, new._composition)
         return new
@@ -281,6 +285,11 @@ class Estimator:
         """Go on with other options."""
         _set_options(self._core.config, self._parameters, options)
         self.options = options
+
+    @property
+    def rate_limit(self) -> float:
+        """Fastest change of the feed-forward of each side [N m/s]: the option's, or what the vehicle makes of its default."""
+        return float(self._core.config[0]["rate_limit"])
 
     def set_released(self, feed_forward: Sequence[float]) -> None:
         """The feed-forward [N m] of each side was last this; it comes back from there over the recovery ramp."""

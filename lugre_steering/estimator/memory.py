@@ -30,12 +30,12 @@ _ONGOING = (
 
 
 def remembered(core: Core, composition: Composition, sides: Sequence[str]) -> Memory:
-    """The memory of each side that has begun; of one in doubt, the state that is trusted."""
+    """The memory of each side that has begun, after its clock was set back anew; of one in doubt, the state that is trusted."""
     table: dict[str, Any] = {}
     states, shadows = (records_of(rows, composition.state) for rows in (core.state, core.shadow))
     for i, side in enumerate(sides):
         channel, guard = core.channels[i], core.guard[i]
-        if states[i]["started"] == 0.0:
+        if states[i]["started"] == 0.0 or channel["last_ns"] == 0:
             continue
         doubted = guard["shadow_ns"] != 0
         stamp_ns, angle = (guard["shadow_ns"], guard["shadow_angle"]) if doubted else (channel["last_ns"], channel["last_value"])

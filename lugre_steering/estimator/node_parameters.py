@@ -80,7 +80,7 @@ NODE_TABLE = (
 _MEANINGS = {
     "pair_tolerance_s": "left and right stamps this close, or by half a sampling period up to 50 ms, are one instant [s]",
     "max_gap_s": "pressures are not interpolated across a longer gap [s]",
-    "backward_jump_s": "a confirmed jump of all angles back in time this long is a restart [s]",
+    "backward_jump_s": "a confirmed jump of all angles back in time this long is a new beginning, with the heat and memories so far [s]",
     "forward_jump_s": "a jump ahead this long must be confirmed [s]",
     "max_rate_rad_s": "a faster change of an angle is a spike [rad/s]",
     "feed_forward_limit_Nm": "largest feed-forward of each side [N m]; 0: three times its static friction",

@@ -15,7 +15,7 @@ from typing import Any
 
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.estimator.memory import Memory
-from lugre_steering.files import HeldError, lock_file, unlock_file
+from lugre_steering.files import HeldError, lock_file, refuse_irregular, unlock_file
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.identity import identity
 
@@ -89,6 +89,7 @@ def write_state(file: Path, vehicle: Vehicle, memory: Memory) -> None:
 def read_state(file: Path, vehicle: Vehicle, now_ns: int, max_age_s: float) -> Memory:
     """The memory in the file. ``DataError`` says why one is not used: damaged, of another vehicle file, too old, ahead."""
     try:
+        refuse_irregular(file)
         with file.open("rb") as stream:
             content: Any = json.loads(stream.read(LARGEST_BYTES))
         found = content.pop("sha256")

@@ -18,6 +18,7 @@ from lugre_steering.estimator.doubt import (
     RANGE,
     TABLE,
     angle_doubts,
+    begin_again,
     comes_back,
     re_anchor,
     runs,
@@ -108,7 +109,8 @@ def _elapsed(c, ch, state, stamp_ns):
     if c.start_ns == 0 or stamp_ns < c.start_ns:
         c.start_ns = stamp_ns
     if ch.last_ns == 0:
-        state.time = max(0.0, (stamp_ns - c.start_ns) * 1e-9)
+        if state.started == 0.0:
+            state.time = max(0.0, (stamp_ns - c.start_ns) * 1e-9)
         return 0.0
     ch.period_ns = stamp_ns - ch.last_ns
     return ch.period_ns * 1e-9
@@ -166,6 +168,8 @@ def advance(core, k, stamp_ns, value, rate, verdict, estimates, count):
     saturated, law_left = state.saturated, _law_left(core, side)
     dt = _elapsed(c, ch, state, stamp_ns)
     g = core.guard[side]
+    if g.set_back and ch.last_ns == 0:
+        begin_again(core, side, stamp_ns, value)
     jumps, running = verdict != ACCEPTED, verdict == RUNNING
     if jumps:
         ch.reasons[ANGLE_JUMP] += 1

@@ -81,4 +81,4 @@ def drive_bounds(core, side, dt):
         call_step(c.step_door, p, bound, core.rubber, out, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         apart = max(apart, abs(out.torque - core.output[side].torque))
     if apart <= AGREED_SHARE * p.static_torque or _supported(c, g.unseen_ns):
-        g.unseen_ns = 0
+        g.unseen_ns, g.set_back = 0, False

@@ -17,13 +17,13 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
 
 from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.estimator.state_file import Ownership, read_state, write_state
 from lugre_steering.live.console import Console
-from lugre_steering.live.parameters import changed, declare
+from lugre_steering.live.later import Later, Work
+from lugre_steering.live.parameters import changed, check_files, declare, undeclared
 from lugre_steering.live.session import LEAVE_S, TICK_S, Session
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
@@ -57,8 +57,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Steady, so that health is reported while simulated time stands still.
         self.create_timer(TICK_S, self.guarded(self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.create_service(Trigger, "~/reload", self._reload)
-        self.create_service(Trigger, "~/mark", self._mark)
+        self._answering = [Later(self, f"~/{name}", work, self.fault) for name, work in (("reload", self._reload), ("mark", self._mark))]
         self._writer: threading.Thread | None = None
         self._ownership = Ownership()
         change = self._service_change_state
@@ -91,6 +90,8 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.fault(error)
             return TransitionCallbackReturn.ERROR
         self._restore(self.session)
+        if unknown := undeclared(self):
+            self.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
         self.get_logger().info(
             f"'{vehicle.name}' ready, executor '{self.settings.executor}'; compiled code loaded in {time.monotonic() - begin:.2f} s"
         )
@@ -185,6 +186,8 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.session.health.unused["more messages came than could be read"] += 1
 
     def _tick(self) -> None:
+        for service in self._answering:
+            service.tick()
         session, now_ns = self.session, time.monotonic_ns()
         waited_s = (now_ns - self._reported_ns) * 1e-9
         if session is None:
@@ -210,7 +213,7 @@ class SteeringTorqueEstimator(LifecycleNode):
             session.alarm = False
             write = session.window("the residual is not what it was")
             if write is not None:
-                threading.Thread(target=self.guarded(lambda: self._written(write())), daemon=True).start()
+                threading.Thread(target=self.guarded(self._write_window), args=(session, write), daemon=True).start()
 
     def _report(self, session: Session, monotonic_ns: int) -> None:
         """The whole report at once, after the rest of one that is under way."""
@@ -251,7 +254,7 @@ class SteeringTorqueEstimator(LifecycleNode):
 
     def _check(self, changes: Sequence[Parameter]) -> SetParametersResult:
         try:
-            changed(self, changes)
+            check_files(changed(self, changes), [change.name for change in changes])
         except LugreSteeringError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -261,40 +264,53 @@ class SteeringTorqueEstimator(LifecycleNode):
         if self.session is not None:
             self.session.change(self.settings)
 
-    def _written(self, file: Path) -> None:
-        self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}")
-
-    def _mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Write the window up to now, for diagnose."""
+    def _write_window(self, session: Session, write: Callable[[], tuple[Path, float]]) -> None:
+        """Write the window of an alarm; that a disk is full is no fault of the torques."""
         try:
-            write = self.session.window("marked") if self.session is not None else None
-            if write is None:
-                raise DataError("parameter 'watch_folder' names no folder for windows, or the node is not configured")
-            response.success, response.message = True, str(write())
-        except (DataError, OSError) as error:
-            response.success, response.message = False, str(error)
-        except Exception as error:  # would end the service, and the caller would wait for ever
-            self.fault(error)
-            response.success, response.message = False, self.last_exception
-        return response
+            file, _ = write()
+        except OSError as error:
+            session.health.window_trouble = str(error)
+            self.get_logger().warning(f"window not written: {error}")
+        else:
+            session.health.window_trouble = ""
+            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}")
 
-    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _mark(self) -> Work:
+        """Tell the mark in the report; with a folder for windows, write the one up to now, for diagnose."""
+        session = self.session
+        if session is None:
+            return False, "the node is not configured"
+        write = session.window("marked")
+        if write is None:
+            return True, f"marked at {session.health.mark}; no window, as parameter 'watch_folder' names no folder for them"
+        try:
+            file, seconds = yield write
+        except OSError as error:
+            return False, str(error)
+        return True, f"{file}\n{seconds:.1f} s"
+
+    def _reload(self) -> Work:
         """Take over what ``vehicle_file`` says now, all of it or nothing."""
+        session, file = self.session, self.settings.vehicle_file
         try:
-            if self.session is None:
+            vehicle = yield lambda: self._prepared(session, file)
+            if session is None or session is not self.session:
                 raise DataError("the node is not configured")
-            vehicle = self._load(self.settings.vehicle_file)
-            self.session.reload(vehicle)
-            response.success, response.message = True, f"'{vehicle.name}' taken over"
+            session.reload(vehicle, file)
+            answer = True, f"'{vehicle.name}' taken over"
         except DataError as error:
-            response.success, response.message = False, f"{self.settings.vehicle_file}: {error}; cleanup and configure instead"
+            answer = False, f"{file}: {error}; cleanup and configure instead"
         except LugreSteeringError as error:
-            response.success, response.message = False, str(error)
-        except Exception as error:  # would end the service, and the caller would wait for ever
-            self.fault(error)
-            response.success, response.message = False, self.last_exception
-        self.get_logger().info(f"reload: {response.message}")
-        return response
+            answer = False, str(error)
+        self.get_logger().info(f"reload: {answer[1]}")
+        return answer
+
+    def _prepared(self, session: Session | None, file: Path) -> Vehicle:
+        """The vehicle file, with all that is called of it compiled."""
+        vehicle = self._load(file)
+        if session is not None:
+            session.prepare(vehicle)
+        return vehicle
 
     def _restore(self, session: Session) -> None:
         file = self.settings.state_file
@@ -307,8 +323,14 @@ class SteeringTorqueEstimator(LifecycleNode):
             return
         if not file.exists():
             return
+        if session.simulated:  # its clock comes as a topic, not before the first samples
+            session.before_first = lambda stamp_ns: self._resume(session, file, stamp_ns)
+        else:
+            self._resume(session, file, time.time_ns())
+
+    def _resume(self, session: Session, file: Path, now_ns: int) -> None:
         try:
-            session.estimator.resume(read_state(file, session.vehicle, time.time_ns(), self.settings.state_max_age_s))
+            session.estimator.resume(read_state(file, session.vehicle, now_ns, self.settings.state_max_age_s))
             self.get_logger().info(f"{file}: temperatures and bristles taken over")
         except DataError as error:
             self.get_logger().warning(f"state not used: {error}")
@@ -325,16 +347,20 @@ class SteeringTorqueEstimator(LifecycleNode):
         file, session = self.settings.state_file, self.session
         memory, vehicle = None, None
         if session is not None:
-            session.health.state_trouble = self._ownership.take(file) if file is not None else ""
-            if file is not None and not session.health.state_trouble:
+            trouble = self._ownership.take(file) if file is not None else ""
+            if file is None or trouble:
+                session.health.state_trouble = trouble
+            else:
                 memory, vehicle = session.estimator.memory, session.vehicle
 
         def write() -> None:
-            if file is None or vehicle is None or not memory or not memory["sides"]:
+            if file is None or session is None or vehicle is None or not memory or not memory["sides"]:
                 return
             try:
                 write_state(file, vehicle, memory)
+                session.health.state_trouble = ""
             except (OSError, ValueError) as error:
-                self.get_logger().warning(f"{file}: state cannot be written: {error}", throttle_duration_sec=30.0)
+                session.health.state_trouble = f"{file}: state cannot be written: {error}"
+                self.get_logger().warning(session.health.state_trouble, throttle_duration_sec=30.0)
 
         return write

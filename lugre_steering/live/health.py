@@ -19,6 +19,7 @@ from lugre_steering.vehicle.model import baseline_parameters
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 STALE = "stale"
+UNCHECKED = "no measured torque: the feed-forward goes on, from the angles alone, and nothing tells whether it is plausible"
 FAULT_HOLD_NS = 1_000_000_000
 RESIDUAL_SECONDS = 10
 SHEET_SECONDS = 60
@@ -66,6 +67,8 @@ class Health:
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
         self.state_trouble = ""  # why the state cannot be kept
+        self.window_trouble = ""  # why the last window of an alarm was not written
+        self.mark = ""  # time and reason of the last window, written or not
         self.doubted: Counter[str] = Counter()  # torques whose feed-forward was held back, by reason
         self._then_doubted: Counter[str] = Counter()
         self._kinds = [channel.kind for channel in vehicle.channels]
@@ -238,6 +241,9 @@ class Health:
                 having.setdefault(f"stamps are not close to the clock{hint}", []).append(label)
                 level = max(level, WARN)
         troubles = [f"{', '.join(inputs)} {what}" for what, inputs in having.items()]
+        measuring = [label for i, label in enumerate(labels) if self._kinds[i] in (Kind.PRESSURE, Kind.TORQUE)]
+        if measuring and set(measuring) <= {label for what in (STALE, "missing") for label in having.get(what, [])}:
+            troubles.append(UNCHECKED)
         if self.namesakes > 0:
             troubles.append(f"{counted(self.namesakes, 'other node')} of this name: their outputs mix with these")
             level = max(level, WARN)
@@ -279,9 +285,8 @@ class Health:
             message = "; ".join(filter(None, [message, "residual as large as the torque: check units, signs, plugs; then diagnose"]))
         words = self._wrong_sheet()
         unlike = math.isfinite(self.mismatch_s)
-        if unlike:
-            since = f"since {self.mismatch_s:.0f} s the residual is not what it was: the model no longer matches; diagnose"
-            message = "; ".join(filter(None, [message, since]))
+        if unlike:  # without the time, which would make news of it each second
+            message = "; ".join(filter(None, [message, "the residual is not what it was: the model no longer matches; diagnose"]))
         message = "; ".join(filter(None, [message, words]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
         values: dict[str, object] = {
@@ -289,6 +294,10 @@ class Health:
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
+        if unlike:
+            values["no longer matches since [s]"] = self.mismatch_s
+        if self.mark:
+            values["last mark"] = self.mark
         return self._status("residual", WARN if saturated or large or words or unlike or not count else OK, message, values)
 
     def _wrong_sheet(self) -> str:
@@ -313,6 +322,8 @@ class Health:
             doubts.append("node not active")
         if self.state_trouble:
             doubts.append(f"temperatures and bristles will not survive: {self.state_trouble}")
+        if self.window_trouble:
+            doubts.append(f"window not written: {self.window_trouble}")
         if self.leaving:
             doubts.append("node stops: feed-forward to zero")
         arrived = [
@@ -323,7 +334,9 @@ class Health:
         if self.active and self.estimates == self._then_estimates and min(arrived) > 1:
             troubles.append("no torque although angles arrive")
         self._then_withheld, self._then_estimates = self.withheld.copy(), self.estimates
-        level = ERROR if troubles else (WARN if self.exceptions or doubts else OK)
+        if self.exceptions and not faulty:
+            doubts.append(f"{counted(self.exceptions, 'exception')} so far: {self.last_exception}")
+        level = ERROR if troubles else (WARN if doubts else OK)
         message = "; ".join([*troubles, *doubts]) or "running"
         values: dict[str, object] = {"exceptions": self.exceptions, "last exception": self.last_exception}
         values |= {f"feed-forward to zero: {reason}": n for reason, n in self.doubted.items()}

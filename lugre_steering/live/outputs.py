@@ -26,7 +26,7 @@ from lugre_steering.vehicle import Vehicle
 class Outputs:
     """Publishes what the estimator returns."""
 
-    def __init__(self, node: Node, vehicle: Vehicle, settings: Settings) -> None:
+    def __init__(self, node: Node, vehicle: Vehicle, settings: Settings, rate_limit_Nm_s: float) -> None:
         self._node = node
         self._publishers: list[Publisher] = []
         overrides = QoSOverridingOptions.with_default_policies()
@@ -56,7 +56,8 @@ class Outputs:
         self._commands: tuple[Float64MultiArray, Publisher] | None = None
         if settings.publish_commands:
             self._commands = Float64MultiArray(), publisher(Float64MultiArray, "~/feed_forward/commands")
-        self._ramp = CommandRamp(settings.angle_timeout_s, settings.options.recovery_ramp_s, self._sides)
+        self._ramp = CommandRamp(settings.angle_timeout_s, settings.options.recovery_ramp_s, rate_limit_Nm_s, self._sides)
+        self._rate_limit_Nm_s = rate_limit_Nm_s
         self.released: list[float] = []  # feed-forward last published; empty before the first
         self.fading: Fade | None = None
         self._fade_commands: Fade | None = None
@@ -65,12 +66,18 @@ class Outputs:
         for publisher in self._publishers:
             self._node.destroy_publisher(publisher)
 
-    def set_ramp(self, settings: Settings) -> None:
-        self._ramp.set_times(settings.angle_timeout_s, settings.options.recovery_ramp_s)
+    def set_ramp(self, settings: Settings, rate_limit_Nm_s: float) -> None:
+        self._ramp.set_limits(settings.angle_timeout_s, settings.options.recovery_ramp_s, rate_limit_Nm_s)
+        self._rate_limit_Nm_s = rate_limit_Nm_s
 
-    def begin_fade(self, ramp_s: float) -> None:
-        """From now on ``fade`` leads the feed-forward to zero, by the steady clock: simulated time may stand still."""
+    def begin_fade(self, ramp_s: float, longest_s: float = math.inf) -> None:
+        """From now on ``fade`` leads the feed-forward to zero, by the steady clock: simulated time may stand still.
+
+        It takes longer than the ramp where the limit of rate asks for that, but no more than ``longest_s``.
+        """
         now_ns = time.monotonic_ns()
+        largest = max(map(abs, (*self.released, *self._ramp.published)))
+        ramp_s = min(longest_s, max(ramp_s, largest / self._rate_limit_Nm_s))
         self.fading = Fade(now_ns, self.released, ramp_s)
         self._fade_commands = Fade(now_ns, self._ramp.published, ramp_s)
 
@@ -126,36 +133,37 @@ class Outputs:
         return True
 
     def estimate(self, stamp_ns: int, row: Records) -> bool:
-        """Publish angles, rates, torques, temperatures and feed-forward of each joint."""
+        """Publish angles, rates, torques and temperatures of each joint; False, and nothing published, if one of them or of the
+        feed-forward is not a finite number."""
         n = self._sides
-        theta, omega, torque, temperature, feed_forward = (
-            row[name][:n].tolist() for name in ("theta", "omega", "torque", "temperature", "feed_forward")
-        )
-        if not math.isfinite(sum(theta) + sum(omega) + sum(torque) + sum(temperature) + sum(feed_forward)):
+        theta, omega, torque, temperature = (row[name][:n].tolist() for name in ("theta", "omega", "torque", "temperature"))
+        if not math.isfinite(sum(theta) + sum(omega) + sum(torque) + sum(temperature) + sum(row["feed_forward"][:n].tolist())):
             return False
         self._set_stamp(stamp_ns)
         message, publisher = self._estimate
         message.position, message.velocity, message.effort = theta, omega, torque
         publisher.publish(message)
-        message, publisher = self._feed_forward
-        message.effort = self.released = feed_forward
-        publisher.publish(message)
-        self.fading = None
         for (message, publisher), value in zip(self._temperatures, temperature, strict=False):
             message.temperature = value
             publisher.publish(message)
         return True
 
+    def feed_forward(self, stamp_ns: int, now_ns: int, row: Records) -> None:
+        """Publish the feed-forward, as commands too if the node is to; the caller sees to it that ``row`` is fresh."""
+        wanted = row["feed_forward"][: self._sides].tolist()
+        self._set_stamp(stamp_ns)
+        message, publisher = self._feed_forward
+        message.effort = self.released = wanted
+        publisher.publish(message)
+        self.fading = None
+        if self._commands is not None:
+            command, publisher = self._commands
+            command.data = self._ramp(now_ns, wanted)
+            publisher.publish(command)
+
     def interrupt_commands(self) -> None:
         """Commands go on from the last one along a new ramp: what comes next may be far from it."""
         self._ramp.restart()
-
-    def commands(self, now_ns: int, row: Records) -> None:
-        """Publish the feed-forward as commands, if the node is to; the caller sees to it that ``row`` is fresh."""
-        if self._commands is not None:
-            message, publisher = self._commands
-            message.data = self._ramp(now_ns, row["feed_forward"][: self._sides].tolist())
-            publisher.publish(message)
 
     def residual(self, row: Records) -> bool:
         """Publish cylinder torque and residual of one past stamp."""

@@ -6,7 +6,7 @@ message."""
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,6 +91,22 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
         raise ParameterError(f"parameter 'watch_folder': got '{given['watch_folder']}', expected a folder that is there, or nothing")
     given["state_file"] = Path(given["state_file"]) if given["state_file"] else None
     return Settings(**given, options=Options(**{parameter.name: values[parameter.name] for parameter in OPTION_TABLE}))
+
+
+def undeclared(node: Node) -> list[str]:
+    """Names of overrides of quality of service that no topic of the configured node has taken: misspelt ones."""
+    return sorted(name for name in node._parameter_overrides if name.startswith(QOS) and not node.has_parameter(name))
+
+
+def check_files(settings: Settings, names: Collection[str]) -> None:
+    """``ParameterError`` if one of the newly named files cannot be what it is to be."""
+    if "vehicle_file" in names and not settings.vehicle_file.is_file():
+        raise ParameterError(f"parameter 'vehicle_file': got '{settings.vehicle_file}', expected a vehicle file that is there")
+    file = settings.state_file
+    if "state_file" in names and file is not None:
+        irregular = file.exists() and not file.is_file()
+        if irregular or not file.parent.is_dir() or not os.access(file.parent, os.W_OK | os.X_OK):
+            raise ParameterError(f"parameter 'state_file': got '{file}', expected a file in a folder that can be written, or nothing")
 
 
 def changed(node: Node, changes: Sequence[Change]) -> Settings:

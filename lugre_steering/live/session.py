@@ -53,15 +53,16 @@ class Session:
         warm_up(vehicle, settings.options)
         self.estimator = Estimator(vehicle, settings.options)
         self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
-        self.outputs = Outputs(node, vehicle, settings)
+        self.outputs = Outputs(node, vehicle, settings, self.estimator.rate_limit)
         self.watch = Watch(vehicle)
         self.samples = SampleRing() if settings.watch_folder is not None else None
         self.alarm = False  # the watch has just found that the model no longer matches
         self._node = node
         self._torque_ns = 0  # stamp of the newest torque
-        self._arrived_ns = 0  # monotonic time of the sample that gave it
+        self._fed_ns = 0  # monotonic time of the sample that gave the newest feed-forward
         self._doubts = 0
         self.news = False  # the doubts have changed since the last report, or the node has been switched on or off
+        self.before_first: Callable[[int], None] | None = None  # to be called once, with the stamp of the first sample
         self._now_ns: Callable[[], int] = time.time_ns
         self.choose_clock()
         self._inputs = Inputs(
@@ -76,7 +77,7 @@ class Session:
     def activate(self) -> None:
         self.active = self.news = True
         if self._torque_ns:  # what has come meanwhile was for nobody: the feed-forward comes back from what was last published
-            self.estimator.set_released(self.outputs.released or [0.0] * len(self.vehicle.sides))
+            self._come_back()
         self.outputs.fading = None
 
     def deactivate(self) -> None:
@@ -87,7 +88,7 @@ class Session:
     def withdraw(self) -> None:
         """Lead the feed-forward to zero and return when it is there: nobody will be left to do so."""
         self.active, outputs = False, self.outputs
-        outputs.begin_fade(min(LEAVE_S, self.settings.options.withdrawal_ramp_s))
+        outputs.begin_fade(self.settings.options.withdrawal_ramp_s, LEAVE_S)
         while not outputs.faded:
             time.sleep(TICK_S)
             outputs.fade(self._now_ns())
@@ -98,23 +99,29 @@ class Session:
         self.settings = settings
         self.estimator.set_options(settings.options)
         self.health.set_timeouts(settings.angle_timeout_s, settings.pressure_timeout_s)
-        self.outputs.set_ramp(settings)
+        self.outputs.set_ramp(settings, self.estimator.rate_limit)
 
-    def reload(self, vehicle: Vehicle) -> None:
-        """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
+    def prepare(self, vehicle: Vehicle) -> None:
+        """Compile what another file of the same vehicle needs, in any thread; ``DataError`` if it is of another one."""
         tell_compiling(self._node.get_logger().info)
+        self.estimator.check_continued(vehicle)
+        warm_up(vehicle, self.settings.options)
+
+    def reload(self, vehicle: Vehicle, file: Path) -> None:
+        """Go on with another file of the same vehicle; ``DataError``, and all as before, if it is of another one."""
         self.estimator = self.estimator.continued(vehicle)
-        self.vehicle, self._sheet = vehicle, source(self.settings.vehicle_file)
+        self.vehicle, self._sheet = vehicle, source(file)
         self.watch = Watch(vehicle)
         self.health.set_vehicle(vehicle)
+        self.outputs.set_ramp(self.settings, self.estimator.rate_limit)
 
     def tick(self) -> None:
         """Called often: leads the feed-forward to zero where that is due."""
         outputs = self.outputs
         if outputs.fading is None:
-            silent_ns = time.monotonic_ns() - self._arrived_ns
-            if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and outputs.released:
-                self.health.withheld["feed-forward led to zero: inputs stale"] += 1
+            silent_ns = time.monotonic_ns() - self._fed_ns
+            if self.active and self._stale_to_zero() and silent_ns > self.settings.angle_timeout_s * 1e9 and not outputs.faded:
+                self.health.withheld["feed-forward led to zero: inputs stale or withheld"] += 1
                 outputs.begin_fade(self.settings.options.withdrawal_ramp_s)
         elif not outputs.faded:
             outputs.fade(self._now_ns())
@@ -133,18 +140,21 @@ class Session:
         self.simulated = bool(clock.ros_time_is_active)
         self._now_ns = (lambda: int(clock.now().nanoseconds)) if self.simulated else time.time_ns
 
-    def window(self, reason: str) -> Callable[[], Path] | None:
-        """What writes the samples of the time since the mismatch began, and of some time before; None without a folder for them."""
+    def window(self, reason: str) -> Callable[[], tuple[Path, float]] | None:
+        """Mark this moment in the report. What writes the samples of the time since the mismatch began, and of some time before, and says
+        where and how much time [s] they hold; None without a folder for them."""
+        self.health.mark, self.news = f"{self._torque_ns * 1e-9:.3f} s: {reason}", True
         folder = self.settings.watch_folder
         if folder is None or self.samples is None:
             return None
         options, sheet = {"watch_before_s": self.settings.watch_before_s}, self._sheet
         since_ns = (self.watch.since_ns or self._torque_ns) - round(self.settings.watch_before_s * 1e9)
-        rows, vehicle, file = self.samples.since(since_ns), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
+        kept, vehicle, file = self.samples.copy(), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
 
-        def write() -> Path:
+        def write() -> tuple[Path, float]:
+            rows = kept[kept["stamp_ns"] >= since_ns]
             write_window(file, vehicle, reason, rows, made("node", options, sheet))
-            return file
+            return file, float(np.ptp(rows["stamp_ns"])) * 1e-9 if rows.size else 0.0
 
         return write
 
@@ -179,6 +189,9 @@ class Session:
         health.arrivals[channel] += 1
         health.arrived_ns[channel] = now_ns
         health.behind_ns[channel] = now_ns - stamp_ns
+        if self.before_first is not None:
+            self.before_first(stamp_ns)
+            self.before_first = None
         estimates, residuals = self.estimator.push(channel, stamp_ns, value, rate)
         if self.samples is not None:
             self.samples.add(channel, stamp_ns, value, rate)
@@ -202,7 +215,6 @@ class Session:
         if stamp_ns <= self._torque_ns:  # the estimator began anew
             outputs.interrupt_commands()
         self._torque_ns = stamp_ns
-        self._arrived_ns = begin_ns
         self.watch.turned(float(row["theta"][0]))
         if row["doubts"] != self._doubts:
             self._doubts, self.news = int(row["doubts"]), True
@@ -223,14 +235,20 @@ class Session:
         health.stamp_to_publish.add(now_ns - stamp_ns)
         if not outputs.estimate(stamp_ns, row):
             self._withhold("estimate is not a finite number")
-        elif abs(now_ns - stamp_ns) <= self.settings.angle_timeout_s * 1e9:
-            outputs.commands(now_ns, row)
-        elif self.settings.publish_commands:
-            self._withhold("commands: stamps are not close to the clock")
+        elif abs(now_ns - stamp_ns) > self.settings.angle_timeout_s * 1e9:
+            self._withhold("feed-forward: stamps are not close to the clock")
+        else:
+            outputs.feed_forward(stamp_ns, now_ns, row)
+            self._fed_ns = begin_ns
 
     def _withhold(self, reason: str) -> None:
         self.health.withheld[reason] += 1
         self.outputs.interrupt_commands()
+        self._come_back()
+
+    def _come_back(self) -> None:
+        """The next feed-forward comes back from what was last published, over the recovery ramp."""
+        self.estimator.set_released(self.outputs.released or [0.0] * len(self.vehicle.sides))
 
 
 def warm_up(vehicle: Vehicle, options: Options) -> None:

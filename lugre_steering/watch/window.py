@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
-from lugre_steering.files import replacing
+from lugre_steering.files import refuse_irregular, replacing
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Channel, IntArray, Kind, Recording, Signal
 from lugre_steering.serialise import plain
@@ -39,11 +39,11 @@ class SampleRing:
         self._ring[self._count % CAPACITY] = channel, stamp_ns, value, rate
         self._count += 1
 
-    def since(self, stamp_ns: int) -> Records:
-        """A copy of those stamped then or later, in order of arrival."""
-        kept = min(self._count, CAPACITY)
-        rows = self._ring[np.arange(self._count - kept, self._count) % CAPACITY]
-        return rows[rows["stamp_ns"] >= stamp_ns]
+    def copy(self) -> Records:
+        """A copy of them, in order of arrival: as quick as memory allows, since torques wait for it."""
+        kept, next_ = min(self._count, CAPACITY), self._count % CAPACITY
+        rows: Records = np.concatenate([self._ring[next_:kept], self._ring[:next_]])
+        return rows
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ def write_window(file: Path, vehicle: Vehicle, reason: str, samples: Records, ma
 def read_window(file: Path, channels: Sequence[Channel]) -> Window:
     """A window as a recording; ``DataError`` if it is none, damaged, or of a vehicle with other channels."""
     try:
+        refuse_irregular(file)
         with zipfile.ZipFile(file) as archive:
             if sum(item.file_size for item in archive.infolist()) > LARGEST_BYTES:
                 raise DataError(f"{file}: larger than any window, expected at most {LARGEST_BYTES} bytes")

@@ -49,6 +49,8 @@ NAME = "/steering_torque_estimator"
 SECOND = 1_000_000_000
 T0 = 1_700_000_000 * SECOND
 PERIOD_S = 0.01
+STOPPED = ("-p", "use_sim_time:=true", "-p", "angle_timeout_s:=60.0")
+"""Of a node whose clock ``World.set_clock`` sets: samples of a minute about it are fresh."""
 
 OUTPUTS = {
     "torque": WrenchStamped,
@@ -224,6 +226,15 @@ class World:
                 time.sleep(wait)
             self.send(sample)
         return until()
+
+    def set_clock(self, stamp_ns: int) -> None:
+        """Publish a simulated time until the node has it."""
+
+        def heard() -> bool:
+            self.clock.publish(Clock(clock=to_time(stamp_ns)))
+            return to_ns(self.heard["diagnostics"][-1].header.stamp) == stamp_ns
+
+        self.wait(heard)
 
     def stamps(self, topic: str) -> list[int]:
         return [to_ns(message.header.stamp) for message in self.heard[topic]]

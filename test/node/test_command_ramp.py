@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ramp of the unstamped feed-forward commands."""
 
+import itertools
+
 import pytest
 
 pytest.importorskip("rclpy")
@@ -9,16 +11,18 @@ pytest.importorskip("rclpy")
 from lugre_steering.estimator.commands import CommandRamp, Fade
 
 MS = 1_000_000
+FAST = 1e9
+"""A limit of rate [N m/s] that nothing here comes to."""
 
 
 def test_first_commands_rise_from_zero() -> None:
-    ramp = CommandRamp(0.2, 1.0, 1)
+    ramp = CommandRamp(0.2, 1.0, FAST, 1)
     values = [ramp(i * 100 * MS, [50.0])[0] for i in range(12)]
     assert values == pytest.approx([0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 50.0])
 
 
 def test_after_silence_commands_continue_where_they_stopped() -> None:
-    ramp = CommandRamp(0.2, 0.4, 2)
+    ramp = CommandRamp(0.2, 0.4, FAST, 2)
     for i in range(20):
         ramp(i * 50 * MS, [100.0, -100.0])
     begin = 2000 * MS
@@ -28,7 +32,7 @@ def test_after_silence_commands_continue_where_they_stopped() -> None:
 
 
 def test_a_clock_set_back_counts_as_silence() -> None:
-    ramp = CommandRamp(0.2, 0.1, 1)
+    ramp = CommandRamp(0.2, 0.1, FAST, 1)
     for i in range(20):
         ramp(i * 50 * MS, [10.0])
     assert ramp(0, [90.0]) == [10.0]
@@ -36,7 +40,7 @@ def test_a_clock_set_back_counts_as_silence() -> None:
 
 
 def test_a_restart_ramps_without_any_silence() -> None:
-    ramp = CommandRamp(5.0, 0.1, 1)
+    ramp = CommandRamp(5.0, 0.1, FAST, 1)
     for i in range(20):
         ramp(i * 10 * MS, [10.0])
     ramp.restart()
@@ -54,5 +58,17 @@ def test_a_fade_reaches_zero_and_makes_no_large_step_after_a_pause() -> None:
     assert Fade(0, [7.0], 0.0)(1) == [0.0]
 
 
-def test_no_ramp_wanted() -> None:
-    assert CommandRamp(0.2, 0.0, 1)(5, [7.0]) == [7.0]
+def test_without_a_ramp_the_limit_of_rate_leads_there() -> None:
+    ramp = CommandRamp(0.2, 0.0, 100.0, 1)
+    assert [ramp(i * 10 * MS, [7.0])[0] for i in range(9)] == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 7.0])
+
+
+def test_commands_go_nowhere_faster_than_the_limit_of_rate() -> None:
+    """On the ramp, after it, and after a pause, which gives no more time than 0.05 s."""
+    ramp = CommandRamp(0.5, 0.1, 200.0, 2)
+    times = [*range(0, 300, 10), *range(600, 900, 10), *range(2000, 2300, 10)]
+    values = [ramp(i * MS, [100.0, -100.0] if i < 1000 else [-100.0, 100.0]) for i in times]
+    for (sooner, a), (later, b) in itertools.pairwise(zip(times, values, strict=True)):
+        assert all(abs(y - x) <= 200.0 * min(0.05, (later - sooner) * 1e-3) + 1e-9 for x, y in zip(a, b, strict=True))
+    assert values[59] == [100.0, -100.0]
+    assert values[-1] == pytest.approx([42.0, -42.0])

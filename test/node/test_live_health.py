@@ -17,7 +17,6 @@ pytest.importorskip("rclpy")
 
 import itertools
 
-from builtin_interfaces.msg import Time
 from live_harness import (
     PATIENCE_S,
     SECOND,
@@ -130,7 +129,8 @@ def test_a_model_that_no_longer_matches_is_told_with_the_time_since() -> None:
     health.mismatch_s = 12.3
     status = next(s for s in health.statuses(1, 1, 1.0, {}, 0) if s.name.endswith("residual"))
     assert status.level == WARN
-    assert "since 12 s the residual is not what it was: the model no longer matches; diagnose" in status.message
+    assert status.message == "the residual is not what it was: the model no longer matches; diagnose"
+    assert {pair.key: pair.value for pair in status.values}["no longer matches since [s]"] == "12.3"
 
 
 def test_every_rejection_is_counted_by_channel_and_reason() -> None:
@@ -283,8 +283,34 @@ def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> 
         steady.steer(30, 0.0, age_ns=round((timeout_s + 0.3) * SECOND))  # too old on arrival: an estimate, but nothing to act upon
         world.wait(lambda: len(world.heard["torque"]) == steady.pairs)
         assert len(commands) == before
-        told = "withheld: commands: stamps are not close to the clock"
+        assert len(feed_forward) == len(commands)
+        told = "withheld: feed-forward: stamps are not close to the clock"
         world.status("outputs", lambda s: s.values.get(told) == "30")
+        last = feed_forward[-1].effort[0]
+        steady.steer(30, 0.0)
+        world.wait(lambda: len(feed_forward) == before + 30)
+        assert feed_forward[before].effort[0] == pytest.approx(last, abs=STEP_NM)  # what nobody heard is not where it goes on from
+
+
+STEP_NM = 0.05 * math.degrees(5393.7)
+"""No step of the feed-forward is larger: 0.05 s of the limit of rate."""
+
+
+def test_feed_forward_of_old_stamps_is_led_to_zero_if_so_wanted() -> None:
+    arguments = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.3", "-p", "when_stale:=zero")
+    with LiveNode(*arguments), World(load(VEHICLE)) as world:
+        commands, feed_forward, steady = world.heard["feed_forward/commands"], world.heard["feed_forward"], Steady(world)
+        while not commands or abs(commands[-1].data[0]) < 5e3:
+            steady.steer(20, 0.05)
+        for late in range(200):  # a clock that goes at half speed
+            steady.steer(1, 0.0, age_ns=late * SECOND // 200)
+        world.wait(lambda: commands[-1].data[0] == 0.0 == feed_forward[-1].effort[0])
+        heard = len(commands), len(feed_forward)
+        steady.steer(30, 0.0, age_ns=SECOND)
+        world.wait(lambda: len(world.heard["torque"]) == steady.pairs)
+        assert (len(commands), len(feed_forward)) == heard  # zero has been said: silence
+        steps = [abs(b.effort[0] - a.effort[0]) for a, b in itertools.pairwise(feed_forward)]
+        assert max(steps) < STEP_NM
 
 
 @pytest.mark.parametrize("cause", ["a clock set back", "an exception"])
@@ -322,6 +348,24 @@ def outputs_of(health: Health) -> tuple[bytes, str]:
     """Level and message of the next report, a second after the one before."""
     status = list(health.statuses(0, 0, 1.0, {}, 0))[-1]
     return status.level, status.message
+
+
+def test_an_exception_that_is_over_is_counted_in_the_message() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    health.fault(ZeroDivisionError("made to fail"), -5 * SECOND)
+    assert outputs_of(health) == (ERROR, "exception: ZeroDivisionError: made to fail")
+    assert outputs_of(health) == (WARN, "1 exception so far: ZeroDivisionError: made to fail")
+
+
+def test_silence_of_all_pressures_is_told_as_what_it_means() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    labels = {f"input {i}": {"accepted": 0} for i in range(7)}
+    health.arrivals, health.arrived_ns = [1] * 7, [SECOND] * 7
+    for silent in (range(2, 5), range(2, 6)):
+        health.arrived_ns = [SECOND - 600_000_000 * (i in silent) for i in range(7)]
+        status = next(health.statuses(SECOND, 1, 1.0, labels, 0))
+        assert status.level == WARN
+        assert ("no measured torque" in status.message) == (len(silent) == 4)
 
 
 def test_angles_without_a_torque_are_an_error() -> None:
@@ -402,12 +446,7 @@ def test_simulated_time() -> None:
     vehicle = load(VEHICLE)
     arguments = ("-p", "use_sim_time:=true", "-p", "publish_commands:=true")
     with LiveNode(*arguments), World(vehicle) as world:
-
-        def set_clock() -> bool:
-            world.clock.publish(Clock(clock=Time(sec=100)))
-            return bool(world.heard["diagnostics"][-1].header.stamp.sec == 100)
-
-        world.wait(set_clock)
+        world.set_clock(100 * SECOND)
         for i in range(100):
             stamp_ns = 100 * SECOND + i * 10_000_000
             world.clock.publish(Clock(clock=to_time(stamp_ns)))

@@ -25,6 +25,7 @@ from live_harness import (
     PERIOD_S,
     SECOND,
     STOP_S,
+    STOPPED,
     VEHICLE,
     Driver,
     LiveNode,
@@ -63,7 +64,7 @@ def unmatched_world() -> Iterator[World]:
         yield world
 
 
-def test_life_cycle() -> None:
+def test_life_cycle(tmp_path: Path) -> None:
     with LiveNode(*COMMANDS, "-p", "autostart:=false") as node, unmatched_world() as world:
         assert state_of(world) == State.PRIMARY_STATE_UNCONFIGURED
         world.status("outputs", lambda s: s.message == "not configured")
@@ -93,9 +94,11 @@ def test_life_cycle() -> None:
         assert change_state(world, Transition.TRANSITION_DEACTIVATE)
         assert change_state(world, Transition.TRANSITION_CLEANUP)
         assert state_of(world) == State.PRIMARY_STATE_UNCONFIGURED
-        set_parameters(world, vehicle_file="/no/such/file.yaml")
+        assert "/no/such/file.yaml" in set_parameters(world, vehicle_file="/no/such/file.yaml").reason
+        (no_vehicle := tmp_path / "none.yaml").write_text("none")
+        set_parameters(world, vehicle_file=str(no_vehicle))
         assert not change_state(world, Transition.TRANSITION_CONFIGURE)
-        assert "/no/such/file.yaml" in node_output(node)
+        assert str(no_vehicle) in node_output(node)
         set_parameters(world, vehicle_file=str(VEHICLE))
         assert change_state(world, Transition.TRANSITION_CONFIGURE)
         assert change_state(world, Transition.TRANSITION_ACTIVATE)
@@ -140,6 +143,27 @@ def test_quality_of_service_can_be_overridden() -> None:
         found = world.node.get_publishers_info_by_topic(f"{NAME}/torque")
         assert "BEST_EFFORT" in [info.qos_profile.reliability.name for info in found]
         assert "no such parameter" not in node_output(node)
+
+
+def test_a_misspelt_quality_of_service_is_told() -> None:
+    topic = "qos_overrides./steering_torque_estimator/torqe.publisher.reliability"
+    with LiveNode("-p", f"{topic}:=best_effort") as node:
+        assert f"no such parameter, not used: {topic}" in node_output(node)
+
+
+def test_the_state_survives_in_simulated_time(tmp_path: Path) -> None:
+    file = tmp_path / "state.json"
+    arguments = (*STOPPED, "-p", f"state_file:={file}", "-p", "state_period_s:=0.2")
+    for start_ns in (100 * SECOND, 101 * SECOND):
+        with LiveNode(*arguments) as node, World() as world:
+            world.set_clock(start_ns)
+            for i in range(20):
+                for side in (0, 1):
+                    world.send(Sample(side, start_ns + i * 10_000_000, 0.1))
+                time.sleep(0.01)
+            world.wait(file.exists)
+            assert ("taken over" in node_output(node)) == (start_ns > 100 * SECOND)
+            assert "state not used" not in node_output(node)
 
 
 def steer_until_heard(world: World, begin_s: float) -> None:

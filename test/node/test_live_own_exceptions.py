@@ -152,6 +152,26 @@ def test_a_state_that_cannot_be_written_is_told_and_the_node_goes_on(
     node.save()
     assert "s.json: state cannot be written: " in capfd.readouterr().err
     assert not node.last_exception
+    assert node.session is not None
+    assert "cannot be written" in node.session.health.state_trouble
+    (tmp_path / "state").mkdir()
+    node.save()
+    assert not node.session.health.state_trouble
+
+
+def test_a_window_that_cannot_be_written_is_told_and_withholds_nothing(node: SteeringTorqueEstimator, tmp_path: Path) -> None:
+    node.start()
+    steer(node)
+    session = node.session
+    assert session is not None
+    shutil.rmtree(tmp_path / "windows")
+    session.alarm = True
+    spin_until(node, lambda: bool(session.health.window_trouble))
+    assert "No such file" in session.health.window_trouble
+    assert not session.health.exceptions
+    (tmp_path / "windows").mkdir()
+    session.alarm = True
+    spin_until(node, lambda: not session.health.window_trouble)
 
 
 def test_a_torque_that_is_no_number_is_withheld_and_told(node: SteeringTorqueEstimator) -> None:
@@ -209,6 +229,10 @@ def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTo
     (result,) = node.set_parameters([Parameter("when_stale", value="perhaps")])
     assert not result.successful
     assert "expected one of silent, zero" in result.reason
+    for name, value in (("vehicle_file", "/none.yaml"), ("state_file", "/none/s.json"), ("state_file", str(VEHICLE.parent))):
+        (result,) = node.set_parameters([Parameter(name, value=value)])
+        assert not result.successful
+        assert f"parameter '{name}': got '{value}', expected a" in result.reason
     assert node.settings == before
 
 

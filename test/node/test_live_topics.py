@@ -16,7 +16,21 @@ import pytest
 pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Duration
-from live_harness import NAME, SECOND, T0, VEHICLE, LiveNode, Sample, World, direct, message_of, motion, to_ns, to_time
+from live_harness import (
+    NAME,
+    SECOND,
+    STOPPED,
+    T0,
+    VEHICLE,
+    LiveNode,
+    Sample,
+    World,
+    direct,
+    message_of,
+    motion,
+    to_ns,
+    to_time,
+)
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Writer
@@ -75,7 +89,8 @@ def test_live_equals_direct_on_every_topic() -> None:
     estimates, residuals = direct(Estimator(vehicle), samples)
     assert len(estimates) == 500
     assert len(residuals) > 490
-    with LiveNode(), World(vehicle) as world:
+    with LiveNode(*STOPPED), World(vehicle) as world:
+        world.set_clock(T0)
         world.play(samples, speed=2.0)
         assert_topics_equal(world, estimates, residuals)
         _, _, inputs = world.status("inputs")
@@ -124,7 +139,8 @@ def test_late_pressures_give_the_residual_later_in_stamp_order() -> None:
     angles = [sample for sample in samples if sample.channel < 2]
     rest = [sample for sample in samples if sample.channel >= 2]
     estimates, residuals = direct(Estimator(vehicle), [*angles, *rest])
-    with LiveNode(), World(vehicle) as world:
+    with LiveNode(*STOPPED), World(vehicle) as world:
+        world.set_clock(T0)
         world.play(angles)
         world.wait(lambda: len(world.heard["torque"]) == len(estimates))
         assert not world.heard["residual"]
@@ -144,7 +160,8 @@ def test_one_joint_with_a_torque_sensor(tmp_path: Path) -> None:
     samples = motion(vehicle, 1.0)
     estimates, residuals = direct(Estimator(vehicle), samples)
     assert len(residuals) > 90
-    with LiveNode(vehicle=file), World(vehicle) as world:
+    with LiveNode(*STOPPED, vehicle=file), World(vehicle) as world:
+        world.set_clock(T0)
         world.play(samples)
         assert_topics_equal(world, estimates, residuals)
         assert world.heard["estimate"][0].name == ["left_track_steer_joint"]
@@ -186,7 +203,8 @@ def test_one_angle_sensor_live_equals_replay(tmp_path: Path) -> None:
     expected = replayed(tmp_path / "out" / "run")
     assert len(expected["torque"]) == 400
     assert len(expected["residual"]) > 390
-    with LiveNode(vehicle=file), World(vehicle) as world:
+    with LiveNode(*STOPPED, vehicle=file), World(vehicle) as world:
+        world.set_clock(T0)
         world.play(samples, speed=2.0)
         world.wait(lambda: all(len(world.heard[topic]) >= len(messages) for topic, messages in expected.items()))
         for topic, field in (
@@ -235,12 +253,13 @@ def test_feed_forward_looks_ahead_along_the_commanded_trajectory() -> None:
     estimates += direct(estimator, still[50:100])[0]
     estimator.refuse_plan()
     estimates += direct(estimator, still[100:160])[0]
-    with LiveNode("-p", "feed_forward_horizon_s:=0.3"), World(vehicle) as world:
+    with LiveNode(*STOPPED, "-p", "feed_forward_horizon_s:=0.3"), World(vehicle) as world:
 
         def refused() -> dict[str, int]:
             values = world.statuses("rejected")[-1].values
             return {key: int(n) for key, n in values.items() if key.startswith("steering/command")}
 
+        world.set_clock(T0)
         world.command.publish(early)
         world.wait(lambda: len(refused()) == 1)
         world.play(still[:50])

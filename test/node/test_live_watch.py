@@ -25,7 +25,9 @@ def test_a_marked_window_is_written(tmp_path: Path) -> None:
         world.wait(lambda: len(world.heard["torque"]) == 200)
         answer = call(world, Trigger, f"{NAME}/mark", Trigger.Request())
         assert answer.success, answer.message
-        file = Path(answer.message)
+        file, length = answer.message.splitlines()
+        assert 1.5 < float(length.removesuffix(" s")) < 30.0  # not the 60 s wanted: there is no more
+        file = Path(file)
         recording = read_window(file, world.vehicle.channels).recording
         assert recording.angle["left"].value.size == 200
         assert recording.angle["right"].value.size == 200
@@ -34,8 +36,12 @@ def test_a_marked_window_is_written(tmp_path: Path) -> None:
     assert made["vehicle"]["sha256"] == {VEHICLE.name: hashlib.sha256(VEHICLE.read_bytes()).hexdigest()}
 
 
-def test_without_a_folder_there_is_none() -> None:
+def test_without_a_folder_a_mark_is_told_and_no_window_written() -> None:
     with LiveNode() as _, World() as world:
+        Driver(world).steer(0.2)
         answer = call(world, Trigger, f"{NAME}/mark", Trigger.Request())
-        assert not answer.success
+        assert answer.success
         assert "watch_folder" in answer.message
+        mark = world.status("residual", lambda s: "last mark" in s.values).values["last mark"]
+        assert mark.endswith(" s: marked")
+        assert mark in answer.message
