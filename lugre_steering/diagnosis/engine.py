@@ -26,7 +26,15 @@ from lugre_steering.fitting.clocks import WORTH_SAYING_S, Synchronised, slows, s
 from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import Suspect, WrongSheet, physics_beside, physics_instead, wrong_entry, wrong_sheet
+from lugre_steering.fitting.sheet import (
+    EXPLAINED,
+    Suspect,
+    WrongSheet,
+    physics_beside,
+    physics_instead,
+    wrong_entry,
+    wrong_sheet,
+)
 from lugre_steering.fitting.split import split
 from lugre_steering.fitting.weather import weather_findings
 from lugre_steering.recording import Recording
@@ -125,7 +133,10 @@ def _searched(
 
 
 def _misplaced(done: Finished) -> WrongSheet | None:
-    """An angle sensor so far from its zero that it was put on, or written down, wrongly: no physics is to be read from its angles."""
+    """An angle sensor so far from its zero that it was put on, or written down, wrongly: no physics is to be read from its angles. Like any
+    wrong entry it explains most of what recalibration leaves; what does not only resembles it."""
+    if not excess(done.problem, done.found.final, done.fitted) < (1.0 - EXPLAINED) * excess(done.problem, done.found.baseline, done.fitted):
+        return None
     for candidate, values in done.found.final.effects:
         zero = values.get("offset", 0.0)
         if "angle" in candidate.effect.hooks and done.problem.vehicle.coordinate.unit == "rad" and abs(zero) > MISPLACED_RAD:

@@ -23,7 +23,9 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.effects import registry
 from lugre_steering.errors import BagError
 from lugre_steering.fitting.fit import fit
+from lugre_steering.fitting.sheet import WrongSheet
 from lugre_steering.proof.simulator import Concealed
+from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep
 from lugre_steering.vehicle import load
 
@@ -107,7 +109,14 @@ def test_angles_far_from_their_zero_are_no_physics(zero: float, told: str | None
     """A hidden offset of a degree is named; five degrees are a sensor put on wrongly, and nothing is named before that is right."""
     problem = small_problem(40.0)
     final = fit(problem, weight(problem), [effect("angle_offset", offset=zero)], linearisations=1)
-    done = SimpleNamespace(problem=problem, found=SimpleNamespace(final=replace(final, effects=(effect("angle_offset", offset=zero),))))
-    wrong = engine._misplaced(cast(Finished, done))
+    left = 3.0 * (problem.measured - final.prediction)
+    final = replace(final, effects=(effect("angle_offset", offset=zero),), prediction=problem.measured - left)
+
+    def misplaced(left_without: Array) -> WrongSheet | None:
+        found = SimpleNamespace(final=final, baseline=replace(final, prediction=problem.measured - left_without))
+        return engine._misplaced(cast(Finished, SimpleNamespace(problem=problem, found=found, fitted=weight(problem))))
+
+    wrong = misplaced(10.0 * left)
     assert (wrong is None) == (told is None)
     assert wrong is None or (told in wrong.statement and "zero of the angle sensors" in wrong.statement)
+    assert misplaced(1.1 * left) is None, "an offset that explains little only resembles what is there"
