@@ -92,12 +92,12 @@ STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
 
 
 RIG = (
-    replace(FRICTION, prior=0.5, low=-2.0, high=2.0),
+    replace(FRICTION, prior=0.5, low=-7.0, high=2.0),
     STATIC,
     replace(STIFFNESS, prior=0.7, low=-3.0, high=3.0),
     replace(STRIBECK, prior=0.7, low=-3.0, high=3.0),
 )
-"""Of a single joint or axis, whose sheet holds rough numbers."""
+"""Of a single joint or axis, whose sheet holds rough numbers: it may have next to no friction."""
 
 
 def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:

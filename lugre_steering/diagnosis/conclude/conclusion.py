@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude import limits
@@ -17,7 +17,7 @@ from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.late import fitted_to_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws
-from lugre_steering.diagnosis.conclude.stands import Stands, standing
+from lugre_steering.diagnosis.conclude.stands import CONTRADICTED, Stands, standing, without_laws
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
@@ -46,10 +46,12 @@ def conclude(
 ) -> Diagnosis:
     """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     done, stands = standing(done, seed, progress)
-    model = _modelled(done, stands)
-    effects = named_effects(model.done, model.whole, model.bent, material) if stands.named else []
-    vehicle = _written(model, stands, effects)
-    causal = causal_rmse(vehicle, recordings, done.problem.runs)
+    model, effects, vehicle, causal = _with_file(done, stands, recordings, material)
+    if stands.lawful is not None:
+        bare = without_laws(done, stands, seed)
+        other = _with_file(done, bare, recordings, material)
+        if causal > (1.0 + CONTRADICTED) * other.causal:  # explained when all is known, and a harm live
+            stands, (model, effects, vehicle, causal) = bare, other
     form = _form(done, stands, vehicle, causal, recordings)
     if (clock := stands.clock) is not None and not stands.better:
         apart = clock_finding(done.problem.vehicle, clock.late_s, clock.deviation_s)
@@ -71,6 +73,22 @@ class _Modelled:
     laws: list[dict[str, Any]]
     law: str
     left: LeftOver
+
+
+class _WithFile(NamedTuple):
+    """What stands with its names and the vehicle file that has it, and the error [N m] of that file without looking ahead."""
+
+    model: _Modelled
+    effects: list[NamedEffect]
+    vehicle: Vehicle
+    causal: float
+
+
+def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float) -> _WithFile:
+    model = _modelled(done, stands)
+    effects = named_effects(model.done, model.whole, model.bent, material) if stands.named else []
+    vehicle = _written(model, stands, effects)
+    return _WithFile(model, effects, vehicle, causal_rmse(vehicle, recordings, done.problem.runs))
 
 
 def _modelled(done: Finished, stands: Stands) -> _Modelled:

@@ -99,6 +99,13 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
     return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
 
 
+def without_laws(done: Finished, stands: Stands, seed: int) -> Stands:
+    """The same without its laws: names as they are without them, or nothing in the place of what laws explained."""
+    found = done.found
+    judged = verify.verify(done.problem, done.weight, found.baseline, found.final, done.roles, seed, done.refitted)
+    return replace(stands, lawful=None, judged=judged, form=None, nearest=())
+
+
 def _tested(done: Finished, seed: int) -> _Tested:
     """The search has already tested significance; held-out data must not contradict it, though they may hardly see the effect,
     and an improvement that may be none is none: beside the freedoms with which names are compared, as without them the form of the

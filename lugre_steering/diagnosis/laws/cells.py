@@ -14,7 +14,7 @@ from lugre_steering.chain.step import Records, run_side, torque_side
 from lugre_steering.effects import laws
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Problem, in_threads
+from lugre_steering.fitting.problem import Problem, in_threads, is_rig
 from lugre_steering.recording import Array
 
 PIECES, HATS, FINE = 10, 3, 36
@@ -141,7 +141,8 @@ def axes_of(problem: Problem) -> list[Axis]:
     lagged = [Axis(name, "lag", tau) for name in ("rate", "direction", "torque", "power") for tau in LAGS_S]
     widths = [("angle", travel), ("torque", torque)]
     shortest = max(float(run.time[1] - run.time[0]) for run in problem.runs) * RING_STEPS
-    highest = min(RINGS_HZ[1], 1.0 / shortest)
+    # The torque of a joint or axis holds that of its inertia, and what smoothing takes from an acceleration looks like a mode.
+    highest = 0.0 if is_rig(problem.vehicle) else min(RINGS_HZ[1], 1.0 / shortest)
     rings = [Axis(laws.RINGS[1], "ring", 1.0 / f) for f in np.geomspace(RINGS_HZ[0], highest, RINGS_TRIED)] if highest > RINGS_HZ[0] else []
     return plain + lagged + rings + [Axis(name, kind, share * of) for name, of in widths for kind in ("play", "relay") for share in PLAYS]
 
