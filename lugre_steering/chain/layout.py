@@ -26,6 +26,7 @@ BASELINE_FIELDS = (
     "initial_bristle",  # z at the start of the recording [rad]
     "torque_unit",  # size of this machine's torques, 1 for a rubber-tracked vehicle; laws write their constants in it
     "angle_unit",  # size of its travel, likewise
+    "acceleration_unit",  # size of its accelerations, likewise
     "sides",  # number of tracks that share vehicle-level torques
     "table_low",  # first temperature of the rubber table [degC]
     "table_step",  # its step [K]

@@ -52,10 +52,11 @@ def running_maximum_excess(kappa):
 
 
 @inner
-def follow(s, dt, measured, measured_rate, sigma, angle_unit):
+def follow(s, dt, measured, measured_rate, sigma, acceleration_unit):
     """Advance the motion state ``s`` by one sample: angle [rad] after ``dt`` [s], its noise ``sigma`` [rad] (0: none).
 
-    ``measured_rate`` [rad/s] is used instead of the differentiated angle when it is a number; ``angle_unit`` is the size of the travel.
+    ``measured_rate`` [rad/s] is used instead of the differentiated angle when it is a number; ``acceleration_unit`` is the size of
+    its accelerations.
     """
     if s.started == 0.0:
         s.started = 1.0
@@ -82,9 +83,9 @@ def follow(s, dt, measured, measured_rate, sigma, angle_unit):
     s.theta += step
 
     rate = step / dt if math.isnan(measured_rate) else measured_rate
-    gain = dt / (min(RATE_TIME_CONSTANT_S, math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * angle_unit))) + dt)
+    gain = dt / (min(RATE_TIME_CONSTANT_S, math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * acceleration_unit))) + dt)
     change = (rate - s.omega) * gain
     s.omega += change
-    if abs(s.omega) < NO_RATE_RAD_S * angle_unit and step == 0.0:
+    if abs(s.omega) < NO_RATE_RAD_S * acceleration_unit and step == 0.0:
         s.omega = 0.0
     s.alpha += (change / dt - s.alpha) * gain

@@ -79,7 +79,7 @@ def _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, fir
 def new_parameters(composition: Composition) -> Records:
     """A parameter record (shape (1,)) with every effect neutral; the other baseline fields are still to be set."""
     record = np.zeros(1, composition.parameters)
-    record["torque_unit"] = record["angle_unit"] = 1.0
+    record["torque_unit"] = record["angle_unit"] = record["acceleration_unit"] = 1.0
     return record
 
 

@@ -18,7 +18,7 @@ from lugre_steering.recording import Array
 from lugre_steering.vehicle.loads import load_moment, vertical_load
 from lugre_steering.vehicle.rubber import ratio_table
 from lugre_steering.vehicle.sections import Vehicle
-from lugre_steering.vehicle.size import FRICTION_NM, angle_unit, decade
+from lugre_steering.vehicle.size import FRICTION_NM, acceleration_unit, angle_unit, decade
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,7 @@ def baseline_parameters(vehicle: Vehicle) -> dict[str, float]:
         values["aligning_torque"] = values.get("aligning_torque", 0.0) + vehicle.gravity.sin_Nm
     values["torque_unit"] = decade(values["coulomb_torque"], FRICTION_NM)
     values["angle_unit"] = angle_unit(vehicle)
+    values["acceleration_unit"] = acceleration_unit(vehicle)
     values["angle_noise"] = vehicle.sensors.angle_sigma
     return values
 

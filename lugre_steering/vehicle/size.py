@@ -12,6 +12,8 @@ from lugre_steering.vehicle.sections import Vehicle
 
 FRICTION_NM, STRIBECK_RAD_S, TRAVEL_RAD = 25e3, 0.026, 0.8
 """Friction torque and Stribeck speed of one track, and travel, of the vehicle whose size counts as one."""
+AXIS_ACCELERATION = 10.0
+"""Acceleration of an axis for its size, against that of the vehicle."""
 SPARE = 5.0
 """By how much the torque of a rig is overstated, so that ranges written for a vehicle, which rests on friction, are wide enough for it."""
 
@@ -47,6 +49,11 @@ VEHICLE = Size()
 def decade(value: float, reference: float) -> float:
     """The power of ten nearest to value / reference; 1 where there is no value."""
     return 10.0 ** round(math.log10(value / reference)) if 0.0 < value < math.inf else 1.0
+
+
+def acceleration_unit(vehicle: Vehicle) -> float:
+    """Size of the accelerations, likewise; an axis is driven by a screw or a belt, and faster for its size than tracks are turned."""
+    return 1.0 if vehicle.coordinate.unit == "rad" else AXIS_ACCELERATION * angle_unit(vehicle)
 
 
 def angle_unit(vehicle: Vehicle) -> float:

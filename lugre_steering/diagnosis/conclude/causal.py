@@ -16,14 +16,14 @@ from lugre_steering.data.dataset import Run, _at
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.size import angle_unit
+from lugre_steering.vehicle.size import acceleration_unit
 
 
 @njit(cache=True)
-def _follow_all(s: Any, time: Array, angle: Array, rate: Array, sigma: float, angle_unit: float, out: Array) -> None:
+def _follow_all(s: Any, time: Array, angle: Array, rate: Array, sigma: float, unit: float, out: Array) -> None:
     """Angle, rate and acceleration (3, n) after each sample."""
     for i in range(time.size):
-        follow(s, time[i] - time[max(i - 1, 0)], angle[i], rate[i], sigma, angle_unit)
+        follow(s, time[i] - time[max(i - 1, 0)], angle[i], rate[i], sigma, unit)
         out[0, i], out[1, i], out[2, i] = s.theta, s.omega, s.alpha
 
 
@@ -45,5 +45,5 @@ def _causal(vehicle: Vehicle, recording: Recording, side: str, time: Array) -> A
     angle, rate = recording.angle[side], recording.rate.get(side)
     given = np.full(angle.time_s.size, np.nan) if rate is None else np.interp(angle.time_s, rate.time_s, rate.value)
     state, motion = np.zeros(1, MOTION), np.zeros((3, angle.time_s.size))
-    _follow_all(state[0], angle.time_s, angle.value, given, vehicle.sensors.angle_sigma, angle_unit(vehicle), motion)
+    _follow_all(state[0], angle.time_s, angle.value, given, vehicle.sensors.angle_sigma, acceleration_unit(vehicle), motion)
     return np.array([_at(time, Signal(angle.time_s, row)) for row in motion])
