@@ -301,7 +301,7 @@ def matlab_73(path: Path) -> None:
 @needs_h5py
 def test_matlab_73(tmp_path: Path) -> None:
     matlab_73(tmp_path / "d.mat")
-    with pytest.raises(MapFileError, match="'sparse_bomb': holds 100000000000 numbers"):
+    with pytest.raises(MapFileError, match="'sparse_bomb': brings the file to 100000000009 numbers"):
         read_table(tmp_path / "d.mat")
     import h5py
 

@@ -194,3 +194,18 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     neither = CliRunner().invoke(app, ["import", str(table)])
     assert neither.exit_code == 2
     assert "needs --map FILE and --out DIR; --propose writes a first map" in neither.output
+
+
+def test_a_stated_unit_that_is_none_of_the_quantity_is_never_taken_for_another(tmp_path: Path) -> None:
+    columns = {
+        "t": T, "q [rev]": ANGLE / (2.0 * np.pi), "q_des": ANGLE, "torque [mNm]": 1e3 * np.sign(RATE), "p_main_a [mA]": 4.0 + 0.1 * T,
+        "p_main_b [kg/cm2]": 100.0 + T,
+    }  # fmt: skip
+    found = proposal(csv_of(tmp_path, columns))
+    assert units(found) == {
+        "time": ("t", "s"), "angle/left": ("q [rev]", "rev"), "measured_torque": ("torque [mNm]", "mN m"),
+        "pressure/main_b": ("p_main_b [kg/cm2]", "kg/cm2"),
+    }  # fmt: skip
+    unused = {entry["column"]: entry["why"] for entry in found["unused"]}
+    assert "'mA'" in unused["p_main_a [mA]"]
+    assert "command" in unused["q_des"]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from lugre_steering.importing.plausible import DEGREES, check_units
 from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, tells, unit_in
+from lugre_steering.importing.words import WORDS, stated_in, tells, unit_in
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
@@ -96,8 +97,9 @@ def _problem(file: Path, map_file: Path) -> str | None:
 def _clocks(table: Table) -> list[Guess]:
     """Time columns: by their name, else the first column that only rises."""
     rising = [name for name, values in table.columns.items() if _rises(values)]
-    named = [name for name in rising if tells(name, "time") and not tells(name, "command")]
-    return [_clock(table, name, name in named) for name in named or rising[:1]]
+    fit = [name for name in rising if _unfit(table, name, ("time",)) is None]
+    named = [name for name in fit if tells(name, "time") and not tells(name, "command")]
+    return [_clock(table, name, name in named) for name in named or fit[:1]]
 
 
 def _rises(values: Array) -> bool:
@@ -149,6 +151,8 @@ def _channels(table: Table, clocks: Sequence[Guess]) -> tuple[list[Guess], list[
     ordered = sorted((name for name in table.columns if name not in times), key=lambda name: _kind(table, name) == "rate")
     for name in ordered:  # rates after the angles they belong to
         key, why = _key(table, name)
+        if key is not None and (stated := _unfit(table, name, _DIMENSIONS[key.partition("/")[0]])):
+            key, why = None, f"{why}, but it is stated in '{stated}', which is none of its units: give scale and unit"
         if key is not None and (obstacle := _obstacle(key, taken)):
             key, why = None, obstacle
         if key is None:
@@ -193,7 +197,7 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
         plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1]).strip()
-        if unit_in(plain) is not None:  # 'p_left_cap_bar' is the line left_cap
+        if READABLE_UNITS[unit_in(plain) or "s"][0] == "pressure":  # 'p_left_cap_bar' is the line left_cap
             plain = re.sub(r"[\s_]+[^\W_]+$", "", plain)
         line = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_").lower()
         line = _OF_PRESSURE.sub("", line)  # 'p main A' and 'pressure_main_a' are the line main_a of a vehicle file
@@ -215,6 +219,22 @@ def _stated(table: Table, name: str, dimensions: tuple[str, ...] | None) -> str 
         if unit is not None and (dimensions is None or READABLE_UNITS[unit][0] in dimensions):
             return unit
     return None
+
+
+def _unfit(table: Table, name: str, dimensions: tuple[str, ...]) -> str | None:
+    """What is stated in place of a unit, where it is none of these dimensions: a scale would have to be guessed."""
+    row = _row_of_units(table)
+    titles = [(title, place == row) for place, title in enumerate(table.titles.get(name, ()))]
+    if _stated(table, name, dimensions) is not None:
+        return None
+    return next((stated for text, whole in (*titles, (name, False)) if (stated := stated_in(text, whole)) is not None), None)
+
+
+def _row_of_units(table: Table) -> int | None:
+    """Which of the other header rows holds a unit for most of the columns."""
+    known = Counter(place for titles in table.titles.values() for place, title in enumerate(titles) if unit_in(title, True))
+    place, count = known.most_common(1)[0] if known else (0, 0)
+    return place if 2 * count > len(table.titles) else None
 
 
 _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
@@ -250,7 +270,8 @@ def _angle_unit(most: float, travel: float) -> tuple[str, str]:
 
 def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
     """By the slope of the angle over the rate times time: 57 where one is in deg and the other in rad."""
-    plain = {"deg": "deg/s", "rad": "rad/s", "mrad": "rad/s", "m": "m/s", "mm": "mm/s", "cm": "m/s"}[angle.unit]
+    linear = READABLE_UNITS[angle.unit][0] == "length"
+    plain = f"{angle.unit}/s" if angle.unit in ("deg", "mm") else "m/s" if linear else "rad/s"
     if angle.time is None or angle.unit not in ("deg", "rad"):
         return plain, f"GUESSED, as the angle is in {angle.unit}"
     time, value, rate = (table.columns[column] for column in (angle.time, angle.column, name))

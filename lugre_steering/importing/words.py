@@ -9,20 +9,35 @@ from collections.abc import Mapping
 
 _SPELLINGS: Mapping[str, str] = {
     "s": "s sec secs second seconds sekunden", "ms": "ms msec msecs millis milliseconds", "us": "us usec micros microseconds",
-    "ns": "ns nsec nsecs nanos nanoseconds", "min": "min minutes", "rad": "rad radian radians", "mrad": "mrad",
-    "deg": "deg degree degrees ° grad", "m": "m meter metre", "cm": "cm", "mm": "mm",
-    "rad/s": "rad/s rad_s rads rad/sec radps", "deg/s": "deg/s deg_s °/s dps deg/sec degs grad/s",
-    "rpm": "rpm 1/min u/min", "m/s": "m/s m_s mps", "mm/s": "mm/s mm_s", "Pa": "pa pascal", "kPa": "kpa", "MPa": "mpa",
-    "mbar": "mbar hpa", "bar": "bar", "psi": "psi", "N": "n newton", "kN": "kn", "N m": "nm n_m n·m n*m n.m newtonmeter",
-    "kN m": "knm kn_m kn·m kn*m kn.m", "degC": "degc c °c celsius deg_c", "K": "k kelvin",
+    "ns": "ns nsec nsecs nanos nanoseconds", "min": "min minutes", "d": "d day days tage",
+    "rad": "rad radian radians", "mrad": "mrad", "deg": "deg degree degrees ° grad",
+    "0.1 deg": "0.1_deg 0.1deg 0.1° 0.1_° 1/10_deg 1/10deg 1/10° deg/10 °/10",
+    "0.01 deg": "0.01_deg 0.01deg 0.01° 0.01_° 1/100_deg 1/100deg 1/100° deg/100 °/100",
+    "rev": "rev revs revolution revolutions turn turns", "m": "m meter metre", "cm": "cm", "mm": "mm", "um": "um micron microns",
+    "in": "in inch inches",
+    "rad/s": "rad/s rad_s rads rad/sec radps", "deg/s": "deg/s deg_s °/s dps deg/sec °/sec degs grad/s",
+    "rpm": "rpm 1/min u/min rev/min", "m/s": "m/s m_s mps", "mm/s": "mm/s mm_s", "Pa": "pa pascal", "kPa": "kpa", "MPa": "mpa",
+    "mbar": "mbar hpa", "bar": "bar bara barg bar(a) bar(g) bar_(a) bar_(g) bar_abs bar_rel", "psi": "psi psia psig psi(a) psi(g)",
+    "kg/cm2": "kg/cm2 kg/cm² kg/cm^2 kgf/cm2 kgf/cm² kgf/cm^2 kp/cm2 kp/cm²", "N": "n newton", "kN": "kn", "lbf": "lbf lb lbs",
+    "N m": "nm n_m n·m n*m n.m n-m newtonmeter", "kN m": "knm kn_m kn·m kn*m kn.m", "mN m": "mNm mN_m mN·m mN*m mN.m",
+    "lbf ft": "lbf_ft lbf-ft lbf·ft lbf*ft lbfft lb_ft lb-ft lbft ft_lbf ft-lbf ftlbf ft_lb ft-lb ftlb",
+    "lbf in": "lbf_in lbf-in lbf·in lbf*in lbfin lb_in lb-in lbin in_lbf in-lbf inlbf in_lb in-lb inlb",
+    "degC": "degc c °c celsius deg_c", "K": "k kelvin",
 }  # fmt: skip
 UNIT_OF: Mapping[str, str] = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
+"""Spelling -> unit; in any case, but for capitals here: mNm is not MNm."""
+_IN_BRACKETS_ONLY = ("in", "d")
+"""Units that at the end of a name are words of their own: p_in."""
+_UNSCALED = frozenset(
+    ("%", "%fs", "%_fs", "percent", "pct", "a", "ma", "amp", "amps", "v", "mv", "volt", "volts", "count", "counts", "ticks", "lsb")
+)
+"""What is stated of a quantity that only a scale, which nobody states, could give."""
 
 WORDS: Mapping[str, frozenset[str]] = {
     kind: frozenset(text.split())
     for kind, text in {
-        "command": "goal target ref reference command commanded cmd desired set setpoint soll demand error enable enabled "
-        "flag status mode valid",
+        "command": "goal target ref reference command commanded cmd desired des set setp setpoint soll demand dem nominal nom error "
+        "enable enabled flag status mode valid",
         "time": "t time zeit timestamp stamp clock elapsed secs millis tstamp",
         "rate": "rate speed velocity vel omega dq dtheta gyro geschwindigkeit drehzahl",
         "temperature": "temp temperature temperatur",
@@ -52,12 +67,43 @@ def tells(name: str, kind: str) -> bool:
 
 def unit_in(text: str, whole: bool = False) -> str | None:
     """A unit that a name or a header cell states: in brackets, at its end after a blank or _, or as the ``whole`` text."""
-    text = text.strip().replace("µ", "u").replace("μ", "u")
-    bracketed = re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", text)
-    parts = re.split(r"[\s_]+", text)
-    ends = [text] if whole else ["_".join(parts[-2:]), parts[-1]] if len(parts) > 1 else []
-    for candidate in (*bracketed, *ends):
-        unit = UNIT_OF.get(re.sub(r"\s+", "_", candidate.strip()).lower())
-        if unit is not None:
-            return unit
-    return None
+    square, rounded = _bracketed(text)
+    ends = [text] if whole else [end for end in _ends(text) if end.lower() not in _IN_BRACKETS_ONLY]
+    return next((unit for candidate in (*square, *rounded, *ends) if (unit := _known(candidate)) is not None), None)
+
+
+def stated_in(text: str, whole: bool = False) -> str | None:
+    """What stands in place of a unit, known or not; at the end of a name only what nothing else can mean."""
+    if whole:
+        return text.strip("[]() ") or None
+    square, rounded = _bracketed(text)
+    found = [part for part in square if not part.isdigit() and not _is_side(part)]
+    found += [part for part in rounded if _known(part) or _spelt(part).lower() in _UNSCALED or re.search(r"[/%°^*·²]", part)]
+    found += [end for end in _ends(text) if end.lower() in _UNSCALED and (len(end) > 2 or end in ("%", "mA", "mV"))]
+    return found[0] if found else None
+
+
+def _bracketed(text: str) -> tuple[list[str], list[str]]:
+    """What stands in square brackets, and outside of them in round ones."""
+    square = re.findall(r"\[([^\[\]]+)\]", text)
+    rounded = re.findall(r"\(((?:[^()]|\([^()]*\))+)\)", re.sub(r"\[[^\[\]]*\]", " ", text))
+    return [part.strip() for part in square], [part.strip() for part in rounded]
+
+
+def _ends(text: str) -> list[str]:
+    """The last two words of a name, and the last."""
+    parts = re.split(r"[\s_]+", text.strip())
+    return ["_".join(parts[-2:]), parts[-1]] if len(parts) > 1 else []
+
+
+def _known(text: str) -> str | None:
+    spelt = _spelt(text)
+    return UNIT_OF.get(spelt) or UNIT_OF.get(spelt.lower())
+
+
+def _spelt(text: str) -> str:
+    return re.sub(r"\s+", "_", text.strip().replace("µ", "u").replace("μ", "u"))
+
+
+def _is_side(text: str) -> bool:
+    return tells(text, "left") or tells(text, "right")
