@@ -218,7 +218,7 @@ def test_a_second_law_is_sought_beside_the_first_as_it_was_fitted() -> None:
     short = Cell("inertia", Axis("time"), 0.0, float(problem.runs[0].time[-1]), pieces=36)
     first = with_law(problem, used, fitted(problem), free_law(problem, short, 0, np.zeros(short.pieces)))
     screen = Screen(problem, first, used, split(problem), white(problem).draws, trace(problem, first, 1, [Axis("angle")]), 1)
-    assert screen.left[0] < 1.2 * first.cost
+    assert screen.beside.left[0] < 1.2 * first.cost
 
 
 def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling() -> None:
@@ -288,17 +288,18 @@ def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | 
     assert in_place(viscous, found, None) == (beyond is not None)
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_names_win_a_draw_unless_they_are_more(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A law that takes a twentieth more than one name does not stand in its place, but in that of two."""
+@pytest.mark.parametrize(("count", "stands"), [(1, False), (2, False), (12, True)])
+def test_names_win_a_draw_unless_they_are_more_and_have_more_values(count: int, stands: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A law of a few values that takes a twentieth more than names does not stand in the place of two of one value each, but of many."""
     problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * (run.theta > 0.1), axis=0)))
     assert found is not None
+    assert len(found.gains) == 1
+    assert 2 < len(found.fitted.effects[-1][0].free) <= 12
     monkeypatch.setattr(rival, "_energies", lambda *_: [95.0, 100.0, 200.0])
     viscous = named(problem, fitted(problem, effect("viscous_friction", sigma_2=1e3)))
-    names = (SimpleNamespace(given=False),) * count
-    done = replace(viscous, found=replace(viscous.found, found=names))
-    assert len(found.gains) == 1
-    assert in_place(done, found, None) == (count > 1)
+    final = replace(viscous.found.final, effects=viscous.found.final.effects * count)
+    done = replace(viscous, found=replace(viscous.found, found=(SimpleNamespace(given=False),) * count, final=final))
+    assert in_place(done, found, None) == stands
 
 
 def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
