@@ -437,3 +437,23 @@ def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path)
     assert held["calibrated"] < 0.1 * held["sheet"]
     clean = calibrate_recordings([read_recording(tmp_path / "bag", true.channels)], done.vehicle)
     assert clean.vehicle.effects == done.vehicle.effects  # what the file has is not looked for again
+
+
+def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_sheet_says_of_friction() -> None:
+    """Oracle: force = mass times acceleration and a loss times the rate, of a motion that is known exactly, with friction of none."""
+    time, mass, loss = np.arange(0.0, 60.0, 0.01), 40.0, 250.0
+    turns = [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
+    position = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
+    rate = sum(size * w * np.cos(w * time + phase) for size, w, phase in turns)
+    acceleration = sum(-size * w**2 * np.sin(w * time + phase) for size, w, phase in turns)
+    vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+    assert vehicle.torque_sensor is not None
+    rng = np.random.default_rng(4)
+    noisy = position + vehicle.sensors.angle_sigma * rng.standard_normal(time.size)
+    force = mass * acceleration + loss * rate + vehicle.torque_sensor.noise_Nm * rng.standard_normal(time.size)
+    result = diagnose_recordings([Recording("axis", 0, {"left": Signal(time, noisy)}, {}, measured_torque=Signal(time, force))], vehicle)
+    found = {effect["id"]: effect["parameters"] for effect in result.json["effects"]}
+    assert set(found) == {"yaw_inertia", "viscous_friction"}
+    assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.02)
+    assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
+    assert result.json["augmented"]["heldout_rmse_Nm"] < 1.5 * vehicle.torque_sensor.noise_Nm

@@ -67,7 +67,8 @@ def answer(measured: dict[str, Signal], torque: float, length: float) -> dict[st
         for p in CATALOGUE[effect["id"]].parameters
         if p.name == name
     }
-    return {"verdict": done["verdict"], "heldout": done["augmented"]["heldout_rmse_Nm"] / torque, **relative}
+    errors = {f"augmented.{key}": done["augmented"][key] / torque for key in ("heldout_rmse_Nm", "causal_rmse_Nm")}
+    return {"verdict": done["verdict"], **errors, **relative}
 
 
 @pytest.fixture(scope="module")
