@@ -8,7 +8,6 @@ import dataclasses
 import hashlib
 import importlib.util
 import math
-import re
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -25,6 +24,7 @@ from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
+from lugre_steering.effects.sound import NAMED, check_sound, is_name
 from lugre_steering.errors import EffectError, reason
 from lugre_steering.expression import ExpressionError, parse
 from lugre_steering.files import read_text, write_text
@@ -32,7 +32,6 @@ from lugre_steering.schema import Reader
 
 PAIRED = ("wind_up", "contact")
 """Hooks whose laws return more than one number: a line of YAML cannot."""
-NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @law
@@ -122,7 +121,7 @@ def _run(file: Path, content: str, sha256: str) -> ModuleType:
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     try:
         exec(compile(content, str(file), "exec", dont_inherit=True), vars(module))
-    except Exception as error:  # whatever a user's own Python raises
+    except (Exception, SystemExit) as error:  # whatever a user's own Python raises
         del sys.modules[spec.name]
         raise EffectError(f"{file}: cannot be run: {type(error).__name__}: {error}") from error
     return module
@@ -140,10 +139,20 @@ def of_objects(found: object, name: str) -> list[Effect]:
     if not items or len(effects) < len(items):
         kinds = ", ".join(type(item).__name__ for item in items)
         raise EffectError(f"{name}: got {kinds or 'nothing'}, expected EFFECT = Effect(...), or EFFECTS, a list of them")
+    _check_all(effects, name)
     return [
         dataclasses.replace(item, hooks={hook: one if hasattr(one, "py_func") else law(one) for hook, one in item.hooks.items()})
         for item in effects
     ]
+
+
+def _check_all(effects: Sequence[Effect], name: str) -> None:
+    """Refuse what is no sound effect, or has the id of another one of the same file or package."""
+    for effect in effects:
+        check_sound(effect, name)
+    ids = [effect.id for effect in effects]
+    if doubled := sorted({one for one in ids if ids.count(one) > 1}):
+        raise EffectError(f"{name}: id: got {', '.join(doubled)} more than once, expected another id for each effect")
 
 
 def _of_yaml(file: Path) -> list[Effect]:
@@ -153,18 +162,20 @@ def _of_yaml(file: Path) -> list[Effect]:
     if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise reader.fail("effects", listed, "a list of effects")
     prefixes = [f"effects[{i}]" for i in range(len(listed))] if len(listed) > 1 else [""]
-    return [
+    effects = [
         _of_law(reader, reader.build(_Kept, item, prefix), prefix)
         if isinstance(item, Mapping) and "law" in item
         else _of_sheet(reader, reader.build(_Sheet, item, prefix), prefix)
         for item, prefix in zip(listed, prefixes, strict=True)
     ]
+    _check_all(effects, str(file))
+    return effects
 
 
 def _of_law(reader: Reader, kept: _Kept, prefix: str) -> Effect:
     before = f"{prefix}." if prefix else ""
-    if not NAME.fullmatch(kept.id):
-        raise reader.fail(f"{before}id", kept.id, "a name of small letters, digits and _, a letter first")
+    if not is_name(kept.id):
+        raise reader.fail(f"{before}id", kept.id, NAMED)
     check_law(kept.law, reader, f"{before}law")
     return named(kept.id, kept.title, kept.source, kept.law)
 
@@ -202,8 +213,8 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
 
     for what, names in (("id", [sheet.id]), ("parameters", sheet.parameters), ("memory", sheet.memory)):
         for name in names:
-            if not NAME.fullmatch(name):
-                raise reader.fail(key(what), name, "a name of small letters, digits and _, a letter first")
+            if not is_name(name):
+                raise reader.fail(key(what), name, NAMED)
     if sheet.stage not in STAGES:
         raise reader.fail(key("stage"), sheet.stage, f"one of {', '.join(STAGES)}")
     if not sheet.laws:

@@ -184,7 +184,7 @@ def _add_installed() -> None:
         where = f"package '{entry.dist.name}'" if entry.dist is not None else f"entry point '{entry.name}'"
         try:
             found = entry.load()
-        except Exception as error:  # whatever a foreign package raises
+        except (Exception, SystemExit) as error:  # whatever a foreign package raises
             raise EffectError(f"{where}: entry point '{entry.name}' cannot be loaded: {type(error).__name__}: {error}") from error
         effects = own.of_objects(found, f"{where}: entry point '{entry.name}'")
         _add(effects, Origin(where, _content(entry.module)), where)

@@ -17,6 +17,7 @@ from scipy import stats
 
 from lugre_steering.effects.entry import Effect, Seen
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS, sought
+from lugre_steering.errors import EffectError
 from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, is_rig, resized
@@ -76,6 +77,16 @@ def possible(vehicle: Vehicle, effect: Effect) -> bool:
     return all(getattr(vehicle, section) is not None for section in effect.needs)
 
 
+def _variants(effect: Effect, seen: Seen) -> list[dict[str, float]]:
+    """Shapes that an effect chooses itself; a foreign one's function may do anything."""
+    assert effect.variants is not None
+    try:
+        return [{name: float(value) for name, value in shapes.items()} for shapes in effect.variants(seen)]
+    except Exception as error:
+        got = f"{type(error).__name__}: {error}"
+        raise EffectError(f"effect '{effect.id}': variants: got {got}, expected shapes, each values by their names") from error
+
+
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
@@ -85,7 +96,7 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
         effect = resized(effect, problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
-            for shapes in effect.variants(_seen(problem)):
+            for shapes in _variants(effect, _seen(problem)):
                 ends = {name for pair in effect.places for name in pair}
                 unset = tuple(name for name in free if name not in shapes and name not in ends)
                 found.append(Candidate(effect, tuple(shapes.items()), free=unset))

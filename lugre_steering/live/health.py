@@ -19,7 +19,7 @@ from lugre_steering.vehicle.model import baseline_parameters
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 STALE = "stale"
-UNCHECKED = "no measured torque: the feed-forward goes on, from the angles alone, and nothing tells whether it is plausible"
+UNCHECKED = "no measured torque: nothing tells whether the feed-forward, which comes of the angles, is plausible"
 FAULT_HOLD_NS = 1_000_000_000
 RESIDUAL_SECONDS = 10
 SHEET_SECONDS = 60
@@ -243,7 +243,7 @@ class Health:
         troubles = [f"{', '.join(inputs)} {what}" for what, inputs in having.items()]
         measuring = [label for i, label in enumerate(labels) if self._kinds[i] in (Kind.PRESSURE, Kind.TORQUE)]
         if measuring and set(measuring) <= {label for what in (STALE, "missing") for label in having.get(what, [])}:
-            troubles.append(UNCHECKED)
+            values["plausibility"] = UNCHECKED
         if self.namesakes > 0:
             troubles.append(f"{counted(self.namesakes, 'other node')} of this name: their outputs mix with these")
             level = max(level, WARN)
