@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -209,3 +210,48 @@ def test_a_stated_unit_that_is_none_of_the_quantity_is_never_taken_for_another(t
     unused = {entry["column"]: entry["why"] for entry in found["unused"]}
     assert "'mA'" in unused["p_main_a [mA]"]
     assert "command" in unused["q_des"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "epoch_s"),
+    [
+        ({"Date": 45987.25 + T / 86400.0}, 0.0),
+        ({"Time": 0.25 + T / 86400.0}, 1e9),
+        ({"header.stamp.sec": 1.7e9 + np.floor(T + 0.5), "header.stamp.nanosec": np.round((T + 0.5) % 1.0 * 1e9)}, 0.0),
+        ({"timestamp": np.floor(1.7e9 + T)}, 0.0),
+        ({"time": np.repeat(T[::2], 2)}, 1e9),
+    ],
+)
+def test_clocks_of_spreadsheets_of_messages_and_of_coarse_stamps(tmp_path: Path, columns: dict[str, np.ndarray], epoch_s: float) -> None:
+    found = proposal(csv_of(tmp_path, columns | {"angle": np.degrees(ANGLE)}))
+    mapping = load_map(tmp_path / "map.yaml")
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["rate_Hz"] == pytest.approx(100.0, rel=0.02)
+    assert row["to_s"] - row["from_s"] == pytest.approx(19.99, rel=0.02)
+    if mapping.time.rate_Hz is None:
+        assert mapping.epoch_s == epoch_s
+    else:
+        assert "stamps repeat the one before: GUESSED 100 rows per second" in found["text"]
+        assert mapping.epoch_s == (1.7e9 if "timestamp" in columns else 1e9)
+
+
+def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
+    propose(csv_of(tmp_path, {"Date": 45987.25 + T / 86400.0, "angle": np.degrees(ANGLE)}), tmp_path / "map.yaml")
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag")["channels"]
+    assert row["from_s"] == pytest.approx(datetime(2025, 11, 26, 6, tzinfo=UTC).timestamp(), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("time", "wanted"),
+    [
+        ({"time [s]": T / 86400.0}, "makes 8.64e+06 samples per second, expected 0.1 to 50000"),
+        ({"time": np.repeat(T[::100], np.random.default_rng(1).permutation([20, 180] * 10))}, "many stamps repeat the one before"),
+        ({"time": T[::-1]}, "key 'time'"),
+        ({"sample": np.arange(T.size)}, "key 'time'"),
+        ({"time [ticks]": T}, "key 'time'"),
+    ],
+)
+def test_a_time_that_cannot_be_is_a_problem(tmp_path: Path, time: dict[str, np.ndarray], wanted: str) -> None:
+    found = propose(csv_of(tmp_path, time | {"angle": np.degrees(ANGLE)}), tmp_path / "map.yaml")
+    assert wanted in found["problem"]
+    assert "nothing known" not in (tmp_path / "map.yaml").read_text()
