@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -255,3 +255,82 @@ def test_a_time_that_cannot_be_is_a_problem(tmp_path: Path, time: dict[str, np.n
     found = propose(csv_of(tmp_path, time | {"angle": np.degrees(ANGLE)}), tmp_path / "map.yaml")
     assert wanted in found["problem"]
     assert "nothing known" not in (tmp_path / "map.yaml").read_text()
+
+
+def written(folder: Path, header: list[str], rows: list[list[str]], delimiter: str = ",") -> Path:
+    path = folder / "log.csv"
+    path.write_text("\n".join(delimiter.join(row) for row in [header, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+NOON = datetime(2026, 11, 22, 11, 59, 50, tzinfo=UTC)
+
+
+def stamps(form: str) -> list[str]:
+    return [(NOON + timedelta(seconds=float(t))).strftime(form) for t in T]
+
+
+@pytest.mark.parametrize(
+    ("titles", "forms", "from_s"),
+    [
+        (["Datum"], ["%d.%m.%Y %H:%M:%S,%f"], NOON.timestamp()),
+        (["Timestamp"], ["%m/%d/%Y %I:%M:%S.%f %p"], NOON.timestamp()),
+        (["Stamp"], ["%d/%m/%Y %H:%M:%S.%f"], NOON.timestamp()),
+        (["Time"], ["%H:%M:%S.%f"], 11 * 3600 + 59 * 60 + 50),
+        (["Date", "Time"], ["%Y-%m-%d", "%H:%M:%S.%f"], NOON.timestamp()),
+        (["Time", "Date"], ["%I:%M:%S.%f %p", "%d.%m.%Y"], NOON.timestamp()),
+    ],
+)
+def test_stamps_of_loggers(tmp_path: Path, titles: list[str], forms: list[str], from_s: float) -> None:
+    rows = [list(row) for row in zip(*map(stamps, forms), (f"{x:.4f}" for x in np.degrees(ANGLE)), strict=True)]
+    found = proposal(written(tmp_path, [*titles, "angle left"], rows, ";"))
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert (row["from_s"], row["to_s"]) == (pytest.approx(from_s, abs=1e-3), pytest.approx(from_s + 19.99, abs=1e-3))
+    assert row["samples"] == T.size
+    assert ("epoch_s: 0" in found["text"]) == (from_s > 1e8)
+
+
+def test_dates_whose_order_nothing_tells_are_left_to_the_user(tmp_path: Path) -> None:
+    rows = [[f"05/06/2026 10:00:{i:02}", f"{i}"] for i in range(60)]
+    found = propose(written(tmp_path, ["Date", "angle left"], rows), tmp_path / "map.yaml")
+    assert found["problem"] is not None
+    assert "dates like '05/06/2026 10:00:00' are ambiguous: say csv.dates: dmy or mdy" in found["format"]
+    rows = [[f"05/06/2026 10:00:{i:02} AM", f"{i}"] for i in range(60)]
+    (tmp_path / "map.yaml").unlink()
+    found = proposal(written(tmp_path, ["Date", "angle left"], rows))
+    assert any("GUESSED mdy" in reason for reason in found["format"])
+
+
+def test_numpy_dates(tmp_path: Path) -> None:
+    time = np.datetime64("2026-11-22T06:00:00", "ms") + np.round(1e3 * T).astype("timedelta64[ms]")
+    np.savez(tmp_path / "d.npz", stamp=time, angle=np.degrees(ANGLE))
+    assert units(proposal(tmp_path / "d.npz"))["time"] == ("stamp", "ns")
+    (row,) = import_table(tmp_path / "d.npz", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["from_s"] == pytest.approx(datetime(2026, 11, 22, 6, tzinfo=UTC).timestamp(), abs=1e-3)
+
+
+@pytest.mark.parametrize("end", ["", ",,,,"])
+@pytest.mark.parametrize("turn", [0, 9])
+def test_two_rates_in_one_table(tmp_path: Path, end: str, turn: int) -> None:
+    lines = ["t [s],angle left [deg],angle right [deg],p_a [bar],p_b [bar],p_c [bar],p_d [bar]"]
+    lines += [f"{0.01 * i:.2f},{i % 7},{i % 5}" + (f",{i},{i},{i},{i}" if i % 10 == turn else end) for i in range(600)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    proposal(tmp_path / "log.csv")
+    found = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert {row["channel"]: row["samples"] for row in found} == {
+        "angle/left": 600, "angle/right": 600, **{f"pressure/p_{line}": 60 for line in "abcd"}
+    }  # fmt: skip
+
+
+def test_tabs_beside_names_with_blanks(tmp_path: Path) -> None:
+    found = proposal(csv_of(tmp_path, {"Time [s]": T, "Angle left [deg]": ANGLE, "Pressure main a [bar]": T}, "\t"))
+    assert units(found)["pressure/main_a"] == ("Pressure main a [bar]", "bar")
+
+
+def test_dashes_and_question_marks_are_missing_numbers_and_no_units(tmp_path: Path) -> None:
+    rows = [[f"{0.01 * i:.2f}", {1: "-", 2: "---"}.get(i % 10, f"{i % 7}"), "?" if i == 5 else f"{i}"] for i in range(600)]
+    found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], [["s", "-", "bar"], *rows]))
+    assert "121 cells of '-', '?' or '#N/A' (count as missing)" in found["format"]
+    assert units(found)["pressure/main_a"] == ("p_main_a", "bar")
+    missing = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert [row["missing"] for row in missing] == [120, 1]

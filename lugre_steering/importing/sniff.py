@@ -13,6 +13,7 @@ from pathlib import Path
 from lugre_steering.counted import counted
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
+from lugre_steering.importing.stamps import is_stamp, order_of
 from lugre_steering.importing.text import number
 from lugre_steering.importing.words import unit_in
 
@@ -47,8 +48,9 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
     header = [cells for _, cells in rows[top:begin]]
     skip = rows[top][0] - 1 if any(line.strip() and line[0] != comment for line in lines[: rows[top][0] - 1]) else 0
     name_row = 1 + max(range(len(header)), key=lambda i: (not _is_units(header[i]), _count(header[i]), -i), default=0)
-    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), encoding=encoding)
-    return options, _reasons(options, header)
+    dates, why = order_of(cell for cells in data for cell in cells)
+    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), encoding=encoding, dates=dates)
+    return options, _reasons(options, header) + ([why] if why else [])
 
 
 def _decoded(file: Path) -> tuple[str, str]:
@@ -78,7 +80,9 @@ def _score(lines: Sequence[str], comment: str, delimiter: str, decimal: str) -> 
     width = Counter(len(_filled(cells)) for cells in rows if _is_data(cells, decimal)).most_common(1)
     if not width or width[0][0] < 2:
         return -1
-    cells = [cell for row in rows if len(_filled(row)) == width[0][0] for cell in row if cell.strip()]
+    # Of rows of numbers only: names with blanks would speak for blanks as delimiter, and against tabs.
+    data = [row for row in rows if len(_filled(row)) == width[0][0] and _is_data(row, decimal)]
+    cells = [cell for row in data for cell in row if cell.strip()]
     return sum(1 if number(cell, decimal) is not None else -1 for cell in cells)
 
 
@@ -88,9 +92,20 @@ def _filled(cells: Sequence[str]) -> list[str]:
     return list(cells[:end])
 
 
+def _told(cells: Sequence[str]) -> list[str]:
+    """Without those that say nothing: a dash is a missing number, and as well no unit."""
+    return [cell for cell in cells if cell.strip(" -?")]
+
+
 def _is_data(cells: Sequence[str], decimal: str) -> bool:
-    filled = [cell for cell in cells if cell.strip()]
+    filled = [cell for cell in _told(cells) if not is_stamp(cell)]  # dates stand among remarks as well
     return bool(filled) and 2 * sum(number(cell, decimal) is not None for cell in filled) >= len(filled)
+
+
+def _all_numbers(cells: Sequence[str], decimal: str) -> bool:
+    """Whether a row holds several numbers and nothing else, as the rows of the faster of two rates."""
+    values = [number(cell, decimal) for cell in _told(cells)]
+    return len(values) > 1 and None not in values
 
 
 def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
@@ -98,7 +113,7 @@ def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
     for i in range(len(rows)):
         run = [cells for _, cells in rows[i : i + _RUN]]
         widest = max(len(_filled(cells)) for cells in run)
-        data = [_is_data(cells, decimal) and 2 * len(_filled(cells)) > widest for cells in run]
+        data = [_is_data(cells, decimal) and (2 * len(_filled(cells)) > widest or _all_numbers(cells, decimal)) for cells in run]
         if data[0] and 2 * sum(data) > len(run):
             return i
     return None
@@ -106,7 +121,7 @@ def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
 
 def _is_title(cells: Sequence[str], numbers: int, width: int, decimal: str) -> bool:
     """A row of words as wide as the data, whose ``numbers`` may end before their ``width``; remarks of a logger are narrower."""
-    filled = [cell for cell in cells if cell.strip()]
+    filled = _told(cells)
     wide = len(cells) >= numbers and 2 * len(filled) >= numbers and len(_filled(cells)) <= width
     return wide and all(number(cell, decimal) is None for cell in filled)
 

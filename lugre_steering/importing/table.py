@@ -78,6 +78,7 @@ class Gathering:
         self.columns: dict[str, Array] = {}
         self.scalars: dict[str, float] = {}
         self.unusable: dict[str, str] = {}
+        self.titles: dict[str, tuple[str, ...]] = {}
         self._count, self._most = 0, most_numbers(file)
 
     def reserve(self, name: str, count: int) -> None:
@@ -97,6 +98,8 @@ class Gathering:
         if array.dtype.names:
             for key in array.dtype.names:
                 self.add(f"{name}.{key}" if name else key, array[key])
+        elif array.dtype.kind in "mM":
+            self._add_times(name, array)
         elif array.dtype.kind not in "iufb":
             self.refuse(name, "complex numbers" if array.dtype.kind == "c" else "no plain numbers")
         elif array.size == 1:
@@ -111,8 +114,14 @@ class Gathering:
         if len(self.columns) + len(self.unusable) > MAX_COLUMNS:
             raise MapFileError(f"{self.file}: holds more than {MAX_COLUMNS} columns")
 
+    def _add_times(self, name: str, array: Any) -> None:
+        """Dates and durations of NumPy, as ns."""
+        nanoseconds = array.astype(f"{array.dtype.kind}8[ns]")
+        self.add(name, np.where(np.isnat(nanoseconds), np.nan, nanoseconds.astype(np.int64).astype(np.float64)))
+        self.titles[name] = ("ns",)
+
     def table(self, titles: Mapping[str, tuple[str, ...]] | None = None) -> Table:
-        return Table(self.file, self.columns, self.scalars, self.unusable, titles or {})
+        return Table(self.file, self.columns, self.scalars, self.unusable, {**self.titles, **(titles or {})})
 
 
 def size_of(shape: tuple[int, ...]) -> int:

@@ -38,7 +38,7 @@ WORDS: Mapping[str, frozenset[str]] = {
     for kind, text in {
         "command": "goal target ref reference command commanded cmd desired des set setp setpoint soll demand dem nominal nom error "
         "enable enabled flag status mode valid",
-        "time": "t time zeit timestamp stamp clock elapsed secs millis tstamp",
+        "time": "t time zeit timestamp stamp clock elapsed secs millis tstamp date datum uhrzeit",
         "rate": "rate speed velocity vel omega dq dtheta gyro geschwindigkeit drehzahl",
         "temperature": "temp temperature temperatur",
         "air": "air ambient outside luft aussen außen umgebung",
@@ -75,7 +75,7 @@ def unit_in(text: str, whole: bool = False) -> str | None:
 def stated_in(text: str, whole: bool = False) -> str | None:
     """What stands in place of a unit, known or not; at the end of a name only what nothing else can mean."""
     if whole:
-        return text.strip("[]() ") or None
+        return text.strip("[]() -?") or None
     square, rounded = _bracketed(text)
     found = [part for part in square if not part.isdigit() and not _is_side(part)]
     found += [part for part in rounded if _known(part) or _spelt(part).lower() in _UNSCALED or re.search(r"[/%°^*·²]", part)]
