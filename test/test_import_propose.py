@@ -334,3 +334,30 @@ def test_dashes_and_question_marks_are_missing_numbers_and_no_units(tmp_path: Pa
     assert units(found)["pressure/main_a"] == ("p_main_a", "bar")
     missing = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
     assert [row["missing"] for row in missing] == [120, 1]
+
+
+@pytest.mark.parametrize(
+    ("names", "line"),
+    [
+        (["angle.left", "pressure.main_a"], "main_a"), (["log.angle.left", "log.p.main_a"], "main_a"),
+        (["out.angle_left.signals.values", "out.p_main_a.signals.values"], "main_a"), (["SteerAngleLeft", "PressMainA"], "main_a"),
+        (["/steering/left/joint_state/position", "/steering/pressure/main_a/fluid_pressure"], "main_a"), (["Left", "P1"], "p1"),
+        (["Left Angle", "Main A Pressure"], "main_a"), (["status.angle left", "left cap pressure"], "left_cap"),
+        (["angle_l [0.01 deg]", "p_cap_bar"], "cap"),
+    ],
+)  # fmt: skip
+def test_names_of_sides_and_lines_in_paths_and_words(tmp_path: Path, names: list[str], line: str) -> None:
+    found = proposal(csv_of(tmp_path, {"time": T, names[0]: np.degrees(ANGLE), names[1]: 100.0 + T}))
+    assert {key: column for key, (column, _) in units(found).items()} == {
+        "time": "time", "angle/left": names[0], f"pressure/{line}": names[1]
+    }  # fmt: skip
+
+
+def test_a_command_anywhere_in_a_path_and_a_state_at_its_end_are_nothing_measured(tmp_path: Path) -> None:
+    columns = {"time": T, "cmd.angle.left": ANGLE, "angle.left.valid": T, "Left": T, "angle.left": np.degrees(ANGLE)}
+    found = proposal(csv_of(tmp_path, columns))
+    assert units(found)["angle/left"] == ("angle.left", "deg")
+    unused = {row["column"]: row["why"] for row in found["unused"]}
+    assert "command" in unused["cmd.angle.left"]
+    assert "command" in unused["angle.left.valid"]
+    assert "may be angle/left too" in unused["Left"]

@@ -93,7 +93,7 @@ def clocks(table: Table) -> list[ClockGuess]:
 
 def is_named(name: str) -> bool:
     """Whether a column is called a time."""
-    return tells(name, "time") and not any(tells(name, kind) for kind in ("command", "temperature", "air"))
+    return tells(name, "time") and not any(tells(name, kind) for kind in ("command", "state", "temperature", "air"))
 
 
 def counts(values: Array) -> bool:

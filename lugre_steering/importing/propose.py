@@ -22,11 +22,14 @@ from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, tells, unit_in
+from lugre_steering.importing.words import WORDS, parts_of, side_alone, spaced, tells, unit_in
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
-_OF_PRESSURE = re.compile(rf"^(?:{'|'.join(WORDS['pressure'])})_(?=[a-z]{{2}})")
+_PRESSURE = "|".join(sorted(WORDS["pressure"]))
+_OF_PRESSURE, _PRESSURE_OF = re.compile(rf"^(?:{_PRESSURE})_(?=[a-z]{{2}})"), re.compile(rf"(?<=[a-z_][a-z])_(?:{_PRESSURE})$")
+_CONTAINERS = ("data", "fluid_pressure", "samples", "signals", "value", "values")
+"""Parts of paths that name nothing."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +108,9 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     taken: dict[str, Guess] = {}
     unused = [{"column": name, "why": why} for name, why in table.unusable.items()]
     of_time = {column for clock in times for column in clock.columns()}
-    ordered = sorted((name for name in table.columns if name not in of_time), key=lambda name: _kind(table, name) == "rate")
-    for name in ordered:  # rates after the angles they belong to
+    order = {None: 1, "rate": 2}  # rates after the angles they belong to, and these by their own names first
+    ordered = sorted((name for name in table.columns if name not in of_time), key=lambda name: order.get(_kind(table, name), 0))
+    for name in ordered:
         key, why = _key(table, name)
         if key is not None and (text := unfit(table, name, _DIMENSIONS[key.partition("/")[0]])):
             key, why = None, f"{why}, but it is stated in '{text}', which is none of its units: give scale and unit"
@@ -130,7 +134,7 @@ def _obstacle(key: str, taken: Mapping[str, Guess]) -> str | None:
 
 def _kind(table: Table, name: str) -> str | None:
     """What a column holds, by its words, else by its unit."""
-    if tells(name, "command"):
+    if tells(name, "command") or tells(name, "state"):
         return "command"
     if tells(name, "temperature"):
         return "air_temperature" if tells(name, "air") else "temperature"
@@ -144,6 +148,18 @@ def _kind(table: Table, name: str) -> str | None:
     return by_unit.get(dimension or "")
 
 
+def _line(name: str) -> str:
+    """The pressure line that a name tells, as vehicle files call it: main_a of 'p main A', 'pressure_main_a', 'PressMainA'."""
+    parts = parts_of(name)
+    told = [part for part in parts if part.strip().lower() not in _CONTAINERS] or parts[-1:]
+    first = max((place for place, part in enumerate(told) if tells(part, "pressure")), default=len(told) - 1)
+    plain = " ".join(told[first:]).strip()
+    if READABLE_UNITS[unit_in(plain) or "s"][0] == "pressure":  # 'p_left_cap_bar' is the line left_cap
+        plain = re.sub(r"[\s_]+[^\W_]+$", "", plain)
+    line = re.sub(r"\W+", "_", spaced(plain), flags=re.ASCII).strip("_").lower()
+    return _PRESSURE_OF.sub("", _OF_PRESSURE.sub("", line))
+
+
 def _key(table: Table, name: str) -> tuple[str | None, str]:
     """The channel of a column, with the reason, or why it is none."""
     kind = _kind(table, name)
@@ -153,16 +169,14 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
         side = next((side for side in ("left", "right") if tells(name, side)), None)
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
-        plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1]).strip()
-        if READABLE_UNITS[unit_in(plain) or "s"][0] == "pressure":  # 'p_left_cap_bar' is the line left_cap
-            plain = re.sub(r"[\s_]+[^\W_]+$", "", plain)
-        line = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_").lower()
-        line = _OF_PRESSURE.sub("", line)  # 'p main A' and 'pressure_main_a' are the line main_a of a vehicle file
+        line = _line(name)
         return f"pressure/{line if line[:1].isalpha() else f'line_{line}'}", "the name or unit tells of pressure"
     if kind == "torque":
         return "measured_torque", "the name or unit tells of torque or force"
     if kind == "air_temperature":
         return kind, "the name tells of air temperature"
+    if kind is None and (side := side_alone(name)) is not None:
+        return f"angle/{side}", "named by its side alone: GUESSED to be the angle"
     if kind is None and is_named(name):
         text = unfit(table, name, ("time",))
         return None, f"called a time, but {f'stated in {text!r}, no unit of time known' if text else 'it does not rise as one'}"

@@ -36,8 +36,8 @@ _UNSCALED = frozenset(
 WORDS: Mapping[str, frozenset[str]] = {
     kind: frozenset(text.split())
     for kind, text in {
-        "command": "goal target ref reference command commanded cmd desired des set setp setpoint soll demand dem nominal nom error "
-        "enable enabled flag status mode valid",
+        "command": "goal target ref reference command commanded cmd desired des set setp setpoint soll demand dem nominal nom",
+        "state": "error enable enabled flag status mode valid",
         "time": "t time zeit timestamp stamp clock elapsed secs millis tstamp date datum uhrzeit",
         "rate": "rate speed velocity vel omega dq dtheta gyro geschwindigkeit drehzahl",
         "temperature": "temp temperature temperatur",
@@ -50,19 +50,49 @@ WORDS: Mapping[str, frozenset[str]] = {
         "right": "right r re rechts rh",
     }.items()
 }
+_QUANTITIES = frozenset(WORDS) - {"left", "right", "air", "command"}
+
+
+def parts_of(name: str) -> list[str]:
+    """The parts of a path (``log.p.main_a``, ``/steering/left/position``), outermost first, without what stands in brackets."""
+    plain = re.sub(r"[\[(].*?[\])]", " ", name)
+    return [part for part in re.split(r"[./]", plain) if part.strip()]
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a column's name, in lower case; of a path its last part."""
-    last = re.sub(r"[\[(].*?[\])]", " ", name.rsplit(".", 1)[-1])
-    spaced = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", last)
-    return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced)]
+    """The words of a column's name, in lower case: of a path those of the innermost part that tells of a quantity, else of the last."""
+    parts = [_words(part) for part in reversed(parts_of(name))]
+    quantities = (words for words in parts if any(_tell(words, kind) for kind in _QUANTITIES))
+    return next(quantities, parts[0] if parts else [])
+
+
+def _words(part: str) -> list[str]:
+    return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced(part))]
+
+
+def spaced(text: str) -> str:
+    """``PressMainA`` as ``Press Main A``."""
+    return re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", text)
 
 
 def tells(name: str, kind: str) -> bool:
-    """Whether a name holds a word of this kind; long words count as part of a compound too (Umgebungstemperatur)."""
-    known, words = WORDS[kind], words_of(name)
+    """Whether a name holds a word of this kind; of a path any part may tell the side, the air and a command."""
+    if kind in _QUANTITIES:
+        return _tell(words_of(name), kind)
+    return any(_tell(_words(part), kind) for part in parts_of(name))
+
+
+def _tell(words: list[str], kind: str) -> bool:
+    """Long words count as part of a compound too (Umgebungstemperatur)."""
+    known = WORDS[kind]
     return any(word in known or any(len(part) > 4 and part in word for part in known) for word in words)
+
+
+def side_alone(name: str) -> str | None:
+    """The side that a name spells out and says nothing else."""
+    words = words_of(name)
+    spelt = len(words) == 1 and len(words[0]) > 3
+    return next((side for side in ("left", "right") if spelt and words[0] in WORDS[side]), None)
 
 
 def unit_in(text: str, whole: bool = False) -> str | None:
