@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -361,3 +362,41 @@ def test_a_command_anywhere_in_a_path_and_a_state_at_its_end_are_nothing_measure
     assert "command" in unused["cmd.angle.left"]
     assert "command" in unused["angle.left.valid"]
     assert "may be angle/left too" in unused["Left"]
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "form", "top"),
+    [
+        (",", lambda x: f'"{x:.4f}"'.replace(".", ","), "19,9900"), (",", lambda x: f'"{1e6 + x:,.2f}"', "1,000,019.99"),
+        (";", lambda x: f"{1e6 + x:,.2f}".translate(str.maketrans(".,", ",.")), "1.000.019,99"),
+    ],
+)  # fmt: skip
+def test_commas_in_quotes_and_thousands_in_groups(tmp_path: Path, delimiter: str, form: Callable[[float], str], top: str) -> None:
+    rows = [[form(t), form(angle)] for t, angle in zip(T, np.degrees(ANGLE), strict=True)]
+    assert rows[-1][0].strip('"') == top
+    proposal(written(tmp_path, ["t", "angle left"], rows, delimiter))
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["rate_Hz"] == pytest.approx(100.0)
+    assert (row["missing"], row["to_s"] - row["from_s"]) == (0, pytest.approx(19.99))
+
+
+def test_one_group_of_three_digits_is_no_number(tmp_path: Path) -> None:
+    rows = [[f"{0.01 * i:.2f}", f"{i}", f'"1,{i:03}"'] for i in range(60)]
+    found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], rows))
+    assert {row["column"]: row["why"][:42] for row in found["unused"]} == {"p_main_a": "line 2, column 'p_main_a': got '1,000', ex"}
+
+
+def test_a_position_beside_a_force_is_guessed_to_be_of_a_linear_axis(tmp_path: Path) -> None:
+    found = proposal(csv_of(tmp_path, {"time": T, "position": 500.0 * ANGLE, "force": 100.0 * np.sign(RATE)}))
+    assert units(found)["angle/left"] == ("position", "mm")
+    assert "GUESSED: up to 261.8 and a force in the file, so a linear axis; if not, then deg" in found["text"]
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "wanted"),
+    [("log.csv.gz", b"\x1f\x8b\x08", "unpack it"), ("log.xlsx", b"PK\x03\x04", "save it as CSV"), ("a.npy", b"\x93NUMPY\x01", r"as \.npz")],
+)
+def test_tables_that_are_no_text_are_told_what_to_do(tmp_path: Path, name: str, begin: bytes, wanted: str) -> None:
+    (tmp_path / name).write_bytes(begin + bytes(100))
+    with pytest.raises(MapFileError, match=wanted):
+        propose(tmp_path / name, tmp_path / "map.yaml")

@@ -233,8 +233,6 @@ def _check_csv(reader: Reader, options: Csv) -> None:
         raise reader.fail("csv.decimal", options.decimal, "one character")
     if len(options.delimiter) != 1 and options.delimiter != WHITESPACE:
         raise reader.fail("csv.delimiter", options.delimiter, f"one character, or '{WHITESPACE}'")
-    if options.delimiter == options.decimal:
-        raise reader.fail("csv.delimiter", options.delimiter, "another character than csv.decimal")
     for what in options.allow:
         if what not in ALLOWANCES:
             raise reader.fail("csv.allow", what, f"one of {', '.join(ALLOWANCES)}")

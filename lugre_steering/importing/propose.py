@@ -22,7 +22,7 @@ from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, parts_of, side_alone, spaced, tells, unit_in
+from lugre_steering.importing.words import WORDS, parts_of, side_alone, spaced, tells, unit_in, words_of
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
@@ -202,7 +202,8 @@ def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tupl
     values = table.columns[name][np.isfinite(table.columns[name])]
     most = float(np.quantile(np.abs(values), 0.99))
     if kind == "angle":
-        return _angle_unit(most, float(np.ptp(values)))
+        linear = not {"position", "pos"}.isdisjoint(words_of(name)) and any(tells(other, "force") for other in table.columns)
+        return _axis_unit(most) if linear else _angle_unit(most, float(np.ptp(values)))
     if kind == "rate":
         return _rate_unit(table, name, taken[f"angle/{side}"])
     if kind == "pressure":
@@ -211,6 +212,11 @@ def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tupl
         unit = "N" if tells(name, "force") else "N m"
         return unit, f"GUESSED: up to {most:.3g}, nothing says more"
     return ("K", f"{most:.0f} can only be K") if float(np.median(values)) > 150.0 else ("degC", f"up to {most:.3g}")
+
+
+def _axis_unit(most: float) -> tuple[str, str]:
+    unit = "mm" if most > 5.0 else "m"
+    return unit, f"GUESSED: up to {most:.4g} and a force in the file, so a linear axis; if not, then {'deg' if unit == 'mm' else 'rad'}"
 
 
 def _angle_unit(most: float, travel: float) -> tuple[str, str]:

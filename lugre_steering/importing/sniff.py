@@ -21,6 +21,12 @@ _BYTES = 1 << 20
 _LINES = 400
 _DELIMITERS = (",", ";", "\t", "|", WHITESPACE)
 _COMMENTS = "#%!"
+_NO_TEXT = (
+    (b"\x1f\x8b", "is packed (gzip), expected a table: unpack it"),
+    (b"PK\x03\x04", "is packed, or a spreadsheet, expected a table: unpack it, or save it as CSV"),
+    (b"\x93NUMPY", "is an array without names, expected a table: save it by names, as .npz"),
+)
+"""How files begin that hold a table, but no text."""
 _RUN = 5
 """The data begin at a row of numbers of which most of so many are, itself included."""
 
@@ -33,9 +39,8 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
         raise MapFileError(f"{file}: holds no text, expected a table")
     marks = Counter(line[0] for line in lines if line[:1] and line[0] in _COMMENTS)
     comment = max(marks, key=marks.__getitem__) if marks else "#"
-    delimiter, decimal = max(
-        ((d, c) for d in _DELIMITERS for c in (".", ",") if d != c), key=lambda way: _score(lines, comment, *way)
-    )
+    ways = [(delimiter, decimal) for decimal in (".", ",") for delimiter in _DELIMITERS]
+    delimiter, decimal = max(ways, key=lambda way: _score(lines, comment, *way))
     rows = [(i, cells) for i, cells in _split(lines, comment, delimiter) if any(cells)]
     begin = _begin(rows, decimal)
     if begin is None:
@@ -56,6 +61,9 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
 def _decoded(file: Path) -> tuple[str, str]:
     with file.open("rb") as stream:
         raw = stream.read(_BYTES)
+    for begin, what in _NO_TEXT:
+        if raw.startswith(begin):
+            raise MapFileError(f"{file}: {what}")
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16", raw.decode("utf-16", errors="ignore")
     try:

@@ -23,6 +23,8 @@ Row = tuple[int, list[str]]
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE | re.ASCII)
 """A number as loggers write it; float() would take the underscores of Python too."""
+_GROUPED = re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})", re.ASCII)
+"""Thousands in groups, where nothing else can be meant: 1,234.5 and 1,234,567, but not 1,234."""
 _MISSING = ("", "nan", "-nan", "na", "n/a", "null", "none")
 _NO_VALUE = re.compile(r"-+|\?+|#n/a", re.IGNORECASE)
 """What loggers and spreadsheets write where there is none."""
@@ -34,10 +36,12 @@ def number(text: str, decimal: str = ".", dates: str | None = None) -> float | N
     """A cell as a number, NaN if it says that there is none, nothing if it is other text. A date is its Unix time [s], a time
     alone the seconds of its day; ``dates``: the order of day and month, where slashes are between them."""
     text = text.strip()
-    # With another decimal character a point groups thousands, or the map is wrong: no number either way.
-    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
+    # With another decimal character a point groups thousands, or the map is wrong.
+    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".").replace("?", ",")
     if _NUMBER.fullmatch(plain):
         return float(plain)
+    if _GROUPED.fullmatch(plain):
+        return float(plain.replace(",", ""))
     if text.lower() in _MISSING or _NO_VALUE.fullmatch(text):
         return float("nan")
     return stamp(text, dates)
