@@ -247,6 +247,7 @@ def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
     [
         ({"time [s]": T / 86400.0}, "makes 8.64e+06 samples per second, expected 0.1 to 50000"),
         ({"time": np.repeat(T[::100], np.random.default_rng(1).permutation([20, 180] * 10))}, "many stamps repeat the one before"),
+        ({"time": (86395.0 + T) % 86400.0}, "s before it begins"),
         ({"time": T[::-1]}, "key 'time'"),
         ({"sample": np.arange(T.size)}, "key 'time'"),
         ({"time [ticks]": T}, "key 'time'"),
@@ -384,6 +385,16 @@ def test_one_group_of_three_digits_is_no_number(tmp_path: Path) -> None:
     rows = [[f"{0.01 * i:.2f}", f"{i}", f'"1,{i:03}"'] for i in range(60)]
     found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], rows))
     assert {row["column"]: row["why"][:42] for row in found["unused"]} == {"p_main_a": "line 2, column 'p_main_a': got '1,000', ex"}
+
+
+def test_what_stands_in_round_brackets_is_a_line_or_not_known(tmp_path: Path) -> None:
+    columns = {"t": T, "angle (right)": np.degrees(ANGLE), "angle (ref)": ANGLE, "Pressure (A)": 100.0 + T, "torque (ozin)": RATE}
+    found = proposal(csv_of(tmp_path, columns))
+    assert units(found)["pressure/pressure"] == ("Pressure (A)", "bar")
+    assert units(found)["angle/right"] == ("angle (right)", "deg")
+    assert "angle/left" not in units(found)
+    torque = next(guess for guess in found["channels"] if guess["key"] == "measured_torque")
+    assert torque["why"].endswith("; what 'ozin' says is not known")
 
 
 def test_a_position_beside_a_force_is_guessed_to_be_of_a_linear_axis(tmp_path: Path) -> None:

@@ -72,6 +72,9 @@ class ClockGuess:
         steps = np.diff(seconds[np.isfinite(seconds)])
         if 10 * int(np.sum(steps == 0.0)) > steps.size:
             return f"{table.file}: time '{self.column}': many stamps repeat the one before, expected one per row, or time: {{rate_Hz: ...}}"
+        if steps.size and float(steps.sum()) <= 0.0:
+            back = f"ends {-float(steps.sum()):.3g} s before it begins, expected it to rise (over midnight?)"
+            return f"{table.file}: time '{self.column}': {back}"
         rate = 1.0 / _step(seconds)
         if _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
             return None

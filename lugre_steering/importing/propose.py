@@ -22,7 +22,7 @@ from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, parts_of, side_alone, spaced, tells, unit_in, words_of
+from lugre_steering.importing.words import WORDS, parts_of, remark_in, side_alone, spaced, tells, unit_in, words_of
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
@@ -120,6 +120,8 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
             unused.append({"column": name, "why": f"{why}; {_span(table.columns[name])}"})
             continue
         unit, reason = _unit(table, name, key, taken)
+        if "GUESSED" in reason and (remark := remark_in(name)) is not None:
+            reason += f"; what '{remark}' says is not known"
         taken[key] = Guess(key, name, unit, f"{why}; {reason}", _clock_of(table, times, name))
     return list(taken.values()), unused
 
@@ -210,7 +212,7 @@ def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tupl
         return _pressure_unit(most)
     if kind == "measured_torque":
         unit = "N" if tells(name, "force") else "N m"
-        return unit, f"GUESSED: up to {most:.3g}, nothing says more"
+        return unit, f"GUESSED: up to {most:.3g}, no unit known is stated"
     return ("K", f"{most:.0f} can only be K") if float(np.median(values)) > 150.0 else ("degC", f"up to {most:.3g}")
 
 

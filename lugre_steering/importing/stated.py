@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 from lugre_steering.importing.map import READABLE_UNITS
 from lugre_steering.importing.table import Table
 from lugre_steering.importing.words import stated_in, unit_in
@@ -22,15 +20,7 @@ def stated(table: Table, name: str, dimensions: tuple[str, ...] | None) -> str |
 
 def unfit(table: Table, name: str, dimensions: tuple[str, ...]) -> str | None:
     """What is stated in place of a unit, where it is none of these dimensions: a scale would have to be guessed."""
-    row = _row_of_units(table)
-    titles = [(title, place == row) for place, title in enumerate(table.titles.get(name, ()))]
     if stated(table, name, dimensions) is not None:
         return None
+    titles = [(title, place == table.row_of_units) for place, title in enumerate(table.titles.get(name, ()))]
     return next((found for text, whole in (*titles, (name, False)) if (found := stated_in(text, whole)) is not None), None)
-
-
-def _row_of_units(table: Table) -> int | None:
-    """Which of the other header rows holds a unit for most of the columns."""
-    known = Counter(place for titles in table.titles.values() for place, title in enumerate(titles) if unit_in(title, True))
-    place, count = known.most_common(1)[0] if known else (0, 0)
-    return place if 2 * count > len(table.titles) else None

@@ -6,14 +6,17 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lugre_steering.errors import MapFileError
+from lugre_steering.importing.words import unit_in
 from lugre_steering.recording import Array
 
 MAX_NUMBERS = 100_000_000
@@ -39,6 +42,13 @@ class Table:
     unusable: Mapping[str, str] = field(default_factory=dict)
     titles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     left_out: Mapping[str, int] = field(default_factory=dict)
+
+    @cached_property
+    def row_of_units(self) -> int | None:
+        """Which of the titles is a unit for most of the columns that have any."""
+        known = Counter(place for titles in self.titles.values() for place, title in enumerate(titles) if unit_in(title, True))
+        place, count = known.most_common(1)[0] if known else (0, 0)
+        return place if 2 * count > len(self.titles) else None
 
     def column(self, name: str) -> Array:
         if name not in self.columns:

@@ -76,10 +76,8 @@ def spaced(text: str) -> str:
 
 
 def tells(name: str, kind: str) -> bool:
-    """Whether a name holds a word of this kind; of a path any part may tell the side, the air and a command."""
-    if kind in _QUANTITIES:
-        return _tell(words_of(name), kind)
-    return any(_tell(_words(part), kind) for part in parts_of(name))
+    """Whether a name holds a word of this kind; side, air and command are told by any part of a path and in round brackets too."""
+    return _tell(words_of(name) if kind in _QUANTITIES else _words(re.sub(r"\[.*?\]", " ", name)), kind)
 
 
 def _tell(words: list[str], kind: str) -> bool:
@@ -108,9 +106,19 @@ def stated_in(text: str, whole: bool = False) -> str | None:
         return text.strip("[]() -?") or None
     square, rounded = _bracketed(text)
     found = [part for part in square if not part.isdigit() and not _is_side(part)]
-    found += [part for part in rounded if _known(part) or _spelt(part).lower() in _UNSCALED or re.search(r"[/%°^*·²]", part)]
-    found += [end for end in _ends(text) if end.lower() in _UNSCALED and (len(end) > 2 or end in ("%", "mA", "mV"))]
+    found += [part for part in rounded if _known(part) or _unscaled(part) or re.search(r"[/%°^*·²]", part)]
+    found += [end for end in _ends(text) if _unscaled(end)]
     return found[0] if found else None
+
+
+def remark_in(text: str) -> str | None:
+    """What stands in round brackets and is no side: a unit that is not known, or a remark."""
+    return next((part for part in _bracketed(text)[1] if not part.isdigit() and not _is_side(part)), None)
+
+
+def _unscaled(text: str) -> bool:
+    """Two letters as they are written, not any: the pressures A and ma are of lines."""
+    return text.lower() in _UNSCALED and (len(text) > 2 or text in ("%", "mA", "mV"))
 
 
 def _bracketed(text: str) -> tuple[list[str], list[str]]:
