@@ -208,7 +208,7 @@ GOOD = HEAD + "time: {column: t}\nchannels: {angle/left: {column: a, unit: deg}}
         (GOOD + "start_s: 2\nstop_s: 1\n", "key 'stop_s': got 1.0, expected more than start_s"),
         (GOOD + "epoch_s: -1\n", "key 'epoch_s': got -1"),
         (GOOD + "csv: {delimiter: ';;'}\n", "key 'csv.delimiter'"),
-        (GOOD + "csv: {decimal: ','}\n", "key 'csv.delimiter': got ',', expected another character than csv.decimal"),
+        (GOOD + "csv: {dates: ymd}\n", "key 'csv.dates': got 'ymd', expected one of dmy, mdy"),
         (GOOD.replace("}}", "}, rate/left: {column: b, unit: m/s}}"), "rate/left.unit': got 'm/s', expected one of rad/s"),
         (GOOD.replace("angle/left: {column: a, unit: deg}", "rate/left: {column: a, unit: deg/s}"), "expected angle/left beside"),
         (GOOD.replace("column: a, unit: deg", "cylinder: {cap: {column: a, unit: bar, area_m2: 1}}"), "for measured_torque only"),

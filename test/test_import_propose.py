@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -209,3 +211,203 @@ def test_a_stated_unit_that_is_none_of_the_quantity_is_never_taken_for_another(t
     unused = {entry["column"]: entry["why"] for entry in found["unused"]}
     assert "'mA'" in unused["p_main_a [mA]"]
     assert "command" in unused["q_des"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "epoch_s"),
+    [
+        ({"Date": 45987.25 + T / 86400.0}, 0.0),
+        ({"Time": 0.25 + T / 86400.0}, 1e9),
+        ({"header.stamp.sec": 1.7e9 + np.floor(T + 0.5), "header.stamp.nanosec": np.round((T + 0.5) % 1.0 * 1e9)}, 0.0),
+        ({"timestamp": np.floor(1.7e9 + T)}, 0.0),
+        ({"time": np.repeat(T[::2], 2)}, 1e9),
+    ],
+)
+def test_clocks_of_spreadsheets_of_messages_and_of_coarse_stamps(tmp_path: Path, columns: dict[str, np.ndarray], epoch_s: float) -> None:
+    found = proposal(csv_of(tmp_path, columns | {"angle": np.degrees(ANGLE)}))
+    mapping = load_map(tmp_path / "map.yaml")
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["rate_Hz"] == pytest.approx(100.0, rel=0.02)
+    assert row["to_s"] - row["from_s"] == pytest.approx(19.99, rel=0.02)
+    if mapping.time.rate_Hz is None:
+        assert mapping.epoch_s == epoch_s
+    else:
+        assert "stamps repeat the one before: GUESSED 100 rows per second" in found["text"]
+        assert mapping.epoch_s == (1.7e9 if "timestamp" in columns else 1e9)
+
+
+def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
+    propose(csv_of(tmp_path, {"Date": 45987.25 + T / 86400.0, "angle": np.degrees(ANGLE)}), tmp_path / "map.yaml")
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag")["channels"]
+    assert row["from_s"] == pytest.approx(datetime(2025, 11, 26, 6, tzinfo=UTC).timestamp(), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("time", "wanted"),
+    [
+        ({"time [s]": T / 86400.0}, "makes 8.64e+06 samples per second, expected 0.1 to 50000"),
+        ({"time": np.repeat(T[::100], np.random.default_rng(1).permutation([20, 180] * 10))}, "many stamps repeat the one before"),
+        ({"time": (86395.0 + T) % 86400.0}, "s before it begins"),
+        ({"time": T[::-1]}, "key 'time'"),
+        ({"sample": np.arange(T.size)}, "key 'time'"),
+        ({"time [ticks]": T}, "key 'time'"),
+    ],
+)
+def test_a_time_that_cannot_be_is_a_problem(tmp_path: Path, time: dict[str, np.ndarray], wanted: str) -> None:
+    found = propose(csv_of(tmp_path, time | {"angle": np.degrees(ANGLE)}), tmp_path / "map.yaml")
+    assert wanted in found["problem"]
+    assert "nothing known" not in (tmp_path / "map.yaml").read_text()
+
+
+def written(folder: Path, header: list[str], rows: list[list[str]], delimiter: str = ",") -> Path:
+    path = folder / "log.csv"
+    path.write_text("\n".join(delimiter.join(row) for row in [header, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+NOON = datetime(2026, 11, 22, 11, 59, 50, tzinfo=UTC)
+
+
+def stamps(form: str) -> list[str]:
+    return [(NOON + timedelta(seconds=float(t))).strftime(form) for t in T]
+
+
+@pytest.mark.parametrize(
+    ("titles", "forms", "from_s"),
+    [
+        (["Datum"], ["%d.%m.%Y %H:%M:%S,%f"], NOON.timestamp()),
+        (["Timestamp"], ["%m/%d/%Y %I:%M:%S.%f %p"], NOON.timestamp()),
+        (["Stamp"], ["%d/%m/%Y %H:%M:%S.%f"], NOON.timestamp()),
+        (["Time"], ["%H:%M:%S.%f"], 11 * 3600 + 59 * 60 + 50),
+        (["Date", "Time"], ["%Y-%m-%d", "%H:%M:%S.%f"], NOON.timestamp()),
+        (["Time", "Date"], ["%I:%M:%S.%f %p", "%d.%m.%Y"], NOON.timestamp()),
+    ],
+)
+def test_stamps_of_loggers(tmp_path: Path, titles: list[str], forms: list[str], from_s: float) -> None:
+    rows = [list(row) for row in zip(*map(stamps, forms), (f"{x:.4f}" for x in np.degrees(ANGLE)), strict=True)]
+    found = proposal(written(tmp_path, [*titles, "angle left"], rows, ";"))
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert (row["from_s"], row["to_s"]) == (pytest.approx(from_s, abs=1e-3), pytest.approx(from_s + 19.99, abs=1e-3))
+    assert row["samples"] == T.size
+    assert ("epoch_s: 0" in found["text"]) == (from_s > 1e8)
+
+
+def test_dates_whose_order_nothing_tells_are_left_to_the_user(tmp_path: Path) -> None:
+    rows = [[f"05/06/2026 10:00:{i:02}", f"{i}"] for i in range(60)]
+    found = propose(written(tmp_path, ["Date", "angle left"], rows), tmp_path / "map.yaml")
+    assert found["problem"] is not None
+    assert "dates like '05/06/2026 10:00:00' are ambiguous: say csv.dates: dmy or mdy" in found["format"]
+    rows = [[f"05/06/2026 10:00:{i:02} AM", f"{i}"] for i in range(60)]
+    (tmp_path / "map.yaml").unlink()
+    found = proposal(written(tmp_path, ["Date", "angle left"], rows))
+    assert any("GUESSED mdy" in reason for reason in found["format"])
+
+
+def test_numpy_dates(tmp_path: Path) -> None:
+    time = np.datetime64("2026-11-22T06:00:00", "ms") + np.round(1e3 * T).astype("timedelta64[ms]")
+    np.savez(tmp_path / "d.npz", stamp=time, angle=np.degrees(ANGLE))
+    assert units(proposal(tmp_path / "d.npz"))["time"] == ("stamp", "ns")
+    (row,) = import_table(tmp_path / "d.npz", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["from_s"] == pytest.approx(datetime(2026, 11, 22, 6, tzinfo=UTC).timestamp(), abs=1e-3)
+
+
+@pytest.mark.parametrize("end", ["", ",,,,"])
+@pytest.mark.parametrize("turn", [0, 9])
+def test_two_rates_in_one_table(tmp_path: Path, end: str, turn: int) -> None:
+    lines = ["t [s],angle left [deg],angle right [deg],p_a [bar],p_b [bar],p_c [bar],p_d [bar]"]
+    lines += [f"{0.01 * i:.2f},{i % 7},{i % 5}" + (f",{i},{i},{i},{i}" if i % 10 == turn else end) for i in range(600)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    proposal(tmp_path / "log.csv")
+    found = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert {row["channel"]: row["samples"] for row in found} == {
+        "angle/left": 600, "angle/right": 600, **{f"pressure/p_{line}": 60 for line in "abcd"}
+    }  # fmt: skip
+
+
+def test_tabs_beside_names_with_blanks(tmp_path: Path) -> None:
+    found = proposal(csv_of(tmp_path, {"Time [s]": T, "Angle left [deg]": ANGLE, "Pressure main a [bar]": T}, "\t"))
+    assert units(found)["pressure/main_a"] == ("Pressure main a [bar]", "bar")
+
+
+def test_dashes_and_question_marks_are_missing_numbers_and_no_units(tmp_path: Path) -> None:
+    rows = [[f"{0.01 * i:.2f}", {1: "-", 2: "---"}.get(i % 10, f"{i % 7}"), "?" if i == 5 else f"{i}"] for i in range(600)]
+    found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], [["s", "-", "bar"], *rows]))
+    assert "121 cells of '-', '?' or '#N/A' (count as missing)" in found["format"]
+    assert units(found)["pressure/main_a"] == ("p_main_a", "bar")
+    missing = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert [row["missing"] for row in missing] == [120, 1]
+
+
+@pytest.mark.parametrize(
+    ("names", "line"),
+    [
+        (["angle.left", "pressure.main_a"], "main_a"), (["log.angle.left", "log.p.main_a"], "main_a"),
+        (["out.angle_left.signals.values", "out.p_main_a.signals.values"], "main_a"), (["SteerAngleLeft", "PressMainA"], "main_a"),
+        (["/steering/left/joint_state/position", "/steering/pressure/main_a/fluid_pressure"], "main_a"), (["Left", "P1"], "p1"),
+        (["Left Angle", "Main A Pressure"], "main_a"), (["status.angle left", "left cap pressure"], "left_cap"),
+        (["angle_l [0.01 deg]", "p_cap_bar"], "cap"),
+    ],
+)  # fmt: skip
+def test_names_of_sides_and_lines_in_paths_and_words(tmp_path: Path, names: list[str], line: str) -> None:
+    found = proposal(csv_of(tmp_path, {"time": T, names[0]: np.degrees(ANGLE), names[1]: 100.0 + T}))
+    assert {key: column for key, (column, _) in units(found).items()} == {
+        "time": "time", "angle/left": names[0], f"pressure/{line}": names[1]
+    }  # fmt: skip
+
+
+def test_a_command_anywhere_in_a_path_and_a_state_at_its_end_are_nothing_measured(tmp_path: Path) -> None:
+    columns = {"time": T, "cmd.angle.left": ANGLE, "angle.left.valid": T, "Left": T, "angle.left": np.degrees(ANGLE)}
+    found = proposal(csv_of(tmp_path, columns))
+    assert units(found)["angle/left"] == ("angle.left", "deg")
+    unused = {row["column"]: row["why"] for row in found["unused"]}
+    assert "command" in unused["cmd.angle.left"]
+    assert "command" in unused["angle.left.valid"]
+    assert "may be angle/left too" in unused["Left"]
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "form", "top"),
+    [
+        (",", lambda x: f'"{x:.4f}"'.replace(".", ","), "19,9900"), (",", lambda x: f'"{1e6 + x:,.2f}"', "1,000,019.99"),
+        (";", lambda x: f"{1e6 + x:,.2f}".translate(str.maketrans(".,", ",.")), "1.000.019,99"),
+    ],
+)  # fmt: skip
+def test_commas_in_quotes_and_thousands_in_groups(tmp_path: Path, delimiter: str, form: Callable[[float], str], top: str) -> None:
+    rows = [[form(t), form(angle)] for t, angle in zip(T, np.degrees(ANGLE), strict=True)]
+    assert rows[-1][0].strip('"') == top
+    proposal(written(tmp_path, ["t", "angle left"], rows, delimiter))
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["rate_Hz"] == pytest.approx(100.0)
+    assert (row["missing"], row["to_s"] - row["from_s"]) == (0, pytest.approx(19.99))
+
+
+def test_one_group_of_three_digits_is_no_number(tmp_path: Path) -> None:
+    rows = [[f"{0.01 * i:.2f}", f"{i}", f'"1,{i:03}"'] for i in range(60)]
+    found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], rows))
+    assert {row["column"]: row["why"][:42] for row in found["unused"]} == {"p_main_a": "line 2, column 'p_main_a': got '1,000', ex"}
+
+
+def test_what_stands_in_round_brackets_is_a_line_or_not_known(tmp_path: Path) -> None:
+    columns = {"t": T, "angle (right)": np.degrees(ANGLE), "angle (ref)": ANGLE, "Pressure (A)": 100.0 + T, "torque (ozin)": RATE}
+    found = proposal(csv_of(tmp_path, columns))
+    assert units(found)["pressure/pressure"] == ("Pressure (A)", "bar")
+    assert units(found)["angle/right"] == ("angle (right)", "deg")
+    assert "angle/left" not in units(found)
+    torque = next(guess for guess in found["channels"] if guess["key"] == "measured_torque")
+    assert torque["why"].endswith("; what 'ozin' says is not known")
+
+
+def test_a_position_beside_a_force_is_guessed_to_be_of_a_linear_axis(tmp_path: Path) -> None:
+    found = proposal(csv_of(tmp_path, {"time": T, "position": 500.0 * ANGLE, "force": 100.0 * np.sign(RATE)}))
+    assert units(found)["angle/left"] == ("position", "mm")
+    assert "GUESSED: up to 261.8 and a force in the file, so a linear axis; if not, then deg" in found["text"]
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "wanted"),
+    [("log.csv.gz", b"\x1f\x8b\x08", "unpack it"), ("log.xlsx", b"PK\x03\x04", "save it as CSV"), ("a.npy", b"\x93NUMPY\x01", r"as \.npz")],
+)
+def test_tables_that_are_no_text_are_told_what_to_do(tmp_path: Path, name: str, begin: bytes, wanted: str) -> None:
+    (tmp_path / name).write_bytes(begin + bytes(100))
+    with pytest.raises(MapFileError, match=wanted):
+        propose(tmp_path / name, tmp_path / "map.yaml")

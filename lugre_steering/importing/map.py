@@ -11,6 +11,7 @@ from pathlib import Path
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.expression import FUNCTIONS
+from lugre_steering.importing.stamps import ORDERS
 from lugre_steering.recording import Array
 from lugre_steering.schema import Reader, positive, quantity
 from lugre_steering.vehicle.check import TOPIC
@@ -152,7 +153,8 @@ class Csv:
     """How a CSV file is written.
 
     Below ``skip_rows`` lines come ``header_rows``, of which ``name_row`` (from 1) holds the column names; ``columns``
-    names them here instead. ``allow``: what is otherwise refused, of ``ALLOWANCES``.
+    names them here instead. ``dates``: of dates by slashes, ``dmy`` or ``mdy``. ``allow``: what is otherwise refused, of
+    ``ALLOWANCES``.
     """
 
     delimiter: str = ","
@@ -164,6 +166,7 @@ class Csv:
     columns: tuple[str, ...] | None = quantity(default=None)
     allow: tuple[str, ...] = ()
     encoding: str = "utf-8"
+    dates: str | None = None
 
 
 @dataclass(frozen=True)
@@ -230,13 +233,13 @@ def _check_csv(reader: Reader, options: Csv) -> None:
         raise reader.fail("csv.decimal", options.decimal, "one character")
     if len(options.delimiter) != 1 and options.delimiter != WHITESPACE:
         raise reader.fail("csv.delimiter", options.delimiter, f"one character, or '{WHITESPACE}'")
-    if options.delimiter == options.decimal:
-        raise reader.fail("csv.delimiter", options.delimiter, "another character than csv.decimal")
     for what in options.allow:
         if what not in ALLOWANCES:
             raise reader.fail("csv.allow", what, f"one of {', '.join(ALLOWANCES)}")
     if options.columns is not None and len(set(options.columns)) != len(options.columns):
         raise reader.fail("csv.columns", list(options.columns), "distinct names")
+    if options.dates is not None and options.dates not in ORDERS:
+        raise reader.fail("csv.dates", options.dates, f"one of {', '.join(ORDERS)}")
     if options.encoding not in ENCODINGS:
         raise reader.fail("csv.encoding", options.encoding, f"one of {', '.join(ENCODINGS)}")
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,19 +15,21 @@ import yaml
 
 from lugre_steering.errors import LugreSteeringError, MapFileError
 from lugre_steering.importing.channels import read_channels
+from lugre_steering.importing.clocks import FEW, ClockGuess, clocks, counts, is_named
 from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Csv, load_map
 from lugre_steering.importing.plausible import DEGREES, check_units
 from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
+from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, stated_in, tells, unit_in
+from lugre_steering.importing.words import WORDS, parts_of, remark_in, side_alone, spaced, tells, unit_in, words_of
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
-_FEW = 5
-_UNIX = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-"""Above so much a time counts from 1970, in this unit."""
-_OF_PRESSURE = re.compile(rf"^(?:{'|'.join(WORDS['pressure'])})_(?=[a-z]{{2}})")
+_PRESSURE = "|".join(sorted(WORDS["pressure"]))
+_OF_PRESSURE, _PRESSURE_OF = re.compile(rf"^(?:{_PRESSURE})_(?=[a-z]{{2}})"), re.compile(rf"(?<=[a-z_][a-z])_(?:{_PRESSURE})$")
+_CONTAINERS = ("data", "fluid_pressure", "samples", "signals", "value", "values")
+"""Parts of paths that name nothing."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Guess:
     column: str
     unit: str
     why: str
-    time: str | None = None
+    time: ClockGuess | None = None
 
 
 def propose(file: Path, map_file: Path) -> dict[str, Any]:
@@ -50,10 +51,10 @@ def propose(file: Path, map_file: Path) -> dict[str, Any]:
         options, more = _allowances(file, options)
         reasons += more
     table = read_table(file, options)
-    clocks = _clocks(table)
-    guesses, unused = _channels(table, clocks)
+    times = clocks(table)
+    guesses, unused = _channels(table, times)
     signed = {name: bits for name, values in table.columns.items() if (bits := _signed_bits(values))}
-    text = _map_text(file, options, reasons, clocks, guesses, unused, signed, table)
+    text = _map_text(file, options, reasons, times, guesses, unused, signed, table)
     try:
         with map_file.open("x", encoding="utf-8") as stream:
             stream.write(text)
@@ -63,11 +64,11 @@ def propose(file: Path, map_file: Path) -> dict[str, Any]:
         "table": str(file),
         "map": str(map_file),
         "format": reasons,
-        "clocks": [asdict(clock) for clock in clocks],
-        "channels": [asdict(guess) for guess in guesses],
+        "clocks": [asdict(clock) for clock in times],
+        "channels": [asdict(guess) | {"time": guess.time.column if guess.time else None} for guess in guesses],
         "signed": signed,
         "unused": unused,
-        "problem": _problem(file, map_file),
+        "problem": _problem(file, map_file) or next(filter(None, (clock.doubt(table) for clock in times)), None),
     }
 
 
@@ -91,75 +92,37 @@ def _problem(file: Path, map_file: Path) -> str | None:
     return None
 
 
-# --------------------------------------------------------------- clocks
-
-
-def _clocks(table: Table) -> list[Guess]:
-    """Time columns: by their name, else the first column that only rises."""
-    rising = [name for name, values in table.columns.items() if _rises(values)]
-    fit = [name for name in rising if _unfit(table, name, ("time",)) is None]
-    named = [name for name in fit if tells(name, "time") and not tells(name, "command")]
-    return [_clock(table, name, name in named) for name in named or fit[:1]]
-
-
-def _rises(values: Array) -> bool:
-    known = values[np.isfinite(values)]
-    return known.size >= _FEW and float(np.mean(np.diff(known) > 0.0)) > 0.9
-
-
-def _clock(table: Table, name: str, named: bool) -> Guess:
-    values = table.columns[name][np.isfinite(table.columns[name])]
-    step = float(np.median(np.diff(values)))
-    how = "named so" if named else "the first column that only rises"
-    unit = _stated(table, name, ("time",))
-    unix = next((unit for least, unit in _UNIX if float(np.median(values)) > least), None)
-    if unit is not None:
-        why = "unit as stated"
-    elif unix is not None:
-        unit, why = unix, "as Unix time it lies in our days"
-    else:
-        unit = "s" if step < 0.5 else "ms" if step < 500.0 else "us" if step < 1e5 else "ns"
-        why = f"steps of {step:.3g}: {_rate(step, unit)}"
-    return Guess("time", name, unit, f"{how}; {why}")
-
-
-def _rate(step: float, unit: str) -> str:
-    return f"{1.0 / (step * READABLE_UNITS[unit][1]):.4g} samples per second"
-
-
-def _unix(table: Table, clock: Guess) -> bool:
-    seconds = np.nanmedian(table.columns[clock.column]) * READABLE_UNITS[clock.unit][1]
-    return bool(seconds > _UNIX[-1][0])
-
-
-def _clock_of(table: Table, clocks: Sequence[Guess], name: str) -> str | None:
-    """The time column next to the left among those of the same length."""
+def _clock_of(table: Table, times: Sequence[ClockGuess], name: str) -> ClockGuess | None:
+    """The clock next to the left among those of the same length."""
     order = list(table.columns)
-    fitting = [clock.column for clock in clocks if table.columns[clock.column].size == table.columns[name].size]
-    left = [column for column in fitting if order.index(column) < order.index(name)]
+    fitting = [clock for clock in times if table.columns[clock.column].size == table.columns[name].size]
+    left = [clock for clock in fitting if order.index(clock.column) < order.index(name)]
     return left[-1] if left else fitting[0] if fitting else None
 
 
 # ------------------------------------------------------------- channels
 
 
-def _channels(table: Table, clocks: Sequence[Guess]) -> tuple[list[Guess], list[dict[str, str]]]:
+def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], list[dict[str, str]]]:
     """Guesses by channel, and the columns that are none."""
     taken: dict[str, Guess] = {}
     unused = [{"column": name, "why": why} for name, why in table.unusable.items()]
-    times = {clock.column for clock in clocks}
-    ordered = sorted((name for name in table.columns if name not in times), key=lambda name: _kind(table, name) == "rate")
-    for name in ordered:  # rates after the angles they belong to
+    of_time = {column for clock in times for column in clock.columns()}
+    order = {None: 1, "rate": 2}  # rates after the angles they belong to, and these by their own names first
+    ordered = sorted((name for name in table.columns if name not in of_time), key=lambda name: order.get(_kind(table, name), 0))
+    for name in ordered:
         key, why = _key(table, name)
-        if key is not None and (stated := _unfit(table, name, _DIMENSIONS[key.partition("/")[0]])):
-            key, why = None, f"{why}, but it is stated in '{stated}', which is none of its units: give scale and unit"
+        if key is not None and (text := unfit(table, name, _DIMENSIONS[key.partition("/")[0]])):
+            key, why = None, f"{why}, but it is stated in '{text}', which is none of its units: give scale and unit"
         if key is not None and (obstacle := _obstacle(key, taken)):
             key, why = None, obstacle
         if key is None:
             unused.append({"column": name, "why": f"{why}; {_span(table.columns[name])}"})
             continue
         unit, reason = _unit(table, name, key, taken)
-        taken[key] = Guess(key, name, unit, f"{why}; {reason}", _clock_of(table, clocks, name))
+        if "GUESSED" in reason and (remark := remark_in(name)) is not None:
+            reason += f"; what '{remark}' says is not known"
+        taken[key] = Guess(key, name, unit, f"{why}; {reason}", _clock_of(table, times, name))
     return list(taken.values()), unused
 
 
@@ -173,68 +136,58 @@ def _obstacle(key: str, taken: Mapping[str, Guess]) -> str | None:
 
 def _kind(table: Table, name: str) -> str | None:
     """What a column holds, by its words, else by its unit."""
-    if tells(name, "command"):
+    if tells(name, "command") or tells(name, "state"):
         return "command"
     if tells(name, "temperature"):
         return "air_temperature" if tells(name, "air") else "temperature"
     for kind in ("rate", "torque", "pressure", "angle"):
         if tells(name, kind):
             return kind
-    dimension = READABLE_UNITS[unit][0] if (unit := _stated(table, name, None)) else None
+    dimension = READABLE_UNITS[unit][0] if (unit := stated(table, name, None)) else None
     if dimension == "temperature" and tells(name, "air"):
         return "air_temperature"
     by_unit = {"angle": "angle", "angular speed": "rate", "pressure": "pressure", "torque": "torque", "force": "torque"}
     return by_unit.get(dimension or "")
 
 
+def _line(name: str) -> str:
+    """The pressure line that a name tells, as vehicle files call it: main_a of 'p main A', 'pressure_main_a', 'PressMainA'."""
+    parts = parts_of(name)
+    told = [part for part in parts if part.strip().lower() not in _CONTAINERS] or parts[-1:]
+    first = max((place for place, part in enumerate(told) if tells(part, "pressure")), default=len(told) - 1)
+    plain = " ".join(told[first:]).strip()
+    if READABLE_UNITS[unit_in(plain) or "s"][0] == "pressure":  # 'p_left_cap_bar' is the line left_cap
+        plain = re.sub(r"[\s_]+[^\W_]+$", "", plain)
+    line = re.sub(r"\W+", "_", spaced(plain), flags=re.ASCII).strip("_").lower()
+    return _PRESSURE_OF.sub("", _OF_PRESSURE.sub("", line))
+
+
 def _key(table: Table, name: str) -> tuple[str | None, str]:
     """The channel of a column, with the reason, or why it is none."""
     kind = _kind(table, name)
-    if np.isfinite(table.columns[name]).sum() < _FEW:
+    if np.isfinite(table.columns[name]).sum() < FEW:
         return None, "hardly any numbers"
     if kind in ("angle", "rate"):
         side = next((side for side in ("left", "right") if tells(name, side)), None)
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
-        plain = re.sub(r"[\[(].*?[\])]", "", name.rsplit(".", 1)[-1]).strip()
-        if READABLE_UNITS[unit_in(plain) or "s"][0] == "pressure":  # 'p_left_cap_bar' is the line left_cap
-            plain = re.sub(r"[\s_]+[^\W_]+$", "", plain)
-        line = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_").lower()
-        line = _OF_PRESSURE.sub("", line)  # 'p main A' and 'pressure_main_a' are the line main_a of a vehicle file
+        line = _line(name)
         return f"pressure/{line if line[:1].isalpha() else f'line_{line}'}", "the name or unit tells of pressure"
     if kind == "torque":
         return "measured_torque", "the name or unit tells of torque or force"
     if kind == "air_temperature":
         return kind, "the name tells of air temperature"
+    if kind is None and (side := side_alone(name)) is not None:
+        return f"angle/{side}", "named by its side alone: GUESSED to be the angle"
+    if kind is None and is_named(name):
+        text = unfit(table, name, ("time",))
+        return None, f"called a time, but {f'stated in {text!r}, no unit of time known' if text else 'it does not rise as one'}"
+    if kind is None and counts(table.columns[name]):
+        return None, "counts the rows: as a time it needs their rate"
     none = {"command": "a command or state, nothing measured", "temperature": "a temperature, but not said to be of the air"}
-    if kind is None and (unit := _stated(table, name, ("length",))) is not None:
+    if kind is None and (unit := stated(table, name, ("length",))) is not None:
         return None, f"a length in {unit}: by 'pivots' or a 'polynomial' an angle, on a linear axis the angle itself"
     return None, none.get(kind or "", "the name tells nothing known")
-
-
-def _stated(table: Table, name: str, dimensions: tuple[str, ...] | None) -> str | None:
-    """The unit that the file gives, by a row of units or in the name."""
-    for text, whole in (*((title, True) for title in table.titles.get(name, ())), (name, False)):
-        unit = unit_in(text, whole)
-        if unit is not None and (dimensions is None or READABLE_UNITS[unit][0] in dimensions):
-            return unit
-    return None
-
-
-def _unfit(table: Table, name: str, dimensions: tuple[str, ...]) -> str | None:
-    """What is stated in place of a unit, where it is none of these dimensions: a scale would have to be guessed."""
-    row = _row_of_units(table)
-    titles = [(title, place == row) for place, title in enumerate(table.titles.get(name, ()))]
-    if _stated(table, name, dimensions) is not None:
-        return None
-    return next((stated for text, whole in (*titles, (name, False)) if (stated := stated_in(text, whole)) is not None), None)
-
-
-def _row_of_units(table: Table) -> int | None:
-    """Which of the other header rows holds a unit for most of the columns."""
-    known = Counter(place for titles in table.titles.values() for place, title in enumerate(titles) if unit_in(title, True))
-    place, count = known.most_common(1)[0] if known else (0, 0)
-    return place if 2 * count > len(table.titles) else None
 
 
 _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
@@ -245,21 +198,27 @@ _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
 
 def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tuple[str, str]:
     kind, _, side = key.partition("/")
-    stated = _stated(table, name, _DIMENSIONS[kind])
-    if stated is not None:
-        return stated, "unit as stated"
+    unit = stated(table, name, _DIMENSIONS[kind])
+    if unit is not None:
+        return unit, "unit as stated"
     values = table.columns[name][np.isfinite(table.columns[name])]
     most = float(np.quantile(np.abs(values), 0.99))
     if kind == "angle":
-        return _angle_unit(most, float(np.ptp(values)))
+        linear = not {"position", "pos"}.isdisjoint(words_of(name)) and any(tells(other, "force") for other in table.columns)
+        return _axis_unit(most) if linear else _angle_unit(most, float(np.ptp(values)))
     if kind == "rate":
         return _rate_unit(table, name, taken[f"angle/{side}"])
     if kind == "pressure":
         return _pressure_unit(most)
     if kind == "measured_torque":
         unit = "N" if tells(name, "force") else "N m"
-        return unit, f"GUESSED: up to {most:.3g}, nothing says more"
+        return unit, f"GUESSED: up to {most:.3g}, no unit known is stated"
     return ("K", f"{most:.0f} can only be K") if float(np.median(values)) > 150.0 else ("degC", f"up to {most:.3g}")
+
+
+def _axis_unit(most: float) -> tuple[str, str]:
+    unit = "mm" if most > 5.0 else "m"
+    return unit, f"GUESSED: up to {most:.4g} and a force in the file, so a linear axis; if not, then {'deg' if unit == 'mm' else 'rad'}"
 
 
 def _angle_unit(most: float, travel: float) -> tuple[str, str]:
@@ -274,13 +233,12 @@ def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
     plain = f"{angle.unit}/s" if angle.unit in ("deg", "mm") else "m/s" if linear else "rad/s"
     if angle.time is None or angle.unit not in ("deg", "rad"):
         return plain, f"GUESSED, as the angle is in {angle.unit}"
-    time, value, rate = (table.columns[column] for column in (angle.time, angle.column, name))
+    time, value, rate = angle.time.seconds(table), table.columns[angle.column], table.columns[name]
     if not time.size == value.size == rate.size:
         return plain, f"GUESSED, as the angle is in {angle.unit}"
     known = np.isfinite(time) & np.isfinite(value) & np.isfinite(rate)
     turned = value[known] - value[known].mean()
-    seconds = time[known] * (READABLE_UNITS[_clock(table, angle.time, True).unit][1])
-    summed = np.concatenate([[0.0], np.cumsum(0.5 * (rate[known][1:] + rate[known][:-1]) * np.diff(seconds))])
+    summed = np.concatenate([[0.0], np.cumsum(0.5 * (rate[known][1:] + rate[known][:-1]) * np.diff(time[known]))])
     summed -= summed.mean()
     ratio = abs(float(summed @ turned) / float(turned @ turned)) if turned.any() else 0.0
     for factor, other in ((DEGREES, "deg/s"), (1.0 / DEGREES, "rad/s")):
@@ -304,7 +262,7 @@ def _signed_bits(values: Array) -> int | None:
         full, between = 2.0**bits, (known > 0.25 * 2.0**bits) & (known < 0.75 * 2.0**bits)
         if known.max() < full:
             low, high = np.unique(known[known < 0.25 * full]).size, np.unique(known[known > 0.75 * full]).size
-            return bits if low >= _FEW and high >= _FEW and not between.any() else None
+            return bits if low >= FEW and high >= FEW and not between.any() else None
     return None
 
 
@@ -320,7 +278,7 @@ def _map_text(
     file: Path,
     options: Csv,
     reasons: Sequence[str],
-    clocks: Sequence[Guess],
+    times: Sequence[ClockGuess],
     guesses: Sequence[Guess],
     unused: Sequence[Mapping[str, str]],
     signed: Mapping[str, int],
@@ -334,10 +292,12 @@ def _map_text(
     default = asdict(Csv())
     if changed := {key: _plain(value) for key, value in asdict(options).items() if value != default[key]}:
         lines.append(f"csv: {_flow(changed)}")
-    if clocks:
-        lines.append(f"time: {_flow({'column': clocks[0].column, 'unit': clocks[0].unit})}  # {_flat(clocks[0].why)}")
-        if _unix(table, clocks[0]):
-            lines.append("epoch_s: 0  # the time is Unix time already")
+    if times:
+        lines.append(f"time: {_flow(times[0].source())}  # {_flat(times[0].why)}")
+        if (epoch := times[0].epoch_s(table)) is not None:
+            lines.append(f"epoch_s: {epoch}  # the time is Unix time{' of the first row' if epoch else ' already'}")
+        if names := {short: name for clock in times if clock.rate_Hz is None for short, name in clock.names.items()}:
+            lines.append(f"names: {_flow(names)}")
     else:
         lines.append("# time: {rate_Hz: 100}  # no column rises like a time: give the samples per second")
     if signed:
@@ -345,8 +305,8 @@ def _map_text(
     lines.append("channels:" if guesses else "channels: {}  # none guessed: choose from the columns below")
     for guess in guesses:
         source: dict[str, Any] = {"column": guess.column, "unit": guess.unit}
-        if clocks and guess.time not in (None, clocks[0].column):
-            source["time"] = {"column": guess.time, "unit": next(c.unit for c in clocks if c.column == guess.time)}
+        if guess.time is not None and guess.time != times[0]:
+            source["time"] = guess.time.source()
         lines.append(f"  {guess.key}: {_flow(source)}  # {_flat(guess.why)}")
     if unused:
         lines.append("# Not used:")

@@ -13,6 +13,7 @@ from pathlib import Path
 from lugre_steering.counted import counted
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
+from lugre_steering.importing.stamps import is_stamp, order_of
 from lugre_steering.importing.text import number
 from lugre_steering.importing.words import unit_in
 
@@ -20,6 +21,12 @@ _BYTES = 1 << 20
 _LINES = 400
 _DELIMITERS = (",", ";", "\t", "|", WHITESPACE)
 _COMMENTS = "#%!"
+_NO_TEXT = (
+    (b"\x1f\x8b", "is packed (gzip), expected a table: unpack it"),
+    (b"PK\x03\x04", "is packed, or a spreadsheet, expected a table: unpack it, or save it as CSV"),
+    (b"\x93NUMPY", "is an array without names, expected a table: save it by names, as .npz"),
+)
+"""How files begin that hold a table, but no text."""
 _RUN = 5
 """The data begin at a row of numbers of which most of so many are, itself included."""
 
@@ -32,9 +39,8 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
         raise MapFileError(f"{file}: holds no text, expected a table")
     marks = Counter(line[0] for line in lines if line[:1] and line[0] in _COMMENTS)
     comment = max(marks, key=marks.__getitem__) if marks else "#"
-    delimiter, decimal = max(
-        ((d, c) for d in _DELIMITERS for c in (".", ",") if d != c), key=lambda way: _score(lines, comment, *way)
-    )
+    ways = [(delimiter, decimal) for decimal in (".", ",") for delimiter in _DELIMITERS]
+    delimiter, decimal = max(ways, key=lambda way: _score(lines, comment, *way))
     rows = [(i, cells) for i, cells in _split(lines, comment, delimiter) if any(cells)]
     begin = _begin(rows, decimal)
     if begin is None:
@@ -47,13 +53,17 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
     header = [cells for _, cells in rows[top:begin]]
     skip = rows[top][0] - 1 if any(line.strip() and line[0] != comment for line in lines[: rows[top][0] - 1]) else 0
     name_row = 1 + max(range(len(header)), key=lambda i: (not _is_units(header[i]), _count(header[i]), -i), default=0)
-    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), encoding=encoding)
-    return options, _reasons(options, header)
+    dates, why = order_of(cell for cells in data for cell in cells)
+    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), encoding=encoding, dates=dates)
+    return options, _reasons(options, header) + ([why] if why else [])
 
 
 def _decoded(file: Path) -> tuple[str, str]:
     with file.open("rb") as stream:
         raw = stream.read(_BYTES)
+    for begin, what in _NO_TEXT:
+        if raw.startswith(begin):
+            raise MapFileError(f"{file}: {what}")
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16", raw.decode("utf-16", errors="ignore")
     try:
@@ -78,7 +88,9 @@ def _score(lines: Sequence[str], comment: str, delimiter: str, decimal: str) -> 
     width = Counter(len(_filled(cells)) for cells in rows if _is_data(cells, decimal)).most_common(1)
     if not width or width[0][0] < 2:
         return -1
-    cells = [cell for row in rows if len(_filled(row)) == width[0][0] for cell in row if cell.strip()]
+    # Of rows of numbers only: names with blanks would speak for blanks as delimiter, and against tabs.
+    data = [row for row in rows if len(_filled(row)) == width[0][0] and _is_data(row, decimal)]
+    cells = [cell for row in data for cell in row if cell.strip()]
     return sum(1 if number(cell, decimal) is not None else -1 for cell in cells)
 
 
@@ -88,9 +100,20 @@ def _filled(cells: Sequence[str]) -> list[str]:
     return list(cells[:end])
 
 
+def _told(cells: Sequence[str]) -> list[str]:
+    """Without those that say nothing: a dash is a missing number, and as well no unit."""
+    return [cell for cell in cells if cell.strip(" -?")]
+
+
 def _is_data(cells: Sequence[str], decimal: str) -> bool:
-    filled = [cell for cell in cells if cell.strip()]
+    filled = [cell for cell in _told(cells) if not is_stamp(cell)]  # dates stand among remarks as well
     return bool(filled) and 2 * sum(number(cell, decimal) is not None for cell in filled) >= len(filled)
+
+
+def _all_numbers(cells: Sequence[str], decimal: str) -> bool:
+    """Whether a row holds several numbers and nothing else, as the rows of the faster of two rates."""
+    values = [number(cell, decimal) for cell in _told(cells)]
+    return len(values) > 1 and None not in values
 
 
 def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
@@ -98,7 +121,7 @@ def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
     for i in range(len(rows)):
         run = [cells for _, cells in rows[i : i + _RUN]]
         widest = max(len(_filled(cells)) for cells in run)
-        data = [_is_data(cells, decimal) and 2 * len(_filled(cells)) > widest for cells in run]
+        data = [_is_data(cells, decimal) and (2 * len(_filled(cells)) > widest or _all_numbers(cells, decimal)) for cells in run]
         if data[0] and 2 * sum(data) > len(run):
             return i
     return None
@@ -106,7 +129,7 @@ def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
 
 def _is_title(cells: Sequence[str], numbers: int, width: int, decimal: str) -> bool:
     """A row of words as wide as the data, whose ``numbers`` may end before their ``width``; remarks of a logger are narrower."""
-    filled = [cell for cell in cells if cell.strip()]
+    filled = _told(cells)
     wide = len(cells) >= numbers and 2 * len(filled) >= numbers and len(_filled(cells)) <= width
     return wide and all(number(cell, decimal) is None for cell in filled)
 

@@ -6,14 +6,17 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lugre_steering.errors import MapFileError
+from lugre_steering.importing.words import unit_in
 from lugre_steering.recording import Array
 
 MAX_NUMBERS = 100_000_000
@@ -39,6 +42,13 @@ class Table:
     unusable: Mapping[str, str] = field(default_factory=dict)
     titles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     left_out: Mapping[str, int] = field(default_factory=dict)
+
+    @cached_property
+    def row_of_units(self) -> int | None:
+        """Which of the titles is a unit for most of the columns that have any."""
+        known = Counter(place for titles in self.titles.values() for place, title in enumerate(titles) if unit_in(title, True))
+        place, count = known.most_common(1)[0] if known else (0, 0)
+        return place if 2 * count > len(self.titles) else None
 
     def column(self, name: str) -> Array:
         if name not in self.columns:
@@ -78,6 +88,7 @@ class Gathering:
         self.columns: dict[str, Array] = {}
         self.scalars: dict[str, float] = {}
         self.unusable: dict[str, str] = {}
+        self.titles: dict[str, tuple[str, ...]] = {}
         self._count, self._most = 0, most_numbers(file)
 
     def reserve(self, name: str, count: int) -> None:
@@ -97,6 +108,8 @@ class Gathering:
         if array.dtype.names:
             for key in array.dtype.names:
                 self.add(f"{name}.{key}" if name else key, array[key])
+        elif array.dtype.kind in "mM":
+            self._add_times(name, array)
         elif array.dtype.kind not in "iufb":
             self.refuse(name, "complex numbers" if array.dtype.kind == "c" else "no plain numbers")
         elif array.size == 1:
@@ -111,8 +124,14 @@ class Gathering:
         if len(self.columns) + len(self.unusable) > MAX_COLUMNS:
             raise MapFileError(f"{self.file}: holds more than {MAX_COLUMNS} columns")
 
+    def _add_times(self, name: str, array: Any) -> None:
+        """Dates and durations of NumPy, as ns."""
+        nanoseconds = array.astype(f"{array.dtype.kind}8[ns]")
+        self.add(name, np.where(np.isnat(nanoseconds), np.nan, nanoseconds.astype(np.int64).astype(np.float64)))
+        self.titles[name] = ("ns",)
+
     def table(self, titles: Mapping[str, tuple[str, ...]] | None = None) -> Table:
-        return Table(self.file, self.columns, self.scalars, self.unusable, titles or {})
+        return Table(self.file, self.columns, self.scalars, self.unusable, {**self.titles, **(titles or {})})
 
 
 def size_of(shape: tuple[int, ...]) -> int:

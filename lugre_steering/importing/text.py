@@ -9,7 +9,6 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
@@ -17,40 +16,35 @@ import numpy as np
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
+from lugre_steering.importing.stamps import stamp
 from lugre_steering.importing.table import MAX_COLUMNS, MAX_NUMBERS, Table
 
 Row = tuple[int, list[str]]
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE | re.ASCII)
 """A number as loggers write it; float() would take the underscores of Python too."""
-_DATE = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?\s*(Z|[-+]\d\d:?\d\d)?", re.ASCII)
-"""Date and time as ISO 8601 has them."""
+_GROUPED = re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})", re.ASCII)
+"""Thousands in groups, where nothing else can be meant: 1,234.5 and 1,234,567, but not 1,234."""
 _MISSING = ("", "nan", "-nan", "na", "n/a", "null", "none")
+_NO_VALUE = re.compile(r"-+|\?+|#n/a", re.IGNORECASE)
+"""What loggers and spreadsheets write where there is none."""
 _MAX_LINE = 1 << 20
 _BLOCK = 4096
 
 
-def number(text: str, decimal: str = ".") -> float | None:
-    """A cell as a number, NaN if it says that there is none, nothing if it is other text. A date is its Unix time [s]."""
+def number(text: str, decimal: str = ".", dates: str | None = None) -> float | None:
+    """A cell as a number, NaN if it says that there is none, nothing if it is other text. A date is its Unix time [s], a time
+    alone the seconds of its day; ``dates``: the order of day and month, where slashes are between them."""
     text = text.strip()
-    # With another decimal character a point groups thousands, or the map is wrong: no number either way.
-    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".")
+    # With another decimal character a point groups thousands, or the map is wrong.
+    plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".").replace("?", ",")
     if _NUMBER.fullmatch(plain):
         return float(plain)
-    if text.lower() in _MISSING:
+    if _GROUPED.fullmatch(plain):
+        return float(plain.replace(",", ""))
+    if text.lower() in _MISSING or _NO_VALUE.fullmatch(text):
         return float("nan")
-    date = _DATE.fullmatch(text)
-    return _unix_time(*date.groups()) if date else None
-
-
-def _unix_time(day: str, clock: str, fraction: str | None, zone: str | None) -> float | None:
-    """Seconds since 1970; UTC unless the date says otherwise; nothing if there is no such day."""
-    offset = "+00:00" if zone in (None, "Z") else f"{zone[:3]}:{zone[-2:]}"
-    try:
-        whole = datetime.fromisoformat(f"{day}T{clock}{offset}").timestamp()
-    except ValueError:
-        return None
-    return whole + float(f"0.{fraction or 0}")
+    return stamp(text, dates)
 
 
 def read_text(file: Path, options: Csv) -> Table:
@@ -173,7 +167,7 @@ class _Columns:
             self.left_out["repeated header rows"] += 1
             return None
         filled = (cell for cell in row if cell.strip())
-        if "text_rows" in self.options.allow and all(number(cell, self.options.decimal) is None for cell in filled):
+        if "text_rows" in self.options.allow and all(number(cell, self.options.decimal, self.options.dates) is None for cell in filled):
             self.left_out["rows without a number"] += 1
             return None
         if len(row) < width and "short_rows" in self.options.allow:
@@ -202,7 +196,9 @@ class _Columns:
                 pass
         found = []
         for (line, _), cell in zip(block, cells, strict=True):
-            value = number(cell, decimal)
+            value = number(cell, decimal, self.options.dates)
+            if _NO_VALUE.fullmatch(cell.strip()):
+                self.left_out["cells of '-', '?' or '#N/A' (count as missing)"] += 1
             if value is None:
                 if "text_cells" not in self.options.allow:
                     where = f"line {line}, column '{self.names[place]}'"

@@ -36,9 +36,9 @@ _UNSCALED = frozenset(
 WORDS: Mapping[str, frozenset[str]] = {
     kind: frozenset(text.split())
     for kind, text in {
-        "command": "goal target ref reference command commanded cmd desired des set setp setpoint soll demand dem nominal nom error "
-        "enable enabled flag status mode valid",
-        "time": "t time zeit timestamp stamp clock elapsed secs millis tstamp",
+        "command": "goal target ref reference command commanded cmd desired des set setp setpoint soll demand dem nominal nom",
+        "state": "error enable enabled flag status mode valid",
+        "time": "t time zeit timestamp stamp clock elapsed secs millis tstamp date datum uhrzeit",
         "rate": "rate speed velocity vel omega dq dtheta gyro geschwindigkeit drehzahl",
         "temperature": "temp temperature temperatur",
         "air": "air ambient outside luft aussen außen umgebung",
@@ -50,19 +50,47 @@ WORDS: Mapping[str, frozenset[str]] = {
         "right": "right r re rechts rh",
     }.items()
 }
+_QUANTITIES = frozenset(WORDS) - {"left", "right", "air", "command"}
+
+
+def parts_of(name: str) -> list[str]:
+    """The parts of a path (``log.p.main_a``, ``/steering/left/position``), outermost first, without what stands in brackets."""
+    plain = re.sub(r"[\[(].*?[\])]", " ", name)
+    return [part for part in re.split(r"[./]", plain) if part.strip()]
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a column's name, in lower case; of a path its last part."""
-    last = re.sub(r"[\[(].*?[\])]", " ", name.rsplit(".", 1)[-1])
-    spaced = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", last)
-    return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced)]
+    """The words of a column's name, in lower case: of a path those of the innermost part that tells of a quantity, else of the last."""
+    parts = [_words(part) for part in reversed(parts_of(name))]
+    quantities = (words for words in parts if any(_tell(words, kind) for kind in _QUANTITIES))
+    return next(quantities, parts[0] if parts else [])
+
+
+def _words(part: str) -> list[str]:
+    return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced(part))]
+
+
+def spaced(text: str) -> str:
+    """``PressMainA`` as ``Press Main A``."""
+    return re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", text)
 
 
 def tells(name: str, kind: str) -> bool:
-    """Whether a name holds a word of this kind; long words count as part of a compound too (Umgebungstemperatur)."""
-    known, words = WORDS[kind], words_of(name)
+    """Whether a name holds a word of this kind; side, air and command are told by any part of a path and in round brackets too."""
+    return _tell(words_of(name) if kind in _QUANTITIES else _words(re.sub(r"\[.*?\]", " ", name)), kind)
+
+
+def _tell(words: list[str], kind: str) -> bool:
+    """Long words count as part of a compound too (Umgebungstemperatur)."""
+    known = WORDS[kind]
     return any(word in known or any(len(part) > 4 and part in word for part in known) for word in words)
+
+
+def side_alone(name: str) -> str | None:
+    """The side that a name spells out and says nothing else."""
+    words = words_of(name)
+    spelt = len(words) == 1 and len(words[0]) > 3
+    return next((side for side in ("left", "right") if spelt and words[0] in WORDS[side]), None)
 
 
 def unit_in(text: str, whole: bool = False) -> str | None:
@@ -75,12 +103,22 @@ def unit_in(text: str, whole: bool = False) -> str | None:
 def stated_in(text: str, whole: bool = False) -> str | None:
     """What stands in place of a unit, known or not; at the end of a name only what nothing else can mean."""
     if whole:
-        return text.strip("[]() ") or None
+        return text.strip("[]() -?") or None
     square, rounded = _bracketed(text)
     found = [part for part in square if not part.isdigit() and not _is_side(part)]
-    found += [part for part in rounded if _known(part) or _spelt(part).lower() in _UNSCALED or re.search(r"[/%°^*·²]", part)]
-    found += [end for end in _ends(text) if end.lower() in _UNSCALED and (len(end) > 2 or end in ("%", "mA", "mV"))]
+    found += [part for part in rounded if _known(part) or _unscaled(part) or re.search(r"[/%°^*·²]", part)]
+    found += [end for end in _ends(text) if _unscaled(end)]
     return found[0] if found else None
+
+
+def remark_in(text: str) -> str | None:
+    """What stands in round brackets and is no side: a unit that is not known, or a remark."""
+    return next((part for part in _bracketed(text)[1] if not part.isdigit() and not _is_side(part)), None)
+
+
+def _unscaled(text: str) -> bool:
+    """Two letters as they are written, not any: the pressures A and ma are of lines."""
+    return text.lower() in _UNSCALED and (len(text) > 2 or text in ("%", "mA", "mV"))
 
 
 def _bracketed(text: str) -> tuple[list[str], list[str]]:

@@ -1,0 +1,206 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The clocks of an unknown table, guessed from names and numbers, each with its reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from lugre_steering.importing.evaluate import Columns, times
+from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Clock, ImportMap
+from lugre_steering.importing.stated import stated, unfit
+from lugre_steering.importing.table import Table
+from lugre_steering.importing.words import WORDS, tells, words_of
+from lugre_steering.recording import Array
+
+FEW = 5
+"""Fewer numbers tell nothing."""
+_UNIX = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+"""Above so much a time counts from 1970, in this unit."""
+_RATES_HZ = (0.1, 5e4)
+"""What recordings of machines are sampled at."""
+_DAY_S, _SHEET_DAYS, _SHEET_1970 = 86400.0, (25e3, 75e3), 25569
+"""Spreadsheets count days from the end of 1899: those of our lives, and the first of 1970."""
+_SECONDS, _NANOSECONDS = ("sec", "secs", "s", "seconds"), re.compile(r"(ns|nsecs?|nanosecs?|nanoseconds)$")
+
+
+@dataclass(frozen=True)
+class ClockGuess:
+    """Sampling instants, and why: a ``column``, an ``expression`` of several under short ``names``, or rows at ``rate_Hz``."""
+
+    column: str
+    unit: str
+    why: str
+    expression: str | None = None
+    names: Mapping[str, str] = field(default_factory=dict)
+    rate_Hz: float | None = None
+    key: str = "time"
+
+    def source(self) -> dict[str, Any]:
+        """As a map has it."""
+        if self.rate_Hz is not None:
+            return {"rate_Hz": self.rate_Hz}
+        way = {"column": self.column} if self.expression is None else {"expression": self.expression}
+        return {**way, "unit": self.unit}
+
+    def columns(self) -> set[str]:
+        return {self.column, *self.names.values()}
+
+    def seconds(self, table: Table) -> Array:
+        """What the columns say (n,) [s], whether they are too coarse or not."""
+        column = self.column if self.expression is None else None
+        mapping = ImportMap(SCHEMA, {}, names=dict(self.names))
+        return times(Columns(table, mapping), Clock(column, self.unit, self.expression), 0)
+
+    def epoch_s(self, table: Table) -> int | None:
+        """Unix time of time zero, where the columns tell Unix time."""
+        seconds = self.seconds(table)
+        if not float(np.nanmedian(seconds)) > _UNIX[-1][0]:
+            return None
+        return 0 if self.rate_Hz is None else int(np.nanmin(seconds))
+
+    def doubt(self, table: Table) -> str | None:
+        """What cannot be true of these instants."""
+        if self.rate_Hz is not None:
+            return None
+        seconds = self.seconds(table)
+        steps = np.diff(seconds[np.isfinite(seconds)])
+        if 10 * int(np.sum(steps == 0.0)) > steps.size:
+            return f"{table.file}: time '{self.column}': many stamps repeat the one before, expected one per row, or time: {{rate_Hz: ...}}"
+        if steps.size and float(steps.sum()) <= 0.0:
+            back = f"ends {-float(steps.sum()):.3g} s before it begins, expected it to rise (over midnight?)"
+            return f"{table.file}: time '{self.column}': {back}"
+        rate = 1.0 / _step(seconds)
+        if _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
+            return None
+        expected = f"expected {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g}: is it a time, and the unit right?"
+        return f"{table.file}: time '{self.column}' in {self.unit}: makes {rate:.3g} samples per second, {expected}"
+
+
+def clocks(table: Table) -> list[ClockGuess]:
+    """Two columns that are a time together, and time columns by their name; else the first column that only rises."""
+    joined = _joined(table)
+    taken = {column for clock in joined for column in clock.columns()}
+    fit = [name for name in table.columns if name not in taken and unfit(table, name, ("time",)) is None]
+    named = [name for name in fit if is_named(name) and _advances(name, table.columns[name])]
+    if joined or named:
+        return joined + [_clock(table, name, "named so") for name in named]
+    rising = [name for name in fit if _rises(table.columns[name]) and not counts(table.columns[name])]
+    return [_clock(table, name, "the first column that only rises") for name in rising[:1]]
+
+
+def is_named(name: str) -> bool:
+    """Whether a column is called a time."""
+    return tells(name, "time") and not any(tells(name, kind) for kind in ("command", "state", "temperature", "air"))
+
+
+def counts(values: Array) -> bool:
+    """Whether a column numbers the rows."""
+    return values.size > 1 and bool(np.all(np.diff(values) == 1.0))
+
+
+def _rises(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    return known.size >= FEW and float(np.mean(np.diff(known) > 0.0)) > 0.9
+
+
+def _advances(name: str, values: Array) -> bool:
+    """Rises, or is called more than t and stands still between its steps."""
+    known = values[np.isfinite(values)]
+    if _rises(values) or known.size < FEW:
+        return known.size >= FEW
+    plain = words_of(name) == ["t"] or any(word in WORDS["time"] and word != "t" for word in words_of(name))
+    return plain and bool(known[-1] > known[0]) and float(np.mean(np.diff(known) >= 0.0)) > 0.9 and np.unique(known).size >= FEW
+
+
+def _step(values: Array) -> float:
+    steps = np.diff(values[np.isfinite(values)])
+    return float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else float("nan")
+
+
+def _clock(table: Table, name: str, how: str) -> ClockGuess:
+    values = table.columns[name][np.isfinite(table.columns[name])]
+    step, middle = _step(values), float(np.median(values))
+    unit = stated(table, name, ("time",))
+    unix = next((unit for least, unit in _UNIX if middle > least), None)
+    if unit is not None:
+        guess = ClockGuess(name, unit, f"{how}; unit as stated")
+    elif unix is not None:
+        guess = ClockGuess(name, unix, f"{how}; as Unix time it lies in our days")
+    elif 1.0 / step > _RATES_HZ[1] and _SHEET_DAYS[0] < middle < _SHEET_DAYS[1]:
+        why = f"{how}; days since 1900, as spreadsheets count them: {_rate(step, 'd')}"
+        guess = ClockGuess(name, "s", why, f"{_DAY_S:g} * (day - {_SHEET_1970})", {"day": name})
+    elif 1.0 / step > _RATES_HZ[1] and values.min() >= 0.0 and values.max() <= 1.0:
+        guess = ClockGuess(name, "d", f"{how}; parts of a day, as spreadsheets keep times: {_rate(step, 'd')}")
+    else:
+        unit = "s" if step < 0.5 else "ms" if step < 500.0 else "us" if step < 1e5 else "ns"
+        guess = ClockGuess(name, unit, f"{how}; steps of {step:.3g}: {_rate(step, unit)}")
+    return _noted(table, guess)
+
+
+def _rate(step: float, unit: str) -> str:
+    return f"{1.0 / (step * READABLE_UNITS[unit][1]):.4g} samples per second"
+
+
+def _noted(table: Table, guess: ClockGuess) -> ClockGuess:
+    """What is odd about the stamps, and a rate in place of those that many rows share."""
+    seconds = guess.seconds(table)
+    steps = np.diff(seconds[np.isfinite(seconds)])
+    repeated, back = int(np.sum(steps == 0.0)), steps[steps < 0.0]
+    why = guess.why + (f"; goes back {back.size} times, by up to {-back.min():.3g} s" if back.size else "")
+    if 10 * repeated <= steps.size:
+        return replace(guess, why=why)
+    rate = _rate_of(seconds[np.isfinite(seconds)])
+    evenly = f": GUESSED {rate:g} rows per second, evenly apart" if rate else ""
+    why += f"; {repeated} of {steps.size + 1} stamps repeat the one before{evenly}"
+    return replace(guess, why=why, rate_Hz=rate)
+
+
+def _rate_of(seconds: Array) -> float | None:
+    """Rows per second, where about as many share each stamp."""
+    first = np.flatnonzero(np.diff(seconds) != 0.0) + 1
+    rows = np.diff(first)
+    if rows.size < 2 or float(np.mean(np.abs(rows - np.median(rows)) <= 1.0 + 0.1 * np.median(rows))) < 0.9:
+        return None
+    return float(f"{float(np.sum(rows)) / float(seconds[first[-1]] - seconds[first[0]]):.4g}")
+
+
+def _joined(table: Table) -> list[ClockGuess]:
+    """Whole seconds beside nanoseconds ('stamp.sec', 'stamp.nanosec'), and days beside times of the day."""
+    found: list[ClockGuess] = []
+    for other, nanoseconds in table.columns.items():
+        ending = _NANOSECONDS.search(other)
+        wanted = [other[: ending.start()] + word for word in _SECONDS] if ending else []
+        for name in (name for name in wanted if name in table.columns):
+            if table.columns[name].size == nanoseconds.size and _all_within(nanoseconds, 1e9) and _whole(table.columns[name], 1.0):
+                turn = f"_{len(found) + 1}" if found else ""
+                names = {f"sec{turn}": name, f"nsec{turn}": other}
+                why = "seconds and nanoseconds of one clock"
+                found.append(_noted(table, ClockGuess(name, "s", why, f"sec{turn} + 1e-9 * nsec{turn}", names)))
+    return found or _day_and_time(table)
+
+
+def _day_and_time(table: Table) -> list[ClockGuess]:
+    named = {name: values for name, values in table.columns.items() if is_named(name) and _all_within(values, np.inf)}
+    days = [name for name, values in named.items() if _whole(values, _DAY_S) and values.min() > _UNIX[-1][0]]
+    for day in days[:1]:
+        same = [name for name, values in named.items() if values.size == named[day].size and _all_within(values, _DAY_S)]
+        for name in same[:1]:
+            why = "days, and beside them the time of the day"
+            return [_noted(table, ClockGuess(name, "s", why, "day + clock", {"day": day, "clock": name}))]
+    return []
+
+
+def _all_within(values: Array, end: float) -> bool:
+    known = values[np.isfinite(values)]
+    return known.size >= FEW and bool(np.all((known >= 0.0) & (known < end)))
+
+
+def _whole(values: Array, step: float) -> bool:
+    known = values[np.isfinite(values)]
+    return known.size >= FEW and bool(np.all(known % step == 0.0))
