@@ -8,7 +8,6 @@ import dataclasses
 import hashlib
 import importlib.util
 import math
-import re
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -23,6 +22,7 @@ from lugre_steering import yaml_text
 from lugre_steering.chain.compiled import exp, law, tanh
 from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
+from lugre_steering.effects.declared import A_NAME, check_typed, is_name
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
 from lugre_steering.errors import EffectError, reason
@@ -32,7 +32,6 @@ from lugre_steering.schema import Reader
 
 PAIRED = ("wind_up", "contact")
 """Hooks whose laws return more than one number: a line of YAML cannot."""
-NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @law
@@ -122,7 +121,7 @@ def _run(file: Path, content: str, sha256: str) -> ModuleType:
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     try:
         exec(compile(content, str(file), "exec", dont_inherit=True), vars(module))
-    except Exception as error:  # whatever a user's own Python raises
+    except (Exception, SystemExit) as error:  # whatever a user's own Python raises
         del sys.modules[spec.name]
         raise EffectError(f"{file}: cannot be run: {type(error).__name__}: {error}") from error
     return module
@@ -140,6 +139,8 @@ def of_objects(found: object, name: str) -> list[Effect]:
     if not items or len(effects) < len(items):
         kinds = ", ".join(type(item).__name__ for item in items)
         raise EffectError(f"{name}: got {kinds or 'nothing'}, expected EFFECT = Effect(...), or EFFECTS, a list of them")
+    for effect in effects:
+        check_typed(effect, name)
     return [
         dataclasses.replace(item, hooks={hook: one if hasattr(one, "py_func") else law(one) for hook, one in item.hooks.items()})
         for item in effects
@@ -163,8 +164,8 @@ def _of_yaml(file: Path) -> list[Effect]:
 
 def _of_law(reader: Reader, kept: _Kept, prefix: str) -> Effect:
     before = f"{prefix}." if prefix else ""
-    if not NAME.fullmatch(kept.id):
-        raise reader.fail(f"{before}id", kept.id, "a name of small letters, digits and _, a letter first")
+    if not is_name(kept.id):
+        raise reader.fail(f"{before}id", kept.id, A_NAME)
     check_law(kept.law, reader, f"{before}law")
     return named(kept.id, kept.title, kept.source, kept.law)
 
@@ -202,8 +203,10 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
 
     for what, names in (("id", [sheet.id]), ("parameters", sheet.parameters), ("memory", sheet.memory)):
         for name in names:
-            if not NAME.fullmatch(name):
-                raise reader.fail(key(what), name, "a name of small letters, digits and _, a letter first")
+            if not is_name(name):
+                raise reader.fail(key(what), name, A_NAME)
+            if name in _FUNCTIONS:
+                raise reader.fail(key(what), name, f"a name that is none of the functions {', '.join(_FUNCTIONS)}")
     if sheet.stage not in STAGES:
         raise reader.fail(key("stage"), sheet.stage, f"one of {', '.join(STAGES)}")
     if not sheet.laws:

@@ -117,7 +117,10 @@ def add_files(files: str | Path | Sequence[str | Path]) -> None:
 
 
 def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
+    ids = [new.id for new in effects]
     for new in effects:
+        if ids.count(new.id) > 1:
+            raise EffectError(f"{where}: effect '{new.id}': there are {ids.count(new.id)} of this id; expected one")
         if ORIGINS.get(new.id) == origin:
             continue
         if new.id in CATALOGUE:
@@ -125,7 +128,7 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
             raise EffectError(f"{where}: effect '{new.id}': there is one of this name in {known}; expected another id")
         foreign = dataclasses.replace(new, sha256=origin.sha256)
         try:
-            check_declared(foreign, {*CATALOGUE, *(other.id for other in effects)})
+            check_declared(foreign, {*CATALOGUE, *ids})
             check(foreign)
             _try(foreign)
         except EffectError as error:
@@ -184,7 +187,7 @@ def _add_installed() -> None:
         where = f"package '{entry.dist.name}'" if entry.dist is not None else f"entry point '{entry.name}'"
         try:
             found = entry.load()
-        except Exception as error:  # whatever a foreign package raises
+        except (Exception, SystemExit) as error:  # whatever a foreign package raises
             raise EffectError(f"{where}: entry point '{entry.name}' cannot be loaded: {type(error).__name__}: {error}") from error
         effects = own.of_objects(found, f"{where}: entry point '{entry.name}'")
         _add(effects, Origin(where, _content(entry.module)), where)

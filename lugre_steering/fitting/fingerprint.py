@@ -9,14 +9,15 @@ the rest is masked. The residual is compared with that part only.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 
-from lugre_steering.effects.entry import Effect, Seen
+from lugre_steering.effects.entry import Effect, Seen, Variant
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS, sought
+from lugre_steering.errors import EffectError
 from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads, is_rig, resized
@@ -85,7 +86,7 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
         effect = resized(effect, problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
-            for shapes in effect.variants(_seen(problem)):
+            for shapes in _suggested(effect, effect.variants, _seen(problem)):
                 ends = {name for pair in effect.places for name in pair}
                 unset = tuple(name for name in free if name not in shapes and name not in ends)
                 found.append(Candidate(effect, tuple(shapes.items()), free=unset))
@@ -99,6 +100,18 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
                 if p.is_shape
             ]
             found += [Candidate(effect, shapes, free=free) for shapes in itertools.product(*grids)]
+    return found
+
+
+def _suggested(effect: Effect, variants: Callable[[Seen], Sequence[Variant]], seen: Seen) -> list[Variant]:
+    """The shapes that an effect chooses for itself, checked: users write such functions too."""
+    try:
+        found: list[Variant] = [dict(shapes) for shapes in variants(seen)]
+    except Exception as error:  # whatever a user's own Python raises
+        raise EffectError(f"effect '{effect.id}': variants: {type(error).__name__}: {error}; expected values by parameter") from error
+    own = {p.name for p in effect.parameters}
+    if foreign := sorted({str(name) for shapes in found for name in shapes if name not in own}):
+        raise EffectError(f"effect '{effect.id}': variants: got {', '.join(foreign)}, expected parameters of it ({', '.join(sorted(own))})")
     return found
 
 
