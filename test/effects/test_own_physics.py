@@ -234,8 +234,8 @@ def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, 
 def test_variants_that_fail_are_an_error_of_their_effect(tmp_path: Path, variants: str, words: str) -> None:
     file = tmp_path / "mine.py"
     file.write_text(OWN_PYTHON.replace("tier=2", f"tier=2, variants={variants}"))
-    told = run_here("effects", "own_spring", "--effects", file)
-    assert told.exit_code == 2
+    told = run("effects", "own_spring", "--effects", file)
+    assert told.returncode == 2
     assert f"effect 'own_spring': variants: {words}" in " ".join(told.stderr.split())
 
 
