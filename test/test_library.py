@@ -241,6 +241,9 @@ TIME = np.arange(5) * 0.1
         ({"torque": (TIME,)}, "measured_torque: got 1 arrays"),
         ({"pressure": {"a": (TIME * 0.0, TIME)}}, "time of pressure/a: got 5 times"),
         ({"air": np.full(5, 293.0)}, "air_temperature: got 293, expected values in degC"),
+        ({"angle": np.full(5, 0.1j)}, "angle/left: got complex128, expected real numbers"),
+        ({"pressure": np.zeros(5)}, "pressure: got ndarray, expected a mapping"),
+        ({"rate": np.full(5, np.timedelta64(1))}, "rate/left: got timedelta64, expected real numbers"),
     ],
 )
 def test_arrays_that_cannot_be_meant_are_refused(changes: dict, said: str) -> None:
@@ -248,10 +251,66 @@ def test_arrays_that_cannot_be_meant_are_refused(changes: dict, said: str) -> No
         ls.Recording.from_arrays(**{"time": TIME, "angle": np.zeros(5)} | changes)
 
 
+def test_dates_are_seconds() -> None:
+    dates = np.datetime64("2024-01-01") + np.arange(5) * np.timedelta64(100, "ms")
+    made = ls.Recording.from_arrays(dates, angle=np.zeros(5), torque=(dates - dates[0], np.ones(5)))
+    assert made.measured_torque is not None
+    assert made.start_ns == 1  # the torque's durations begin at zero
+    assert made.angle["left"].time_s[0] == dates[0].astype("datetime64[s]").astype(int)
+    np.testing.assert_allclose(made.measured_torque.time_s, TIME)
+
+
 def test_samples_that_are_no_number_are_left_out_and_counted() -> None:
     made = ls.Recording.from_arrays(TIME, angle=np.array([0.0, np.nan, 0.1, np.inf, 0.2]), torque=np.ones(5))
     assert made.rejected == {"angle/left": {"not_finite": 2}}
     np.testing.assert_allclose(made.angle["left"].time_s, [0.0, 0.2, 0.4])
+
+
+UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: ls.replay([], VEHICLE), "no recording is given"),
+        (lambda: ls.calibrate([], VEHICLE), "no recording is given"),
+        (lambda: ls.diagnose([], VEHICLE), "no recording is given"),
+        (lambda: ls.replay(5, VEHICLE), "recordings: got 5, expected paths of bags, or recordings"),
+        (lambda: ls.replay(UPWARD, VEHICLE), "holds no input of the vehicle, expected angle 'left', angle 'right'"),
+        (lambda: ls.diagnose(STOP, VEHICLE, material=np.nan), "material: got nan, expected a number from 0 to 1"),
+        (lambda: ls.diagnose(STOP, VEHICLE, seed=-1), "seed: got -1, expected a whole number from 0"),
+        (lambda: ls.load_vehicle(None), "vehicle: got None, expected a vehicle or the path of its file"),
+        (lambda: ls.save_vehicle(ls.load_vehicle(VEHICLE), "/nowhere/x.yaml"), "/nowhere/x.yaml: cannot be written: No such file"),
+        (lambda: ls.simulate("paper-rate"), "'paper-rate': is an experiment, which the command runs; expected a file or one of"),
+        (lambda: ls.simulate(ls.load_vehicle(VEHICLE)), "what: got Vehicle, expected the name"),
+        (lambda: ls.simulate("double-cycle", seeds=1), "seeds: got 1, expected no such option; did you mean 'seed'?"),
+        (lambda: ls.simulate("double-cycle", seed=1.5), "seed: got 1.5, expected a whole number from 0"),
+        (lambda: ls.simulate("double-cycle", angle_rate_Hz="x"), "angle_rate_Hz: got 'x', expected a number from 1 to 1000"),
+        (lambda: ls.simulate("double-cycle", effects=[5]), "effects: got 5, expected texts"),
+        (lambda: ls.Options(max_gap_s="x"), "max_gap_s: got 'x', expected a number from 0.001 to 60"),
+    ],
+)
+def test_what_a_program_gives_wrongly_is_an_error_of_ours(call, said: str) -> None:
+    with pytest.raises(ls.LugreSteeringError, match=re.escape(said)):
+        call()
+
+
+def test_a_message_that_is_none_is_refused() -> None:
+    estimator = ls.Estimator(VEHICLE)
+    for message, said in (
+        (("angle/left", 1, 0.0), "channel: got angle/left, expected 0 to"),
+        ((0, 10**30, 0.0), "expected a whole number of at most 64 bits"),
+        ((0, 1.5, 0.0), "stamp_ns: got 1.5"),
+        ((0, 1, "fast"), "value, rate: got 'fast', nan, expected numbers"),
+    ):
+        with pytest.raises(ls.DataError, match=re.escape(said)):
+            estimator.push(*message)
+
+
+def test_results_are_compared_by_what_they_say(replay: ls.Replay) -> None:
+    again = ls.replay(STOP, VEHICLE)
+    assert replace(again, provenance=replay.provenance) == replay
+    assert replace(replay, vehicle="another") != replay
 
 
 @pytest.mark.parametrize("call", [ls.replay, ls.calibrate, ls.diagnose])

@@ -47,7 +47,7 @@ def facts(summary: Mapping[str, Any]) -> Facts:
     }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Series:
     """The estimates of one bag, n of them, and its m residuals; times [s] since the first stamp.
 
@@ -95,7 +95,7 @@ class ReplayedBag:
     picture_note: str | None = None
     page: str | None = field(default=None, metadata=ADDED)
     """File of the page beside the record."""
-    series: Series | None = field(default=None, repr=False, metadata=IN_MEMORY)
+    series: Series | None = field(default=None, repr=False, compare=False, metadata=IN_MEMORY)
 
     def kept(self) -> Series:
         """The series, or an error where the results went into a bag."""

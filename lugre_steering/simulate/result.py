@@ -39,7 +39,7 @@ class Simulation(Result):
     rubber_at_end_degC: tuple[float, ...]
     effects: Mapping[str, Mapping[str, float]]
     name: str = field(repr=False, metadata=IN_MEMORY)
-    run: Simulated = field(repr=False, metadata=IN_MEMORY)
+    run: Simulated = field(repr=False, compare=False, metadata=IN_MEMORY)
 
     @classmethod
     def of(cls, name: str, run: Simulated) -> Simulation:
