@@ -31,6 +31,7 @@ from lugre_steering.schemas import FILES, schema_of
 
 ROOT = Path(__file__).resolve().parents[1]
 VEHICLE = ROOT / "config" / "test_vehicle.yaml"
+LINEAR_AXIS = ROOT / "config" / "linear_axis_example.yaml"
 STOP = ROOT / "bags" / "synthetic_hidden_stop_a"
 DOUBLE_CYCLE = ROOT / "bags" / "synthetic_double_cycle"
 PAGE = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
@@ -441,6 +442,29 @@ def test_the_contract_s_own_schema_accepts_what_ours_does(diagnosis: ls.Diagnosi
 def test_real_results_keep_to_their_schemas(diagnosis: ls.Diagnosis, calibration: ls.Calibration, replay: ls.Replay) -> None:
     for result in (diagnosis, calibration, replay, ls.diagnose(short(), VEHICLE)):
         assert refusals(schema_of(type(result)), json.loads(result.to_json())) == []
+
+
+@pytest.fixture(scope="module")
+def axis() -> ls.Simulation:
+    return ls.simulate("double-cycle", LINEAR_AXIS, angle_rate_Hz=20.0, pressure_rate_Hz=20.0)
+
+
+def test_a_simulation_keeps_to_its_schema(axis: ls.Simulation) -> None:
+    for result in (axis, ls.simulate("double-cycle", VEHICLE, angle_rate_Hz=20.0)):
+        assert result.json["schema"] == "lugre_steering/simulation/1"
+        assert refusals(schema_of(ls.Simulation), json.loads(result.to_json())) == []
+
+
+def test_a_linear_axis_is_told_in_its_own_units(axis: ls.Simulation) -> None:
+    assert (axis.largest_angle_deg, axis.coordinate_unit, axis.torque_unit) == (None, "m", "N")
+    assert axis.largest_coordinate == pytest.approx(np.abs(axis.run.truth.motion.theta).max())
+    replay = ls.replay(axis.recording, LINEAR_AXIS)
+    if importlib.util.find_spec("matplotlib") is not None:
+        names = {each.get_ylabel() + each.get_title() for figure in (axis.plot(), replay.plot()) for each in figure.axes}
+        assert not [name for name in names if "rad" in name or "N m" in name or "torque" in name]
+    if importlib.util.find_spec("pandas") is not None:
+        assert list(axis.to_frame()) == ["time_s", "position_left_m", "force_N", "rubber_left_degC"]
+        assert list(replay.to_frame()) == ["time_s", "position_left_m", "force_N", "measured_N", "residual_N", "bag"]
 
 
 def short() -> ls.Recording:

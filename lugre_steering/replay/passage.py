@@ -162,6 +162,8 @@ class Passage:
             residual_time_s=(residuals["stamp_ns"] - start_ns) * 1e-9,
             measured=residuals["measured_torque"],
             residual=residuals["residual"],
+            angle_unit=self.vehicle.coordinate.unit,
+            torque_unit=self.vehicle.coordinate.force_unit,
         )
 
     def _wanted(self, bag: Bag) -> Sequence[Channel]:

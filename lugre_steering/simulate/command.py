@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -180,7 +179,7 @@ def show_run(console: Console, result: Mapping[str, Any], vehicle: Vehicle) -> N
     angle = words.coordinate_axis(vehicle, "steering angle")
     table.add_row("duration", words.quantity(result["duration_s"], "s"))
     table.add_row(f"largest {units.words(vehicle, 'torque')}", words.torque(vehicle, result["largest_torque_Nm"]))
-    table.add_row(f"largest {angle.name}", words.quantity(math.radians(result["largest_angle_deg"]) * angle.scale, angle.unit))
+    table.add_row(f"largest {angle.name}", words.quantity(result["largest_coordinate"] * angle.scale, angle.unit))
     if result["largest_pressure_Pa"] is not None:
         table.add_row("largest pressure", words.quantity(1e-5 * result["largest_pressure_Pa"], "bar"))
     if vehicle.rubber is not None:
