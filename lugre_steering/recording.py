@@ -21,11 +21,13 @@ import itertools
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lugre_steering.errors import DataError
+from lugre_steering.result import html
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -122,6 +124,25 @@ class Recording:
     measured_torque: Signal | None = None
     rejected: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        channels = "; ".join(f"{row['channel']}: {row['samples']} samples to {row['until (s)']:.6g} s" for row in self._rows())
+        return f"Recording({self.name!r}; {channels})"
+
+    def _repr_html_(self) -> str:
+        return html("Recording", self.name, self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        """Its signals in a few lines."""
+        signals: dict[str, Signal | None] = {f"angle/{side}": signal for side, signal in self.angle.items()}
+        signals |= {f"rate/{side}": signal for side, signal in self.rate.items()}
+        signals |= {f"pressure/{line}": signal for line, signal in self.pressure.items()}
+        signals |= {"air_temperature": self.air_temperature, "measured_torque": self.measured_torque}
+        return [
+            {"channel": channel, "samples": signal.time_s.size, "until (s)": float(signal.time_s[-1])}
+            for channel, signal in signals.items()
+            if signal is not None and signal.time_s.size
+        ]
 
     @classmethod
     def from_arrays(

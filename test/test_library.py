@@ -87,6 +87,18 @@ def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
 def test_rooms_show_what_they_are_called_with() -> None:
     assert list(inspect.signature(ls.replay).parameters) == ["data", "vehicle", "options"]
     assert list(inspect.signature(ls.simulate).parameters)[:3] == ["what", "vehicle", "effects"]
+    assert "kept in memory" in str(inspect.getdoc(ls.replay))
+    assert "a built-in manoeuvre" in str(inspect.getdoc(ls.simulate))
+
+
+def test_vehicles_and_recordings_are_shown_in_a_few_words() -> None:
+    vehicle = ls.load_vehicle(VEHICLE)
+    assert repr(vehicle).startswith(f"Vehicle(name: {vehicle.name}; sides: left, right; inputs: ")
+    assert len(repr(vehicle)) < 500
+    assert f"<p>{vehicle.name}</p>" in vehicle._repr_html_()
+    recording = ls.Recording.from_arrays(TIME, angle=np.zeros(5), air=([0.0, 0.2], [20.0, 21.0]))
+    assert repr(recording) == "Recording('recording'; angle/left: 5 samples to 0.4 s; air_temperature: 2 samples to 0.2 s)"
+    assert "<td>air_temperature</td>" in recording._repr_html_()
 
 
 def test_one_file_or_effect_needs_no_list() -> None:
