@@ -15,7 +15,7 @@ import yaml
 
 from lugre_steering.errors import LugreSteeringError, MapFileError
 from lugre_steering.importing.channels import read_channels
-from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Csv, load_map
+from lugre_steering.importing.map import DIMENSIONS, READABLE_UNITS, SCHEMA, Csv, load_map
 from lugre_steering.importing.plausible import DEGREES, check_units
 from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
@@ -217,15 +217,9 @@ def _stated(table: Table, name: str, dimensions: tuple[str, ...] | None) -> str 
     return None
 
 
-_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
-    "angle": ("angle", "length"), "rate": ("angular speed", "speed"), "pressure": ("pressure",),
-    "measured_torque": ("torque", "force"), "air_temperature": ("temperature",),
-}  # fmt: skip
-
-
 def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tuple[str, str]:
     kind, _, side = key.partition("/")
-    stated = _stated(table, name, _DIMENSIONS[kind])
+    stated = _stated(table, name, DIMENSIONS[kind])
     if stated is not None:
         return stated, "unit as stated"
     values = table.columns[name][np.isfinite(table.columns[name])]

@@ -24,14 +24,14 @@ from lugre_steering.proof.bagfile import Topic, write_bag
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, Concealed, Motion
 from lugre_steering.proof.contact import HiddenContact, Patches, Track, patches, run_track
 from lugre_steering.proof.generator import Law, Modulation, Scene, draw_law, modulate
-from lugre_steering.proof.made import Hidden, Probe, active_intervals, left_over, removable_of, unit
+from lugre_steering.proof.made import Hidden, Probe, active_intervals, removable_of, unit
 from lugre_steering.proof.rubber import rubber_table
 from lugre_steering.proof.sensors import PERIOD_S, Habits, NoiseKind, Samples, draw_habits, sense_angle, sense_pressures
 from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle, draw_vehicle, load_sheet
 
 __all__ = [
     "EFFECT_IDS", "UNLISTED_IDS", "BagData", "Case", "CaseData", "Concealed", "load_sheet", "noise_variance",
-    "recalibrated_variance", "removable_variance", "simulate_case", "tangents", "write_case",
+    "removable_variance", "simulate_case", "tangents", "write_case",
 ]
 
 Array = NDArray[np.float64]
@@ -308,14 +308,6 @@ _CALIBRATED = (
     "static_torque_Nm", "coulomb_torque_Nm", "stiffness_Nm_rad", "stribeck_speed_rad_s", "heat_capacity_J_K",
     "heat_loss_W_K",
 )
-
-
-def recalibrated_variance(data: CaseData) -> float:
-    """``removable_variance`` of both bags together, less what moving the baseline's parameters can imitate [N2 m2].
-
-    Linear: the added torque is projected off the tangents of this simulator's own baseline (finite differences of 1 %).
-    """
-    return left_over(np.concatenate([bag.torque - bag.torque_without for bag in data.bags]), tangents(data))
 
 
 def tangents(data: CaseData) -> Array:
