@@ -123,7 +123,8 @@ class ReplayedBag:
 class Replay(Result):
     """Torques that the estimator gives for recordings; ``overall``: agreement with the measured torque over all of them.
 
-    ``torque_unit``: N m, or the force unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was
+    ``vehicle``: the file as it was named, or of a vehicle that was in memory its name; ``torque_unit``: N m, or the force
+    unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was
     named and gave no torque, with the reason.
     """
 
