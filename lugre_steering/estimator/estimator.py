@@ -157,10 +157,10 @@ class Estimator:
         if not isinstance(stamp_ns, WHOLE) or abs(stamp_ns) > LAST_NS:
             raise DataError(f"stamp_ns: got {stamp_ns!r}, expected a whole number of at most 64 bits")
         try:
-            numbers = float(value), float(rate)
+            value, rate = float(value), float(rate)
         except (TypeError, ValueError):
             raise DataError(f"value, rate: got {value!r}, {rate!r}, expected numbers") from None
-        e, r = _process_one(self._held, self._first_line, channel, stamp_ns, *numbers)
+        e, r = _process_one(self._held, self._first_line, channel, stamp_ns, value, rate)
         return self._estimates[:e], self._residuals[:r]
 
     def push_block(self, channel: IntArray, stamp_ns: IntArray, value: Array, rate: Array) -> tuple[Records, Records]:
