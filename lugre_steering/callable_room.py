@@ -25,6 +25,11 @@ class _Room(ModuleType):
         return function
 
     @property
+    def __doc__(self) -> str | None:  # type: ignore[override]
+        # No text of its own: it would stand in the place of this one.
+        return self._function.__doc__
+
+    @property
     def __signature__(self) -> inspect.Signature:
         """As help and editors show it."""
         return inspect.signature(self._function)

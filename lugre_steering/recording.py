@@ -21,11 +21,13 @@ import itertools
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lugre_steering.errors import DataError
+from lugre_steering.result import html
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -71,7 +73,7 @@ class Channel:
     ackermann: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Signal:
     """One channel: ``time_s`` (n,) strictly increasing seconds from the recording's first stamp, ``value`` (n,).
 
@@ -123,6 +125,25 @@ class Recording:
     rejected: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
+    def __repr__(self) -> str:
+        channels = "; ".join(f"{row['channel']}: {row['samples']} samples to {row['until (s)']:.6g} s" for row in self._rows())
+        return f"Recording({self.name!r}; {channels})"
+
+    def _repr_html_(self) -> str:
+        return html("Recording", self.name, self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        """Its signals in a few lines."""
+        signals: dict[str, Signal | None] = {f"angle/{side}": signal for side, signal in self.angle.items()}
+        signals |= {f"rate/{side}": signal for side, signal in self.rate.items()}
+        signals |= {f"pressure/{line}": signal for line, signal in self.pressure.items()}
+        signals |= {"air_temperature": self.air_temperature, "measured_torque": self.measured_torque}
+        return [
+            {"channel": channel, "samples": signal.time_s.size, "until (s)": float(signal.time_s[-1])}
+            for channel, signal in signals.items()
+            if signal is not None and signal.time_s.size
+        ]
+
     @classmethod
     def from_arrays(
         cls,
@@ -137,15 +158,18 @@ class Recording:
     ) -> Recording:
         """A recording made of arrays, for everything that takes a bag.
 
-        ``time`` (n,) [s] strictly increasing, of any origin; ``angle`` [rad] and ``rate`` [rad/s] as {side: samples}, or one array
-        for the joint 'left' of a vehicle with a single one; ``torque`` [N m] of a torque sensor, or ``pressure`` [Pa] as {line:
-        samples}, gauge or absolute as the vehicle file says; ``air`` [degC]. Samples are an array (n,), or a pair (time, array)
-        where a sensor has a clock of its own. Samples that are no finite number are left out and counted in ``rejected``.
-        ``DataError`` for anything that cannot be meant.
+        ``time`` (n,) [s] (or datetime64) strictly increasing, of any origin; ``angle`` [rad] and ``rate`` [rad/s] as {side:
+        samples}, or one array for the joint 'left' of a vehicle with a single one; ``torque`` [N m] of a torque sensor, or
+        ``pressure`` [Pa] as {line: samples}, gauge or absolute as the vehicle file says; ``air`` [degC]. Samples are an array
+        (n,), or a pair (time, array) where a sensor has a clock of its own. Samples that are no finite number are left out and
+        counted in ``rejected``. ``DataError`` for anything that cannot be meant.
         """
         given = {f"angle/{side}": samples for side, samples in _by_side(angle).items()}
-        given |= {f"rate/{side}": samples for side, samples in _by_side(rate or {}).items()}
-        given |= {f"pressure/{line}": samples for line, samples in (pressure or {}).items()}
+        given |= {f"rate/{side}": samples for side, samples in _by_side({} if rate is None else rate).items()}
+        lines = {} if pressure is None else pressure
+        if not isinstance(lines, Mapping):
+            raise DataError(f"pressure: got {type(lines).__name__}, expected a mapping {{line: samples}}")
+        given |= {f"pressure/{line}": samples for line, samples in lines.items()}
         given |= {label: samples for label, samples in (("measured_torque", torque), ("air_temperature", air)) if samples is not None}
         clock = _clock(time, "time")
         signals, rejected = {}, {}
@@ -171,10 +195,18 @@ def _by_side(samples: BySide) -> Mapping[str, Samples]:
 
 def _clock(time: ArrayLike, label: str) -> Array:
     """Times (n,) [s], checked."""
-    clock = _numbers(time, label)
+    clock = _numbers(_seconds(time), label)
     if clock.size < 2 or not np.isfinite(clock).all() or not (np.diff(clock) > 0.0).all():
         raise DataError(f"{label}: got {clock.size} times, expected at least two finite ones [s] that increase strictly")
     return clock
+
+
+def _seconds(time: ArrayLike) -> ArrayLike:
+    """Dates and durations of NumPy or pandas as seconds, dates since 1970."""
+    kind = getattr(getattr(time, "dtype", None), "kind", "")
+    if kind == "M":
+        return _seconds(np.asarray(time) - np.datetime64(0, "s"))
+    return np.asarray(time) / np.timedelta64(1, "s") if kind == "m" else time
 
 
 def _signal(label: str, samples: Samples, clock: Array) -> tuple[Signal, int]:
@@ -198,7 +230,10 @@ def _signal(label: str, samples: Samples, clock: Array) -> tuple[Signal, int]:
 
 def _numbers(values: ArrayLike, label: str) -> Array:
     try:
-        array = np.asarray(values, np.float64)
+        given = np.asarray(values)
+        if given.dtype.kind in "cmM":  # NumPy would drop the imaginary part, or the unit of time
+            raise DataError(f"{label}: got {given.dtype}, expected real numbers")
+        array = np.asarray(given, np.float64)
     except (TypeError, ValueError):
         raise DataError(f"{label}: got {type(values).__name__}, expected an array of numbers") from None
     if array.ndim != 1:

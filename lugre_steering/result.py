@@ -61,6 +61,16 @@ def frame(rows: Sequence[Row] | Mapping[str, Any]) -> DataFrame:
     return pd.DataFrame(rows)
 
 
+def angle_column(side: str, unit: str) -> str:
+    """The name of a track's angle in tables; of a linear axis its position, in its own unit."""
+    return f"angle_{side}_rad" if unit == "rad" else f"position_{side}_{unit}"
+
+
+def torque_column(name: str, unit: str) -> str:
+    """The name of a torque in tables; of a linear axis a force, in its own unit."""
+    return f"{name}_Nm" if unit == "N m" else f"{name.replace('torque', 'force')}_{unit.replace(' ', '')}"
+
+
 def folder_for(out: str | Path) -> Path:
     """A folder to write results into, made if it is not there."""
     folder = Path(out)

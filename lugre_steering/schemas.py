@@ -20,9 +20,12 @@ from lugre_steering.fleet.result import Fleet
 from lugre_steering.replay.result import Replay
 from lugre_steering.result import folder_for
 from lugre_steering.serialise import as_json, written
+from lugre_steering.simulate.result import Simulation
 
-FILES: Mapping[str, type] = {"diagnosis": Diagnosis, "calibration": Calibration, "summary": Replay, "fleet": Fleet}
-"""Result files by the stem of their name."""
+FILES: Mapping[str, type] = {
+    "diagnosis": Diagnosis, "calibration": Calibration, "summary": Replay, "fleet": Fleet, "simulation": Simulation,
+}  # fmt: skip
+"""Results by the stem of their file's name; a simulation has none, it is what ``simulate --json`` writes."""
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _SIMPLE: dict[Any, dict[str, Any]] = {
     float: {"type": "number"}, int: {"type": "integer"}, bool: {"type": "boolean"}, str: {"type": "string"},

@@ -31,6 +31,7 @@ from lugre_steering.schemas import FILES, schema_of
 
 ROOT = Path(__file__).resolve().parents[1]
 VEHICLE = ROOT / "config" / "test_vehicle.yaml"
+LINEAR_AXIS = ROOT / "config" / "linear_axis_example.yaml"
 STOP = ROOT / "bags" / "synthetic_hidden_stop_a"
 DOUBLE_CYCLE = ROOT / "bags" / "synthetic_double_cycle"
 PAGE = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
@@ -86,6 +87,18 @@ def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
 def test_rooms_show_what_they_are_called_with() -> None:
     assert list(inspect.signature(ls.replay).parameters) == ["data", "vehicle", "options"]
     assert list(inspect.signature(ls.simulate).parameters)[:3] == ["what", "vehicle", "effects"]
+    assert "kept in memory" in str(inspect.getdoc(ls.replay))
+    assert "a built-in manoeuvre" in str(inspect.getdoc(ls.simulate))
+
+
+def test_vehicles_and_recordings_are_shown_in_a_few_words() -> None:
+    vehicle = ls.load_vehicle(VEHICLE)
+    assert repr(vehicle).startswith(f"Vehicle(name: {vehicle.name}; sides: left, right; inputs: ")
+    assert len(repr(vehicle)) < 500
+    assert f"<p>{vehicle.name}</p>" in vehicle._repr_html_()
+    recording = ls.Recording.from_arrays(TIME, angle=np.zeros(5), air=([0.0, 0.2], [20.0, 21.0]))
+    assert repr(recording) == "Recording('recording'; angle/left: 5 samples to 0.4 s; air_temperature: 2 samples to 0.2 s)"
+    assert "<td>air_temperature</td>" in recording._repr_html_()
 
 
 def test_one_file_or_effect_needs_no_list() -> None:
@@ -241,6 +254,9 @@ TIME = np.arange(5) * 0.1
         ({"torque": (TIME,)}, "measured_torque: got 1 arrays"),
         ({"pressure": {"a": (TIME * 0.0, TIME)}}, "time of pressure/a: got 5 times"),
         ({"air": np.full(5, 293.0)}, "air_temperature: got 293, expected values in degC"),
+        ({"angle": np.full(5, 0.1j)}, "angle/left: got complex128, expected real numbers"),
+        ({"pressure": np.zeros(5)}, "pressure: got ndarray, expected a mapping"),
+        ({"rate": np.full(5, np.timedelta64(1))}, "rate/left: got timedelta64, expected real numbers"),
     ],
 )
 def test_arrays_that_cannot_be_meant_are_refused(changes: dict, said: str) -> None:
@@ -248,10 +264,66 @@ def test_arrays_that_cannot_be_meant_are_refused(changes: dict, said: str) -> No
         ls.Recording.from_arrays(**{"time": TIME, "angle": np.zeros(5)} | changes)
 
 
+def test_dates_are_seconds() -> None:
+    dates = np.datetime64("2024-01-01") + np.arange(5) * np.timedelta64(100, "ms")
+    made = ls.Recording.from_arrays(dates, angle=np.zeros(5), torque=(dates - dates[0], np.ones(5)))
+    assert made.measured_torque is not None
+    assert made.start_ns == 1  # the torque's durations begin at zero
+    assert made.angle["left"].time_s[0] == dates[0].astype("datetime64[s]").astype(int)
+    np.testing.assert_allclose(made.measured_torque.time_s, TIME)
+
+
 def test_samples_that_are_no_number_are_left_out_and_counted() -> None:
     made = ls.Recording.from_arrays(TIME, angle=np.array([0.0, np.nan, 0.1, np.inf, 0.2]), torque=np.ones(5))
     assert made.rejected == {"angle/left": {"not_finite": 2}}
     np.testing.assert_allclose(made.angle["left"].time_s, [0.0, 0.2, 0.4])
+
+
+UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: ls.replay([], VEHICLE), "no recording is given"),
+        (lambda: ls.calibrate([], VEHICLE), "no recording is given"),
+        (lambda: ls.diagnose([], VEHICLE), "no recording is given"),
+        (lambda: ls.replay(5, VEHICLE), "recordings: got 5, expected paths of bags, or recordings"),
+        (lambda: ls.replay(UPWARD, VEHICLE), "holds no input of the vehicle, expected angle 'left', angle 'right'"),
+        (lambda: ls.diagnose(STOP, VEHICLE, material=np.nan), "material: got nan, expected a number from 0 to 1"),
+        (lambda: ls.diagnose(STOP, VEHICLE, seed=-1), "seed: got -1, expected a whole number from 0"),
+        (lambda: ls.load_vehicle(None), "vehicle: got None, expected a vehicle or the path of its file"),
+        (lambda: ls.save_vehicle(ls.load_vehicle(VEHICLE), "/nowhere/x.yaml"), "/nowhere/x.yaml: cannot be written: No such file"),
+        (lambda: ls.simulate("paper-rate"), "'paper-rate': is an experiment, which the command runs; expected a file or one of"),
+        (lambda: ls.simulate(ls.load_vehicle(VEHICLE)), "what: got Vehicle, expected the name"),
+        (lambda: ls.simulate("double-cycle", seeds=1), "seeds: got 1, expected no such option; did you mean 'seed'?"),
+        (lambda: ls.simulate("double-cycle", seed=1.5), "seed: got 1.5, expected a whole number from 0"),
+        (lambda: ls.simulate("double-cycle", angle_rate_Hz="x"), "angle_rate_Hz: got 'x', expected a number from 1 to 1000"),
+        (lambda: ls.simulate("double-cycle", effects=[5]), "effects: got 5, expected texts"),
+        (lambda: ls.Options(max_gap_s="x"), "max_gap_s: got 'x', expected a number from 0.001 to 60"),
+    ],
+)
+def test_what_a_program_gives_wrongly_is_an_error_of_ours(call, said: str) -> None:
+    with pytest.raises(ls.LugreSteeringError, match=re.escape(said)):
+        call()
+
+
+def test_a_message_that_is_none_is_refused() -> None:
+    estimator = ls.Estimator(VEHICLE)
+    for message, said in (
+        (("angle/left", 1, 0.0), "channel: got angle/left, expected 0 to"),
+        ((0, 10**30, 0.0), "expected a whole number of at most 64 bits"),
+        ((0, 1.5, 0.0), "stamp_ns: got 1.5"),
+        ((0, 1, "fast"), "value, rate: got 'fast', nan, expected numbers"),
+    ):
+        with pytest.raises(ls.DataError, match=re.escape(said)):
+            estimator.push(*message)
+
+
+def test_results_are_compared_by_what_they_say(replay: ls.Replay) -> None:
+    again = ls.replay(STOP, VEHICLE)
+    assert replace(again, provenance=replay.provenance) == replay
+    assert replace(replay, vehicle="another") != replay
 
 
 @pytest.mark.parametrize("call", [ls.replay, ls.calibrate, ls.diagnose])
@@ -382,6 +454,29 @@ def test_the_contract_s_own_schema_accepts_what_ours_does(diagnosis: ls.Diagnosi
 def test_real_results_keep_to_their_schemas(diagnosis: ls.Diagnosis, calibration: ls.Calibration, replay: ls.Replay) -> None:
     for result in (diagnosis, calibration, replay, ls.diagnose(short(), VEHICLE)):
         assert refusals(schema_of(type(result)), json.loads(result.to_json())) == []
+
+
+@pytest.fixture(scope="module")
+def axis() -> ls.Simulation:
+    return ls.simulate("double-cycle", LINEAR_AXIS, angle_rate_Hz=20.0, pressure_rate_Hz=20.0)
+
+
+def test_a_simulation_keeps_to_its_schema(axis: ls.Simulation) -> None:
+    for result in (axis, ls.simulate("double-cycle", VEHICLE, angle_rate_Hz=20.0)):
+        assert result.json["schema"] == "lugre_steering/simulation/1"
+        assert refusals(schema_of(ls.Simulation), json.loads(result.to_json())) == []
+
+
+def test_a_linear_axis_is_told_in_its_own_units(axis: ls.Simulation) -> None:
+    assert (axis.largest_angle_deg, axis.coordinate_unit, axis.torque_unit) == (None, "m", "N")
+    assert axis.largest_coordinate == pytest.approx(np.abs(axis.run.truth.motion.theta).max())
+    replay = ls.replay(axis.recording, LINEAR_AXIS)
+    if importlib.util.find_spec("matplotlib") is not None:
+        names = {each.get_ylabel() + each.get_title() for figure in (axis.plot(), replay.plot()) for each in figure.axes}
+        assert not [name for name in names if "rad" in name or "N m" in name or "torque" in name]
+    if importlib.util.find_spec("pandas") is not None:
+        assert list(axis.to_frame()) == ["time_s", "position_left_m", "force_N", "rubber_left_degC"]
+        assert list(replay.to_frame()) == ["time_s", "position_left_m", "force_N", "measured_N", "residual_N", "bag"]
 
 
 def short() -> ls.Recording:

@@ -653,7 +653,7 @@ def test_quality_of_service_that_says_nothing_clear_is_left_out(tmp_path: Path, 
 
 
 def test_a_horizon_that_is_no_number_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="feed_forward_horizon_s: got nan, expected 0 to 5"):
+    with pytest.raises(DataError, match="feed_forward_horizon_s: got nan, expected a number from 0 to 5"):
         Options(feed_forward_horizon_s=float("nan"))
     bag = make.write(tmp_path / "run", drive(2.0))
     command = ["replay", str(bag), "--vehicle", str(VEHICLE), "--out", str(tmp_path / "out"), "--horizon", "nan"]

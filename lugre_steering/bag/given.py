@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,27 +12,34 @@ import numpy as np
 
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag.load import distinct, read_recording
+from lugre_steering.errors import DataError
 from lugre_steering.recording import Array, Channel, IntArray, Kind, Recording, Signal
 
 Given = str | Path | Recording
 
 
 def each(data: Given | Sequence[Given]) -> list[Given]:
-    """One thing or several as a list."""
-    return [data] if isinstance(data, (str, Path, Recording)) else list(data)
+    """One thing or several as a list, of which none may be missing or something else."""
+    items: list[Given] = list(data) if isinstance(data, Iterable) and not isinstance(data, (str, bytes)) else [data]
+    if not items:
+        raise DataError("no recording is given, expected at least one")
+    for item in items:
+        if not isinstance(item, (str, Path, Recording)):
+            raise DataError(f"recordings: got {item!r}, expected paths of bags, or recordings")
+    return items
 
 
-def files(data: Given | Sequence[Given]) -> list[Path]:
+def files(items: Sequence[Given]) -> list[Path]:
     """The paths among them."""
-    return [Path(item) for item in each(data) if not isinstance(item, Recording)]
+    return [Path(item) for item in items if not isinstance(item, Recording)]
 
 
 def given_recordings(
-    data: Given | Sequence[Given], channels: Sequence[Channel], progress: Callable[[str], None] = lambda _: None
+    items: Sequence[Given], channels: Sequence[Channel], progress: Callable[[str], None] = lambda _: None
 ) -> list[Recording]:
     """All of them in memory, each by a name of its own; the same recording twice is refused."""
     found = []
-    for item in each(data):
+    for item in items:
         if isinstance(item, Recording):
             found.append((item.name, with_both_tracks(item, channels)))
         else:
@@ -73,6 +80,9 @@ def in_stamp_order(recording: Recording, channels: Sequence[Channel]) -> tuple[I
         stamps.append(recording.start_ns + np.round(signal.time_s * 1e9).astype(np.int64))
         values.append(signal.value)
         rates.append(rate)
+    if not stamps:
+        wanted = ", ".join(f"{channel.kind.name.lower()} '{channel.name}'" for channel in channels)
+        raise DataError(f"{recording.name}: holds no input of the vehicle, expected {wanted}")
     stamp = np.concatenate(stamps)
     order = np.argsort(stamp, kind="stable")
     return np.concatenate(numbers)[order], stamp[order], np.concatenate(values)[order], np.concatenate(rates)[order]

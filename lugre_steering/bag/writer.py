@@ -50,13 +50,14 @@ class Part:
 
 
 @lru_cache(maxsize=1)
-def _stock_types() -> Typestore:
+def stock_types() -> Typestore:
+    """The message types of ROS 2 Jazzy, made once."""
     return get_typestore(Stores.ROS2_JAZZY)
 
 
 def _type_hash(msgtype: str) -> str:
     try:
-        return _stock_types().hash_rihs01(msgtype)
+        return stock_types().hash_rihs01(msgtype)
     except (TypesysError, KeyError):
         return ""  # not a stock type
 
@@ -149,7 +150,7 @@ class BagWriter:
 
     def add_topic(self, topic: str, msgtype: str) -> int:
         """Announce a topic of a stock type; returns its number."""
-        definition, _ = _stock_types().generate_msgdef(msgtype, ros_version=2)
+        definition, _ = stock_types().generate_msgdef(msgtype, ros_version=2)
         return self.add_connection(Connection(topic, msgtype, definition=definition))
 
     def add_connection(self, connection: Connection) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lugre_steering.bag.given import Given, files, given_recordings
+from lugre_steering.bag.given import Given, each, files, given_recordings
 from lugre_steering.calibration.calibrate import calibrate_recordings, chosen
 from lugre_steering.calibration.result import Calibration
 from lugre_steering.effects.registry import made
@@ -33,10 +33,11 @@ def calibrate(
     relative standard deviations of sheet values, ``priors=False`` lets the data alone decide.
     """
     model = vehicle_of(vehicle)
-    recordings = given_recordings(data, model.channels, progress)
+    items = each(data)
+    recordings = given_recordings(items, model.channels, progress)
     wanted = chosen(model, free, fix, prior)
     with one_blas_thread():
         found = calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
     options = {"free": free, "fix": fix, "prior": prior or {}, "priors": priors}
-    return replace(found, provenance=made("calibrate", options, sheet, files(data)))
+    return replace(found, provenance=made("calibrate", options, sheet, files(items)))

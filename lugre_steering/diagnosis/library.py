@@ -8,10 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lugre_steering.bag.given import Given, files, given_recordings
+from lugre_steering.bag.given import Given, each, files, given_recordings
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import leaving_out, made
+from lugre_steering.given_number import check_number
 from lugre_steering.pool import one_blas_thread
 from lugre_steering.result import folder_for
 from lugre_steering.vehicle import Vehicle, vehicle_of
@@ -33,13 +34,16 @@ def diagnose(
     ``without``: names of the catalogue that are not considered, to see what takes their place; ``progress`` is called with what is
     being done.
     """
+    check_number("seed", seed, 0, whole=True)
+    check_number("material", material, 0.0, 1.0)
     model = vehicle_of(vehicle)
-    recordings = given_recordings(data, model.channels, progress)
+    items = each(data)
+    recordings = given_recordings(items, model.channels, progress)
     unsought = [without] if isinstance(without, str) else list(without)
     with leaving_out(unsought), one_blas_thread():
         found = diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
-    return replace(found, provenance=made("diagnose", {"seed": seed, "material": material, "without": unsought}, sheet, files(data)))
+    return replace(found, provenance=made("diagnose", {"seed": seed, "material": material, "without": unsought}, sheet, files(items)))
 
 
 def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:

@@ -226,7 +226,7 @@ class Diagnosis(Result):
     """How the statement begins: what, where, how much of the torque, what to do."""
     provenance: Provenance | None = field(default=None, metadata=ADDED)
     """By what version, when, with what options and from which files it was made; None for data in memory."""
-    traces: tuple[BagTrace, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
+    traces: tuple[BagTrace, ...] = field(default=(), repr=False, compare=False, metadata=IN_MEMORY)
     evidence: tuple[Evidence, ...] = field(default=(), repr=False, metadata=IN_MEMORY)
     coordinate_of: Mapping[str, str] = field(default_factory=dict, repr=False, metadata=IN_MEMORY)
     sheet: Vehicle | None = field(default=None, repr=False, metadata=IN_MEMORY)

@@ -22,9 +22,9 @@ from lugre_steering import yaml_text
 from lugre_steering.chain.compiled import exp, law, tanh
 from lugre_steering.chain.compose import HOOKS, quantities_of
 from lugre_steering.chain.layout import BASELINE_FIELDS
+from lugre_steering.effects.declared import A_NAME, check_typed, is_name
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
-from lugre_steering.effects.sound import NAMED, check_sound, is_name
 from lugre_steering.errors import EffectError, reason
 from lugre_steering.expression import ExpressionError, parse
 from lugre_steering.files import read_text, write_text
@@ -139,20 +139,12 @@ def of_objects(found: object, name: str) -> list[Effect]:
     if not items or len(effects) < len(items):
         kinds = ", ".join(type(item).__name__ for item in items)
         raise EffectError(f"{name}: got {kinds or 'nothing'}, expected EFFECT = Effect(...), or EFFECTS, a list of them")
-    _check_all(effects, name)
+    for effect in effects:
+        check_typed(effect, name)
     return [
         dataclasses.replace(item, hooks={hook: one if hasattr(one, "py_func") else law(one) for hook, one in item.hooks.items()})
         for item in effects
     ]
-
-
-def _check_all(effects: Sequence[Effect], name: str) -> None:
-    """Refuse what is no sound effect, or has the id of another one of the same file or package."""
-    for effect in effects:
-        check_sound(effect, name)
-    ids = [effect.id for effect in effects]
-    if doubled := sorted({one for one in ids if ids.count(one) > 1}):
-        raise EffectError(f"{name}: id: got {', '.join(doubled)} more than once, expected another id for each effect")
 
 
 def _of_yaml(file: Path) -> list[Effect]:
@@ -162,20 +154,18 @@ def _of_yaml(file: Path) -> list[Effect]:
     if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise reader.fail("effects", listed, "a list of effects")
     prefixes = [f"effects[{i}]" for i in range(len(listed))] if len(listed) > 1 else [""]
-    effects = [
+    return [
         _of_law(reader, reader.build(_Kept, item, prefix), prefix)
         if isinstance(item, Mapping) and "law" in item
         else _of_sheet(reader, reader.build(_Sheet, item, prefix), prefix)
         for item, prefix in zip(listed, prefixes, strict=True)
     ]
-    _check_all(effects, str(file))
-    return effects
 
 
 def _of_law(reader: Reader, kept: _Kept, prefix: str) -> Effect:
     before = f"{prefix}." if prefix else ""
     if not is_name(kept.id):
-        raise reader.fail(f"{before}id", kept.id, NAMED)
+        raise reader.fail(f"{before}id", kept.id, A_NAME)
     check_law(kept.law, reader, f"{before}law")
     return named(kept.id, kept.title, kept.source, kept.law)
 
@@ -214,7 +204,9 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
     for what, names in (("id", [sheet.id]), ("parameters", sheet.parameters), ("memory", sheet.memory)):
         for name in names:
             if not is_name(name):
-                raise reader.fail(key(what), name, NAMED)
+                raise reader.fail(key(what), name, A_NAME)
+            if name in _FUNCTIONS:
+                raise reader.fail(key(what), name, f"a name that is none of the functions {', '.join(_FUNCTIONS)}")
     if sheet.stage not in STAGES:
         raise reader.fail(key("stage"), sheet.stage, f"one of {', '.join(STAGES)}")
     if not sheet.laws:

@@ -117,7 +117,10 @@ def add_files(files: str | Path | Sequence[str | Path]) -> None:
 
 
 def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
+    ids = [new.id for new in effects]
     for new in effects:
+        if ids.count(new.id) > 1:
+            raise EffectError(f"{where}: effect '{new.id}': there are {ids.count(new.id)} of this id; expected one")
         if ORIGINS.get(new.id) == origin:
             continue
         if new.id in CATALOGUE:
@@ -125,7 +128,7 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
             raise EffectError(f"{where}: effect '{new.id}': there is one of this name in {known}; expected another id")
         foreign = dataclasses.replace(new, sha256=origin.sha256)
         try:
-            check_declared(foreign, {*CATALOGUE, *(other.id for other in effects)})
+            check_declared(foreign, {*CATALOGUE, *ids})
             check(foreign)
             _try(foreign)
         except EffectError as error:

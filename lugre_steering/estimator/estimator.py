@@ -40,6 +40,7 @@ from lugre_steering.estimator.memory import Memory, hand_over, recall, remembere
 from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
+from lugre_steering.given_number import check_number
 from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle, vehicle_of
@@ -77,9 +78,7 @@ class Options:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value, low, high = getattr(self, item.name), item.metadata["low"], item.metadata["high"]
-            if not low <= value <= high:  # nan is refused too
-                raise DataError(f"{item.name}: got {value:g}, expected {low:g} to {high:g}")
+            check_number(item.name, getattr(self, item.name), item.metadata["low"], item.metadata["high"])
 
 
 @njit(nogil=True, cache=True)
@@ -123,6 +122,10 @@ def _process_one(held, first_line, channel, stamp_ns, value, rate):
     )
 
 
+WHOLE = (int, np.integer)
+LAST_NS = 2**63 - 1
+
+
 class Snapshot(NamedTuple):
     """The state of an estimator, for one of the same model in the same process."""
 
@@ -149,9 +152,15 @@ class Estimator:
 
         ``DataError`` for a channel that ``channels`` does not have: the compiled loop would write beside its memory.
         """
-        if not 0 <= channel < len(self.channels):
+        if not isinstance(channel, WHOLE) or not 0 <= channel < len(self.channels):
             raise self._no_channel(channel)
-        e, r = _process_one(self._held, self._first_line, channel, stamp_ns, float(value), float(rate))
+        if not isinstance(stamp_ns, WHOLE) or abs(stamp_ns) > LAST_NS:
+            raise DataError(f"stamp_ns: got {stamp_ns!r}, expected a whole number of at most 64 bits")
+        try:
+            value, rate = float(value), float(rate)
+        except (TypeError, ValueError):
+            raise DataError(f"value, rate: got {value!r}, {rate!r}, expected numbers") from None
+        e, r = _process_one(self._held, self._first_line, channel, stamp_ns, value, rate)
         return self._estimates[:e], self._residuals[:r]
 
     def push_block(self, channel: IntArray, stamp_ns: IntArray, value: Array, rate: Array) -> tuple[Records, Records]:
@@ -167,7 +176,7 @@ class Estimator:
         )
         return estimates[:e], residuals[:r]
 
-    def _no_channel(self, channel: int) -> DataError:
+    def _no_channel(self, channel: object) -> DataError:
         return DataError(f"channel: got {channel}, expected 0 to {len(self.channels) - 1}, the place in channels")
 
     def begin_at(self, rubber_degC: float) -> None:

@@ -9,13 +9,13 @@ the rest is masked. The residual is compared with that part only.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 
-from lugre_steering.effects.entry import Effect, Seen
+from lugre_steering.effects.entry import Effect, Seen, Variant
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS, sought
 from lugre_steering.errors import EffectError
 from lugre_steering.fitting import onset
@@ -77,16 +77,6 @@ def possible(vehicle: Vehicle, effect: Effect) -> bool:
     return all(getattr(vehicle, section) is not None for section in effect.needs)
 
 
-def _variants(effect: Effect, seen: Seen) -> list[dict[str, float]]:
-    """Shapes that an effect chooses itself; a foreign one's function may do anything."""
-    assert effect.variants is not None
-    try:
-        return [{name: float(value) for name, value in shapes.items()} for shapes in effect.variants(seen)]
-    except Exception as error:
-        got = f"{type(error).__name__}: {error}"
-        raise EffectError(f"effect '{effect.id}': variants: got {got}, expected shapes, each values by their names") from error
-
-
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
@@ -96,7 +86,7 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
         effect = resized(effect, problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
-            for shapes in _variants(effect, _seen(problem)):
+            for shapes in _suggested(effect, effect.variants, _seen(problem)):
                 ends = {name for pair in effect.places for name in pair}
                 unset = tuple(name for name in free if name not in shapes and name not in ends)
                 found.append(Candidate(effect, tuple(shapes.items()), free=unset))
@@ -110,6 +100,18 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
                 if p.is_shape
             ]
             found += [Candidate(effect, shapes, free=free) for shapes in itertools.product(*grids)]
+    return found
+
+
+def _suggested(effect: Effect, variants: Callable[[Seen], Sequence[Variant]], seen: Seen) -> list[Variant]:
+    """The shapes that an effect chooses for itself, checked: users write such functions too."""
+    try:
+        found: list[Variant] = [{name: float(value) for name, value in shapes.items()} for shapes in variants(seen)]
+    except Exception as error:  # whatever a user's own Python raises
+        raise EffectError(f"effect '{effect.id}': variants: {type(error).__name__}: {error}; expected values by parameter") from error
+    own = {p.name for p in effect.parameters}
+    if foreign := sorted({str(name) for shapes in found for name in shapes if name not in own}):
+        raise EffectError(f"effect '{effect.id}': variants: got {', '.join(foreign)}, expected parameters of it ({', '.join(sorted(own))})")
     return found
 
 

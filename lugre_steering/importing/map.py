@@ -52,7 +52,7 @@ ALLOWANCES: Mapping[str, str] = {
 WHITESPACE = "whitespace"
 """As ``csv.delimiter``: any run of blanks and tabs."""
 
-_DIMENSIONS = {
+DIMENSIONS = {
     "angle": ("angle", "length"),
     "rate": ("angular speed", "speed"),
     "pressure": ("pressure",),
@@ -260,7 +260,7 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
     key = f"channels.{name}"
     kind, _, rest = name.partition("/")
     sided = kind in ("angle", "rate")
-    known = (sided and rest in ("left", "right")) or (kind == "pressure" and rest) or (kind in _DIMENSIONS and not rest)
+    known = (sided and rest in ("left", "right")) or (kind == "pressure" and rest) or (kind in DIMENSIONS and not rest)
     if not known or (not rest and (sided or kind == "pressure")) or not TOPIC.fullmatch(name):
         expected = "angle/left, angle/right, rate/left, rate/right, pressure/<line>, air_temperature or measured_torque"
         raise reader.fail("channels", name, expected)
@@ -272,7 +272,7 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
     elif source.pivots is not None:
         _check_pivots(reader, key, kind, source, source.pivots)
     else:
-        _check_unit(reader, f"{key}.unit", source.unit, _DIMENSIONS[kind])
+        _check_unit(reader, f"{key}.unit", source.unit, DIMENSIONS[kind])
     if (source.polynomial is None) != (source.of is None):
         raise reader.fail(f"{key}.of", source.of, "the column of a polynomial, together with 'polynomial'")
     if source.polynomial is not None and not source.polynomial:

@@ -16,7 +16,7 @@ import yaml
 from lugre_steering.errors import LugreSteeringError, MapFileError
 from lugre_steering.importing.channels import read_channels
 from lugre_steering.importing.clocks import FEW, ClockGuess, clocks, counts, is_named
-from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Csv, load_map
+from lugre_steering.importing.map import DIMENSIONS, READABLE_UNITS, SCHEMA, Csv, load_map
 from lugre_steering.importing.plausible import DEGREES, check_units
 from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
@@ -112,7 +112,7 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     ordered = sorted((name for name in table.columns if name not in of_time), key=lambda name: order.get(_kind(table, name), 0))
     for name in ordered:
         key, why = _key(table, name)
-        if key is not None and (text := unfit(table, name, _DIMENSIONS[key.partition("/")[0]])):
+        if key is not None and (text := unfit(table, name, DIMENSIONS[key.partition("/")[0]])):
             key, why = None, f"{why}, but it is stated in '{text}', which is none of its units: give scale and unit"
         if key is not None and (obstacle := _obstacle(key, taken)):
             key, why = None, obstacle
@@ -190,15 +190,9 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
     return None, none.get(kind or "", "the name tells nothing known")
 
 
-_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
-    "angle": ("angle", "length"), "rate": ("angular speed", "speed"), "pressure": ("pressure",),
-    "measured_torque": ("torque", "force"), "air_temperature": ("temperature",),
-}  # fmt: skip
-
-
 def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tuple[str, str]:
     kind, _, side = key.partition("/")
-    unit = stated(table, name, _DIMENSIONS[kind])
+    unit = stated(table, name, DIMENSIONS[kind])
     if unit is not None:
         return unit, "unit as stated"
     values = table.columns[name][np.isfinite(table.columns[name])]

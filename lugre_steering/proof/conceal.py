@@ -20,7 +20,7 @@ from lugre_steering.chain.compiled import njit
 from lugre_steering.errors import DataError
 from lugre_steering.proof.made import Hidden
 
-__all__ = ["CATALOGUE", "EFFECT_IDS", "UNLISTED_IDS", "Concealed", "Hidden", "Motion", "draw", "sensed"]
+__all__ = ["CATALOGUE", "EFFECT_IDS", "UNLISTED_IDS", "Concealed", "FineMotion", "Hidden", "draw", "sensed"]
 
 Array = NDArray[np.float64]
 
@@ -202,7 +202,7 @@ def gate(time: Array, start_s: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Motion:
+class FineMotion:
     """Motion of both tracks (2, n) on the fine grid (n,) [s]: angle [rad], rate [rad/s], acceleration [rad/s2]."""
 
     time: Array
@@ -243,7 +243,7 @@ def _end_stop(angle: Array, low: float, high: float, k1: float, k3: float, loss:
     return out
 
 
-def end_stop(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def end_stop(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """Rubber buffers of the four stops; their thresholds differ by half a degree or so."""
     shift = 0.5 * DEG
     at = v["threshold"]
@@ -252,18 +252,18 @@ def end_stop(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
     return np.stack([_end_stop(angle, low, high, v["k1"], v["k3"], v["loss"]) for angle, (low, high) in sides])
 
 
-def yaw_inertia(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def yaw_inertia(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """D'Alembert torque of mass that the sheet does not know."""
     return v["inertia"] * motion.acceleration
 
 
-def kingpin_jacking(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def kingpin_jacking(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """Lift about an inclined kingpin (odd in the angle) with a caster part (even)."""
     s = np.sin(motion.angle)
     return np.asarray(v["amplitude"] * (s + v["caster_share"] * s**2))
 
 
-def slope_bias(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def slope_bias(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """Side force of the slope on the kingpin trail, which shortens as the track turns; a sum over both sides."""
     return np.asarray(0.5 * v["torque"] * np.cos(motion.angle))
 
@@ -281,24 +281,24 @@ def _berm(angle: Array, torque: float, span: float, growth: float) -> Array:
     return out
 
 
-def soil_shear(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def soil_shear(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """Berms that grow with the ground they have swept."""
     return np.stack([_berm(angle, v["torque"], v["span"], v["growth"]) for angle in motion.angle])
 
 
-def gear_ripple(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def gear_ripple(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """Unlisted: torque periodic in the angle, as of a toothed ring; a sum over both sides."""
     phase = 2.0 * np.pi * motion.angle / v["period"]
     return np.asarray(0.5 * v["torque"] * (np.sin(phase) + 0.25 * np.sin(2.0 * phase + 1.0)))
 
 
-def rate_memory(motion: Motion, v: Values, _rng: np.random.Generator) -> Array:
+def rate_memory(motion: FineMotion, v: Values, _rng: np.random.Generator) -> Array:
     """Unlisted: a fluid that remembers seconds (Maxwell) and thins with rate; ``torque`` is reached at 0.1 rad/s."""
     drive = np.sign(motion.rate) * np.sqrt(np.abs(motion.rate) / 0.1)
     return v["torque"] * _low_pass(np.asarray(drive), motion.step, v["time"])
 
 
-def intermittent_contact(motion: Motion, v: Values, rng: np.random.Generator) -> Array:
+def intermittent_contact(motion: FineMotion, v: Values, rng: np.random.Generator) -> Array:
     """Unlisted: something rubs now and then inside an angle zone, in bursts that nothing recorded predicts."""
     n, hold = motion.time.size, max(int(v["burst_time"] / motion.step), 1)
     bursts = np.repeat(rng.random(n // hold + 1) < 0.45, hold)[:n].astype(float)
@@ -321,7 +321,7 @@ def _seal_memory(rate: Array, step: float, angle: float) -> Array:
     return out
 
 
-def cylinder_friction(torque: Array, motion: Motion, v: Values) -> Array:
+def cylinder_friction(torque: Array, motion: FineMotion, v: Values) -> Array:
     """Seal friction that grows with the load, with a Stribeck bump; at rest a part of it stays (0 none, 1 all)."""
     rate = motion.rate.mean(axis=0)
     kept = _seal_memory(rate, motion.step, 0.05 * DEG)
@@ -331,20 +331,20 @@ def cylinder_friction(torque: Array, motion: Motion, v: Values) -> Array:
     return np.asarray(sign * (v["coulomb"] + v["load_share"] * np.abs(torque)) * bump + v["viscous"] * rate)
 
 
-def line_loss_linear(_torque: Array, motion: Motion, v: Values) -> Array:
+def line_loss_linear(_torque: Array, motion: FineMotion, v: Values) -> Array:
     """Laminar hose loss; the oil warms with the distance moved and thins by up to a third."""
     rate = motion.rate.mean(axis=0)
     moved = np.cumsum(np.abs(rate)) * motion.step
     return np.asarray(v["b"] * rate * (1.1 - 0.3 * (1.0 - np.exp(-moved / 6.0))))
 
 
-def line_loss_quadratic(_torque: Array, motion: Motion, v: Values) -> Array:
+def line_loss_quadratic(_torque: Array, motion: FineMotion, v: Values) -> Array:
     """Turbulent loss with the exponent of a rough hose (1.85), equal to ``c rate^2`` at 0.1 rad/s."""
     rate = motion.rate.mean(axis=0)
     return np.asarray(v["c"] * 0.01 * np.sign(rate) * np.abs(rate / 0.1) ** 1.85)
 
 
-def back_pressure(_torque: Array, motion: Motion, v: Values) -> Array:
+def back_pressure(_torque: Array, motion: FineMotion, v: Values) -> Array:
     """Pressure at the return ports that the sensors at the valve do not see: builds with flow, gone at rest.
 
     ``pressure`` acts on the return areas times their arms, 5.75e-3 m3 for the reference vehicle, at 0.1 rad/s.
@@ -353,7 +353,7 @@ def back_pressure(_torque: Array, motion: Motion, v: Values) -> Array:
     return np.asarray(v["pressure"] * 5.75e-3 * np.tanh(rate / (1.0 * DEG)) * (0.7 + 0.3 * np.abs(rate) / 0.1))
 
 
-def trapped_pressure(torque: Array, motion: Motion, v: Values) -> Array:
+def trapped_pressure(torque: Array, motion: FineMotion, v: Values) -> Array:
     """A closing valve leaks: while parked the load falls towards (1 - share) of itself; motion brings it back."""
     parked = np.abs(motion.rate.mean(axis=0)) < 0.15 * DEG
     return -v["share"] * torque * _leak(parked, motion.step, v["time"])
@@ -367,7 +367,7 @@ def _leak(parked: NDArray[np.bool_], step: float, time: float) -> Array:
     return out
 
 
-def body_mode(torque: Array, motion: Motion, v: Values) -> Array:
+def body_mode(torque: Array, motion: FineMotion, v: Values) -> Array:
     """Unlisted: the chassis rocks on its other tracks, a lightly damped mode that the steering torque excites."""
     return v["gain"] * (_mode(torque, motion.step, 2.0 * np.pi * v["frequency"], v["damping"]) - torque)
 
@@ -383,13 +383,13 @@ def _mode(force: Array, step: float, pulsation: float, damping: float) -> Array:
     return out
 
 
-PARALLEL_LAWS: dict[str, Callable[[Motion, Values, np.random.Generator], Array]] = {
+PARALLEL_LAWS: dict[str, Callable[[FineMotion, Values, np.random.Generator], Array]] = {
     law.__name__: law
     for law in (
         end_stop, yaw_inertia, kingpin_jacking, slope_bias, soil_shear, gear_ripple, rate_memory, intermittent_contact,
     )
 }
-LOSS_LAWS: dict[str, Callable[[Array, Motion, Values], Array]] = {
+LOSS_LAWS: dict[str, Callable[[Array, FineMotion, Values], Array]] = {
     law.__name__: law
     for law in (
         cylinder_friction, line_loss_linear, line_loss_quadratic, back_pressure, trapped_pressure, body_mode,

@@ -35,7 +35,7 @@ class Patches(NamedTuple):
     graded: Array
 
 
-class Track(NamedTuple):
+class TrackSeries(NamedTuple):
     """Series (n,) of one track: contact and aligning torque [N m], contact angle [rad], mean temperature [degC]."""
 
     friction: Array
@@ -419,8 +419,8 @@ def _remember(
 def run_track(
     angle: Array, h: float, v: TrueVehicle, rubber: RubberTable, patch: Patches, hidden: HiddenContact,
     level_factor: Array | None = None, stiffness_factor: Array | None = None,
-) -> Any:  # Track, compiled  # fmt: skip
-    """Simulate one track (see ``Track``) for its clean angle (n,) on a grid of ``h`` seconds.
+) -> Any:  # TrackSeries, compiled  # fmt: skip
+    """Simulate one track (see ``TrackSeries``) for its clean angle (n,) on a grid of ``h`` seconds.
 
     The factors (n,), if any, are what an unlisted law makes of friction level and stiffness.
     """
@@ -460,4 +460,4 @@ def run_track(
         _relax(t, rate, h, hidden, cells.chain)
         m = _remember(t, h, rate, slip, power, hidden, m, patch, cells)
         contact[k], heat[k] = m.theta, m.mean_T
-    return Track(friction, aligning, contact, heat)
+    return TrackSeries(friction, aligning, contact, heat)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lugre_steering.data.dataset import ideal_run
 from lugre_steering.fitting.problem import Candidate, Problem, standing_effects
 from lugre_steering.proof.made import Made
-from lugre_steering.proof.probe import MEASURES, Motion, Seen, motion, sliding_torque
+from lugre_steering.proof.probe import MEASURES, Seen, Trip, motion, sliding_torque
 from lugre_steering.vehicle import load
 
 Array = NDArray[np.float64]
@@ -50,11 +50,11 @@ def measured(made: Made, augmented: Path, diagnosis: Mapping[str, Any]) -> dict[
 class Chain:
     """The estimator's chain with the physics of a vehicle file, on the probe."""
 
-    def __init__(self, augmented: Path, trip: Motion, torque: Array) -> None:
+    def __init__(self, augmented: Path, trip: Trip, torque: Array) -> None:
         vehicle = load(augmented)
         self.effects = standing_effects(vehicle)
         angle, rate, acceleration = (row[::EVERY] for row in (trip.angle, trip.rate, trip.acceleration))
-        self.trip = Motion(trip.time[::EVERY], angle, rate, acceleration, trip.leg[::EVERY], trip.limit)
+        self.trip = Trip(trip.time[::EVERY], angle, rate, acceleration, trip.leg[::EVERY], trip.limit)
         bare, sides = replace(vehicle, effects=()), len(vehicle.sides)
         theta, omega, alpha = (np.stack([row] * sides) for row in (self.trip.angle, self.trip.rate, self.trip.acceleration))
         run = ideal_run(bare, "probe", self.trip.time, theta, (omega, alpha), torque[::EVERY], 1.0)

@@ -28,7 +28,7 @@ FAST, SLOW = (5, 6), (7, 8)
 
 
 @dataclass(frozen=True)
-class Motion:
+class Trip:
     """The probe (n,): time [s], angle of both tracks [rad], its derivatives, and the number of the leg; ``limit`` [rad]."""
 
     time: Array
@@ -43,7 +43,7 @@ class Motion:
 class Seen:
     """Torque of the probe (n,) [N m] with an effect and without it; ``scale``: sliding torque [N m]."""
 
-    motion: Motion
+    motion: Trip
     torque: Array
     without: Array
     scale: float
@@ -62,7 +62,7 @@ class Seen:
         return np.isin(m.leg, legs) & (np.abs(m.angle) < 0.3 * m.limit) & (np.abs(m.rate) > 0.5 * DEG)
 
 
-def motion(limit: float) -> Motion:
+def motion(limit: float) -> Trip:
     """The probe for a vehicle that steers to ``limit`` [rad]; rates fade in and out over half a second."""
     rates, legs = [np.zeros(round(1.0 / STEP_S))], [np.full(round(1.0 / STEP_S), -1)]
     at = 0.0
@@ -77,7 +77,7 @@ def motion(limit: float) -> Motion:
     rate_series = np.concatenate(rates)
     angle = np.concatenate([[0.0], np.cumsum(rate_series[:-1]) * STEP_S])
     time = np.arange(angle.size, dtype=np.float64) * np.float64(STEP_S)
-    return Motion(time, angle, np.gradient(angle, STEP_S), np.gradient(np.gradient(angle, STEP_S), STEP_S), np.concatenate(legs), limit)
+    return Trip(time, angle, np.gradient(angle, STEP_S), np.gradient(np.gradient(angle, STEP_S), STEP_S), np.concatenate(legs), limit)
 
 
 def sliding_torque(seen_without: Array) -> float:

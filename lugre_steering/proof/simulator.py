@@ -21,17 +21,17 @@ from rosbags.rosbag2 import StoragePlugin
 
 from lugre_steering.proof import conceal, hydraulics, manoeuvres
 from lugre_steering.proof.bagfile import Topic, write_bag
-from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, Concealed, Motion
-from lugre_steering.proof.contact import HiddenContact, Patches, Track, patches, run_track
+from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS, Concealed, FineMotion
+from lugre_steering.proof.contact import HiddenContact, Patches, TrackSeries, patches, run_track
 from lugre_steering.proof.generator import Law, Modulation, Scene, draw_law, modulate
-from lugre_steering.proof.made import Hidden, Probe, active_intervals, left_over, removable_of, unit
+from lugre_steering.proof.made import Hidden, Probe, active_intervals, removable_of, unit
 from lugre_steering.proof.rubber import rubber_table
 from lugre_steering.proof.sensors import PERIOD_S, Habits, NoiseKind, Samples, draw_habits, sense_angle, sense_pressures
 from lugre_steering.proof.vehicle_draw import Sheet, TrueVehicle, draw_vehicle, load_sheet
 
 __all__ = [
     "EFFECT_IDS", "UNLISTED_IDS", "BagData", "Case", "CaseData", "Concealed", "load_sheet", "noise_variance",
-    "recalibrated_variance", "removable_variance", "simulate_case", "tangents", "write_case",
+    "removable_variance", "simulate_case", "tangents", "write_case",
 ]
 
 Array = NDArray[np.float64]
@@ -152,7 +152,7 @@ def probe(data: CaseData, angles: Array) -> Probe:
     """The case's vehicle with everything hidden, from the start and in every bag, on other angles (2, n) [rad] at STEP_S."""
     time = np.arange(angles.shape[1], dtype=np.float64) * np.float64(manoeuvres.STEP_S)
     bench = _Bench(data.sheet, data.patches, time, angles, data.line_share, data.return_flow_Pas, (data.case.seed, 41), data.law)
-    always, tracks = [effect._replace(start_s=-1e9) for effect in data.hidden], dict[tuple[str, ...], tuple[Track, ...]]()
+    always, tracks = [effect._replace(start_s=-1e9) for effect in data.hidden], dict[tuple[str, ...], tuple[TrackSeries, ...]]()
     gain = hydraulics.line_gain(data.sheet, angles)
 
     def torque(hidden: list[Hidden]) -> Array:
@@ -187,7 +187,7 @@ def _bag(
     kind: str, bench: _Bench, vehicle: TrueVehicle, hidden: list[Hidden], noise: NoiseKind, habits: Habits,
     rng: np.random.Generator,
 ) -> BagData:
-    tracks: dict[tuple[str, ...], tuple[Track, ...]] = {}
+    tracks: dict[tuple[str, ...], tuple[TrackSeries, ...]] = {}
     gain = hydraulics.line_gain(bench.sheet, bench.measured)
     pressures = _pressures(bench, vehicle, hidden, tracks)
     torque = hydraulics.torque_of(pressures, gain)[::_FINE]
@@ -212,7 +212,7 @@ def _bag(
 
 
 def _pressures(
-    bench: _Bench, vehicle: TrueVehicle, hidden: list[Hidden], tracks: dict[tuple[str, ...], tuple[Track, ...]]
+    bench: _Bench, vehicle: TrueVehicle, hidden: list[Hidden], tracks: dict[tuple[str, ...], tuple[TrackSeries, ...]]
 ) -> Array:
     """Noise-free pressures (lines, n) [Pa] as the line sensors see them; ``tracks`` remembers contact runs."""
     time, step = bench.time, manoeuvres.STEP_S
@@ -226,7 +226,7 @@ def _pressures(
         elif effect.id == "moment_arm_error":
             arm_factor = 1.0 + on * (effect.values["a"] * bench.measured + effect.values["b"] * bench.measured**2)
     rate = np.gradient(angle, step, axis=1)
-    motion = Motion(time, angle, rate, np.gradient(rate, step, axis=1))
+    motion = FineMotion(time, angle, rate, np.gradient(rate, step, axis=1))
     law = next((effect for effect in hidden if effect.id == LAW), None)
     change = None if law is None else _modulation(bench, vehicle, motion, law, tracks)
     sides = np.stack([track.friction + track.aligning for track in _contact(bench, vehicle, angle, hidden, change, tracks)])
@@ -256,8 +256,8 @@ def _pressures(
 
 def _contact(
     bench: _Bench, vehicle: TrueVehicle, angle: Array, hidden: list[Hidden], change: Modulation | None,
-    tracks: dict[tuple[str, ...], tuple[Track, ...]],
-) -> tuple[Track, ...]:  # fmt: skip
+    tracks: dict[tuple[str, ...], tuple[TrackSeries, ...]],
+) -> tuple[TrackSeries, ...]:  # fmt: skip
     """Both contacts with what is hidden before and in them; each combination is run once."""
     before = [h for h in hidden if h.id in conceal.ANGLE or h.id in conceal.CONTACT]
     key = (*(h.id for h in before), *([LAW] if change is not None else []))
@@ -277,7 +277,7 @@ def _contact(
 
 
 def _modulation(
-    bench: _Bench, vehicle: TrueVehicle, motion: Motion, law: Hidden, tracks: dict[tuple[str, ...], tuple[Track, ...]]
+    bench: _Bench, vehicle: TrueVehicle, motion: FineMotion, law: Hidden, tracks: dict[tuple[str, ...], tuple[TrackSeries, ...]]
 ) -> Modulation:
     """What the generated law does to both tracks, from their torque without it."""
     plain = _contact(bench, vehicle, motion.angle, [], None, tracks)
@@ -308,14 +308,6 @@ _CALIBRATED = (
     "static_torque_Nm", "coulomb_torque_Nm", "stiffness_Nm_rad", "stribeck_speed_rad_s", "heat_capacity_J_K",
     "heat_loss_W_K",
 )
-
-
-def recalibrated_variance(data: CaseData) -> float:
-    """``removable_variance`` of both bags together, less what moving the baseline's parameters can imitate [N2 m2].
-
-    Linear: the added torque is projected off the tangents of this simulator's own baseline (finite differences of 1 %).
-    """
-    return left_over(np.concatenate([bag.torque - bag.torque_without for bag in data.bags]), tangents(data))
 
 
 def tangents(data: CaseData) -> Array:

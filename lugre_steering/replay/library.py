@@ -24,9 +24,9 @@ def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, opti
 
     ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file.
     """
-    model, timing = vehicle_of(vehicle), options or Options()
+    model, timing, items = vehicle_of(vehicle), options or Options(), each(data)
     overall, bags = Comparison(), list[ReplayedBag]()
-    for item in each(data):
+    for item in items:
         path = Path(item.name if isinstance(item, Recording) else item)
         name = item.name if isinstance(item, Recording) else bag_name(path)
         passage = Passage(path, unused_name(name, [bag.name for bag in bags]), model, timing)
@@ -38,5 +38,5 @@ def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, opti
         overall.merge(passage.fit)
     source = model.name if isinstance(vehicle, Vehicle) else str(vehicle)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
-    origin = made("replay", {**asdict(timing), "initial_temperature": None}, sheet, files(data))
+    origin = made("replay", {**asdict(timing), "initial_temperature": None}, sheet, files(items))
     return Replay(SCHEMA, source, model.coordinate.force_unit, timing, tuple(bags), overall.result(), origin)

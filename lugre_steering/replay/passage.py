@@ -11,19 +11,16 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
 
 from lugre_steering.bag import Bag, BagWriter, Block
 from lugre_steering.bag.find import REPLAYED
 from lugre_steering.bag.given import in_stamp_order
 from lugre_steering.bag.load import STRAY_NS
 from lugre_steering.bag.reader import damage_words, shortened
-from lugre_steering.bag.writer import copied
+from lugre_steering.bag.writer import copied, stock_types
 from lugre_steering.chain.step import Records
 from lugre_steering.counted import counted
 from lugre_steering.errors import BagError, DataError
@@ -162,6 +159,8 @@ class Passage:
             residual_time_s=(residuals["stamp_ns"] - start_ns) * 1e-9,
             measured=residuals["measured_torque"],
             residual=residuals["residual"],
+            angle_unit=self.vehicle.coordinate.unit,
+            torque_unit=self.vehicle.coordinate.force_unit,
         )
 
     def _wanted(self, bag: Bag) -> Sequence[Channel]:
@@ -262,7 +261,7 @@ class Passage:
             if len(raw) > PLAN_BYTES:
                 raise DataError(f"more than {PLAN_BYTES} bytes")
             try:
-                message = _types().deserialize_cdr(raw, TRAJECTORY)
+                message = stock_types().deserialize_cdr(raw, TRAJECTORY)
             except Exception as error:  # flipped bytes may raise anything
                 raise DataError("malformed") from error
             self.estimator.set_plan(*planned_angles(message, self._joints, latest_ns))
@@ -397,8 +396,3 @@ def _first_stamp(block: Block, sides: int) -> int | None:
     # One of them, not the mean of two: half of the stamps may be of another clock.
     near = (block.stamp_ns > 0) & (np.abs(offset - usual[(usual.size - 1) // 2]) <= STRAY_NS)
     return int(block.stamp_ns[near].min())
-
-
-@lru_cache(maxsize=1)
-def _types() -> Typestore:
-    return get_typestore(Stores.ROS2_JAZZY)

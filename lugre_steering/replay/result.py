@@ -19,7 +19,7 @@ from lugre_steering.gate import Facts, Gate
 from lugre_steering.online import Agreement
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Finding
-from lugre_steering.result import Result, folder_for, frame, html, of_bag
+from lugre_steering.result import Result, angle_column, folder_for, frame, html, of_bag, torque_column
 from lugre_steering.serialise import ADDED, IN_MEMORY
 
 if TYPE_CHECKING:
@@ -47,12 +47,13 @@ def facts(summary: Mapping[str, Any]) -> Facts:
     }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Series:
     """The estimates of one bag, n of them, and its m residuals; times [s] since the first stamp.
 
     ``angle`` [rad] and ``rubber_temperature`` [degC] by side, ``torque`` (n,) of all tracks [N m]; ``measured`` (m,) [N m] from
-    pressures or a torque sensor and ``residual`` (m,) [N m], measured minus estimate.
+    pressures or a torque sensor and ``residual`` (m,) [N m], measured minus estimate. Of a linear axis ``angle_unit`` and
+    ``torque_unit`` are its own, m and N.
     """
 
     time_s: Array
@@ -62,6 +63,8 @@ class Series:
     residual_time_s: Array
     measured: Array
     residual: Array
+    angle_unit: str
+    torque_unit: str
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class ReplayedBag:
     picture_note: str | None = None
     page: str | None = field(default=None, metadata=ADDED)
     """File of the page beside the record."""
-    series: Series | None = field(default=None, repr=False, metadata=IN_MEMORY)
+    series: Series | None = field(default=None, repr=False, compare=False, metadata=IN_MEMORY)
 
     def kept(self) -> Series:
         """The series, or an error where the results went into a bag."""
@@ -106,9 +109,11 @@ class ReplayedBag:
     def to_frame(self) -> DataFrame:
         """One row per estimate: time, angles, torque, temperatures, and the residual where there is one of the same instant."""
         s = self.kept()
-        columns = {"time_s": s.time_s, **{f"angle_{side}_rad": values for side, values in s.angle.items()}, "torque_Nm": s.torque}
+        columns = {"time_s": s.time_s, **{angle_column(side, s.angle_unit): values for side, values in s.angle.items()}}
+        columns[torque_column("torque", s.torque_unit)] = s.torque
         columns |= {f"rubber_{side}_degC": values for side, values in s.rubber_temperature.items()}
-        for name, values in (("measured_Nm", s.measured), ("residual_Nm", s.residual)):
+        for what, values in (("measured", s.measured), ("residual", s.residual)):
+            name = torque_column(what, s.torque_unit)
             columns[name] = np.full(s.time_s.size, np.nan)
             columns[name][np.searchsorted(s.time_s, s.residual_time_s)] = values
         return frame(columns)
@@ -118,7 +123,8 @@ class ReplayedBag:
 class Replay(Result):
     """Torques that the estimator gives for recordings; ``overall``: agreement with the measured torque over all of them.
 
-    ``torque_unit``: N m, or the force unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was
+    ``vehicle``: the file as it was named, or of a vehicle that was in memory its name; ``torque_unit``: N m, or the force
+    unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was
     named and gave no torque, with the reason.
     """
 
@@ -149,11 +155,12 @@ class Replay(Result):
         from lugre_steering.report.panels import Curve, Panel, panels
 
         s, unit = of_bag(self.bags, bag).kept(), self.torque_unit
-        torque = Panel("torque that the actuators deliver", unit, [Curve(s.time_s, s.torque, "estimate", "improved")])
+        angle_name, torque_name = ("angle", "torque") if s.angle_unit == "rad" else ("position", "force")
+        torque = Panel(f"{torque_name} that the actuators deliver", unit, [Curve(s.time_s, s.torque, "estimate", "improved")])
         if s.measured.size:
             torque.curves.insert(0, Curve(s.residual_time_s, s.measured, "measured", "measured"))
         return panels([
-            Panel("angle", "rad", [Curve(s.time_s, angle, side) for side, angle in s.angle.items()]),
+            Panel(angle_name, s.angle_unit, [Curve(s.time_s, angle, side) for side, angle in s.angle.items()]),
             torque,
             Panel("residual", unit, [Curve(s.residual_time_s, s.residual, "measured minus estimate")]),
         ])  # fmt: skip

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +25,7 @@ from lugre_steering.recording import Kind
 from lugre_steering.report import words
 from lugre_steering.report.available import no_pictures
 from lugre_steering.resources import config_folder
+from lugre_steering.schema import suggestion
 from lugre_steering.serialise import plain
 from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
@@ -34,6 +34,7 @@ from lugre_steering.simulate.paper.figure import checks_table, draw_outcome, out
 from lugre_steering.simulate.paper.outcome import Outcome
 from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
+from lugre_steering.simulate.sensors import Sensing
 from lugre_steering.simulate.write import STORAGES, write_bag
 from lugre_steering.terminal import Prose, point
 from lugre_steering.vehicle import Vehicle
@@ -82,6 +83,8 @@ def motion_named(what: str, vehicle: Vehicle) -> Motion:
     """The motion of a built-in manoeuvre, a YAML or CSV file, or a recorded bag."""
     if what in BUILT_IN:
         return manoeuvres.motion_of(BUILT_IN[what], vehicle)
+    if is_experiment(what):
+        raise DataError(f"'{what}': is an experiment, which the command runs; expected a file or one of {', '.join(BUILT_IN)}")
     path = Path(what)
     if not path.exists():
         names = ", ".join([*BUILT_IN, *EXPERIMENTS, ALL])
@@ -126,6 +129,10 @@ def run_manoeuvre(
 
 def simulation(what: str, vehicle: Vehicle, sensing: Mapping[str, float | int]) -> Simulation:
     """One manoeuvre in memory; ``sensing`` overrides fields of ``Sensing``."""
+    known = [item.name for item in dataclasses.fields(Sensing)]
+    for key, value in sensing.items():
+        if key not in known:
+            raise DataError(f"{key}: got {value!r}, expected no such option; {suggestion(key, known)}")
     name = bag_name(Path(what)).replace("-", "_")
     run = simulate(vehicle, motion_named(what, vehicle), dataclasses.replace(sensing_of(vehicle), **sensing))  # type: ignore[arg-type]
     return Simulation.of(name, run)
@@ -172,7 +179,7 @@ def show_run(console: Console, result: Mapping[str, Any], vehicle: Vehicle) -> N
     angle = words.coordinate_axis(vehicle, "steering angle")
     table.add_row("duration", words.quantity(result["duration_s"], "s"))
     table.add_row(f"largest {units.words(vehicle, 'torque')}", words.torque(vehicle, result["largest_torque_Nm"]))
-    table.add_row(f"largest {angle.name}", words.quantity(math.radians(result["largest_angle_deg"]) * angle.scale, angle.unit))
+    table.add_row(f"largest {angle.name}", words.quantity(result["largest_coordinate"] * angle.scale, angle.unit))
     if result["largest_pressure_Pa"] is not None:
         table.add_row("largest pressure", words.quantity(1e-5 * result["largest_pressure_Pa"], "bar"))
     if vehicle.rubber is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from lugre_steering.chain.lag import lagged
 from lugre_steering.errors import DataError
+from lugre_steering.given_number import check_number
 from lugre_steering.recording import Array, IntArray, Signal
 from lugre_steering.simulate.manoeuvres import STEP_S
 from lugre_steering.vehicle import Vehicle
@@ -43,11 +44,8 @@ class Sensing:
 
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise DataError(f"{name}: got {value:g}, expected a number from {low:g} to {high:g}")
-        if self.seed < 0:
-            raise DataError(f"seed: got {self.seed}, expected 0 or more")
+            check_number(name, getattr(self, name), low, high)
+        check_number("seed", self.seed, 0, whole=True)
 
 
 def instants(duration_s: float, rate_Hz: float, jitter_s: float, rng: np.random.Generator) -> Array:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from lugre_steering.errors import ImplausibleWarning, VehicleFileError
+from lugre_steering.errors import ImplausibleWarning, VehicleFileError, reason
 from lugre_steering.files import COMMENT_MARK, MAKER, comments, write_text
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.check import check
@@ -33,6 +33,8 @@ def load(path: str | Path) -> Vehicle:
 
     What is possible and unlike any real vehicle is warned of (``ImplausibleWarning``).
     """
+    if not isinstance(path, (str, Path)):
+        raise VehicleFileError(f"vehicle: got {path!r}, expected a vehicle or the path of its file")
     file = Path(path)
     reader = Reader(file, VehicleFileError)
     text = reader.text()
@@ -77,7 +79,10 @@ def save(vehicle: Vehicle, path: str | Path, notes: Sequence[str] = ()) -> None:
     """
     content = yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120)
     first = f"{COMMENT_MARK}; not whole without the three dots of its last line\n"
-    write_text(f"{first}{comments(notes)}{content}{END}\n", Path(path))
+    try:
+        write_text(f"{first}{comments(notes)}{content}{END}\n", Path(path))
+    except OSError as error:
+        raise VehicleFileError(f"{path}: cannot be written: {reason(error)}; expected a file in a writable folder") from error
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, Any]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 
 from lugre_steering.vehicle.sections import Vehicle
@@ -11,4 +12,5 @@ from lugre_steering.vehicle.sections import Vehicle
 
 def identity(vehicle: Vehicle) -> str:
     """A hash of all that the vehicle file and its tables say."""
-    return hashlib.sha256(repr(vehicle).encode()).hexdigest()
+    said = ", ".join(f"{item.name}={getattr(vehicle, item.name)!r}" for item in dataclasses.fields(vehicle))
+    return hashlib.sha256(f"Vehicle({said})".encode()).hexdigest()

@@ -16,6 +16,7 @@ from typing import Any
 
 from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.recording import Channel, Kind
+from lugre_steering.result import html
 from lugre_steering.schema import positive, quantity
 
 SIDES = ("left", "right")
@@ -376,6 +377,24 @@ class Vehicle:
             assert self.axle is not None  # checked when the file was read
             ratio = self.axle.kingpin_distance_m / self.axle.wheelbase_m * (1.0 if sensor == "left" else -1.0)
         return Channel(Kind.ANGLE, side, getattr(self.topics, sensor), getattr(self.topics, f"{sensor}_joint"), ratio)
+
+    def __repr__(self) -> str:
+        about = "; ".join(f"{row['what']}: {row['is']}" for row in self._rows())
+        return f"Vehicle({about})"
+
+    def _repr_html_(self) -> str:
+        return html("Vehicle", self.name, self._rows())
+
+    def _rows(self) -> list[dict[str, str]]:
+        """What it is in a few lines; the whole is its file."""
+        about = {
+            "name": self.name,
+            "sides": ", ".join(self.sides),
+            "inputs": ", ".join(channel.topic for channel in self.channels),
+            "effects": ", ".join(effect.id for effect in self.effects) or "none",
+            "laws": str(len(self.laws)),
+        }
+        return [{"what": what, "is": text} for what, text in about.items()]
 
     def replace(self, **changes: Any) -> Vehicle:
         """A copy with some sections changed."""

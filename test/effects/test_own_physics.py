@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -199,6 +200,20 @@ print(round((torque_side(p, model.rubber, time, np.full(50, 0.1), *still) - plai
         ("tier=2", 'tier=2, constants={"table": 1.0}', "constants: got 'table'"),
         ('"stiffness", 1e4)', '"stiffness", 1e4, relative_to="angle")', "relative_to: got 'angle'; did you mean 'max_angle'"),
         ("hooks={", "hooks={} and {", "hooks: got none"),
+        ('id="own_spring"', "id=5", "effect 5: id: got 5, expected a text"),
+        ('id="own_spring"', 'id="A B"', "id: got 'A B', expected a name"),
+        ("tier=2", 'tier="x"', "tier: got 'x', expected a whole number"),
+        ("tier=2", "tier=2, one_sided=1", "one_sided: got 1, expected True or False"),
+        ("tier=2", 'tier=2, places=("stiffness",)', "places: got 'stiffness', expected pairs of names"),
+        ("tier=2", "tier=2, rivals=(5,)", "rivals: got 5, expected texts"),
+        ("tier=2", "tier=2, variants=5", "variants: got 5, expected a function, or None"),
+        ("parameters=(", 'parameters=("x", ', r"parameters\[0\]: got 'x', expected a Parameter"),
+        ("1e4)", '"x")', r"parameters\[0\].scale: got 'x', expected a number"),
+        ("1e4)", '1e4, grid=("x",))', r"parameters\[0\].grid: got 'x', expected numbers"),
+        ('{"torque": torque}', '{"torque": 5}', "hooks.torque: got 5, expected a function"),
+        ('{"torque": torque}', '{"torque": max}', "hooks.torque: got <built-in function max>, expected a function"),
+        ('{"torque": torque}', "torque", "hooks: got <function torque at .*>, expected a mapping"),
+        ("GAIN = 1.0", "raise SystemExit(3)", "cannot be run: SystemExit: 3"),
         ("* shape(theta)", "* shape(thta)", "name 'thta' is not defined"),
         ("def torque(stiffness, theta):", "def torque(stiffness, theta, wound):", "every memory that it names"),
     ],
@@ -206,6 +221,22 @@ print(round((torque_side(p, model.rubber, time, np.full(50, 0.1), *still) - plai
 def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, new: str, words: str) -> None:
     text = OWN_PYTHON if "memory that" not in words else OWN_PYTHON.replace("tier=2", 'tier=2, memory={"wound": 0.0}')
     assert len(refusal(tmp_path / "mine.py", text, old, new, words).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("variants", "words"),
+    [
+        ("lambda seen: 1 / 0", "ZeroDivisionError: division by zero; expected"),
+        ("lambda seen: 5", "TypeError: 'int' object is not iterable; expected"),
+        ("lambda seen: [{'stifness': 1.0}]", "got stifness, expected parameters of it (stiffness)"),
+    ],
+)
+def test_variants_that_fail_are_an_error_of_their_effect(tmp_path: Path, variants: str, words: str) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(OWN_PYTHON.replace("tier=2", f"tier=2, variants={variants}"))
+    told = run("effects", "own_spring", "--effects", file)
+    assert told.returncode == 2
+    assert f"effect 'own_spring': variants: {words}" in " ".join(told.stderr.split())
 
 
 @pytest.mark.usefixtures("catalogue")
@@ -262,6 +293,14 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
         ("stage: parallel_torque", "stage: engine", "expected one of motion"),
         ("scale: 300.0", "scale: many", "a plain number"),
         ("laws:", "lawz:", "no such key"),
+        ("id: chain_ripple", "id: class", "no word of Python"),
+        ("id: chain_ripple", f"id: {'a' * 300}", "at most 64"),
+        ("title: ", 'title: "a\\nb" #', r"title: got 'a\\nb', expected one line"),
+        ("high: 1.0e4", "high: -1.0", "parameters.torque.low: got 0.0, expected less than high"),
+        ("scale: 300.0", "scale: 0.0", "parameters.torque.scale: got 0.0, expected a typical size above 0"),
+        ("scale: 300.0", "scale: -5.0", "parameters.torque.scale: got -5.0, expected"),
+        ("scale: 300.0", "scale: 1.0e+9", "parameters.torque.scale: got 1000000000.0, expected a typical size above 0, at most"),
+        ("grid: [", "grid: [7.0, ", "parameters.pitch.grid: got 7.0, expected values from low"),
         ("laws:", "memory: {wound: 0.0}\nlaws:", "the next value of each memory"),
     ],
 )
@@ -272,6 +311,9 @@ def test_what_is_no_effect_is_refused(tmp_path: Path, old: str, new: str, words:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
+        ("a.yaml", "effects:\n" + 2 * textwrap.indent(RIPPLE.read_text(), "    ").replace("    id:", "  - id:"), "there are 2 of this id"),
+        ("a.yaml", RIPPLE.read_text().replace("pitch", "dt"), "got 'dt', expected a name"),
+        ("a.yaml", RIPPLE.read_text().replace(" pitch", " sin"), "got 'sin', expected a name that is none of the functions"),
         ("a.py", "EFFECT = 3", "got int, expected EFFECT"),
         ("a.py", "import nothing_of_this_name", "cannot be run: ModuleNotFoundError"),
         ("a.txt", "", "expected .py or .yaml"),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lugre_steering.proof import probe
 from lugre_steering.proof.measurable import Chain
-from lugre_steering.proof.probe import MEASURES, Motion, Seen
+from lugre_steering.proof.probe import MEASURES, Seen, Trip
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ DIRECTION = np.sign(TRIP.rate)
         ("surface_patch", lambda m: np.where((m.angle > 0.1) & (m.angle < 0.2), -0.15, 0.0) * BASE, -0.15),
     ],
 )
-def test_measures_read_what_was_put_in(name: str, extra: Callable[[Motion], Array], expected: float) -> None:
+def test_measures_read_what_was_put_in(name: str, extra: Callable[[Trip], Array], expected: float) -> None:
     value = MEASURES[name][2](Seen(TRIP, BASE + extra(TRIP), BASE, SLIDING))
     assert value == pytest.approx(expected, rel=0.02)
 

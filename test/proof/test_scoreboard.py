@@ -16,13 +16,13 @@ import pytest
 from bag_making import slowly_sampled
 from hypothesis import given
 from hypothesis import strategies as st
+from proof_page import page_lines
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError
 from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, simulator, sizing
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
-from lugre_steering.proof.table import page_lines
 
 Row = dict[str, Any]
 

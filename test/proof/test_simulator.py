@@ -23,7 +23,7 @@ from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.proof import hydraulics, manoeuvres, simulator
 from lugre_steering.proof.conceal import ZONED
 from lugre_steering.proof.contact import HiddenContact, Patches, patches, run_track
-from lugre_steering.proof.made import beside
+from lugre_steering.proof.made import beside, recalibrated
 from lugre_steering.proof.rubber import complex_modulus, rubber_table
 from lugre_steering.proof.simulator import (
     EFFECT_IDS,
@@ -31,7 +31,6 @@ from lugre_steering.proof.simulator import (
     Case,
     Concealed,
     noise_variance,
-    recalibrated_variance,
     removable_variance,
     simulate_case,
     write_case,
@@ -308,7 +307,7 @@ def test_recalibration_hides_some_effects_more_than_others(sheet: Sheet) -> None
     left = {}
     for effect in ("heat_partition", "end_stop"):
         data = simulate_case(short_case(Concealed(effect)), sheet)
-        left[effect] = recalibrated_variance(data) / np.mean([removable_variance(bag) for bag in data.bags])
+        left[effect] = recalibrated(SecondCase(data)) / np.mean([removable_variance(bag) for bag in data.bags])
     assert left["heat_partition"] < 0.05
     assert 0.1 < left["end_stop"] < 1.0
 
@@ -317,7 +316,7 @@ def test_an_effect_beside_another_keeps_only_what_the_other_cannot_imitate(sheet
     """Two constants differ by nothing but their arms; an end stop and a constant have little in common."""
     alike = simulate_case(short_case(Concealed("slope_bias"), Concealed("pressure_offset")), sheet)
     apart = simulate_case(short_case(Concealed("slope_bias"), Concealed("end_stop")), sheet)
-    alone = recalibrated_variance(simulate_case(short_case(Concealed("slope_bias")), sheet))
+    alone = recalibrated(SecondCase(simulate_case(short_case(Concealed("slope_bias")), sheet)))
     assert beside(SecondCase(alike))["slope_bias"] < 0.3 * alone
     assert beside(SecondCase(apart))["slope_bias"] == pytest.approx(alone, rel=0.4)
 

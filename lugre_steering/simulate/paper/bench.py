@@ -19,6 +19,7 @@ from lugre_steering.vehicle import Initial, Vehicle
 
 PUBLISHED_EXTREMES_NM = (49_980.0, 48_740.0, 48_580.0, 46_510.0)
 """Liang et al. 2022, section 4.2: largest torque at tc, tf, ti, tl."""
+RATES_DEG_S = (2.0, 4.0, 6.0, 8.0, 10.0)
 MOVING_RAD_S = 1e-3
 
 

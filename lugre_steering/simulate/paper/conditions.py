@@ -15,6 +15,7 @@ from lugre_steering.report import words
 from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, Motion, motion_of
 from lugre_steering.simulate.paper.bench import (
+    RATES_DEG_S,
     Bench,
     arrivals,
     at_temperature,
@@ -28,7 +29,6 @@ from lugre_steering.simulate.paper.outcome import Check, Curve, Outcome, Panel
 from lugre_steering.vehicle import pavements
 
 AMBIENT_DEGC = (-20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0)
-RATES_DEG_S = (2.0, 4.0, 6.0, 8.0, 10.0)
 PAST_NEUTRAL_DEG = (0.0, 10.0, 20.0)
 AFTER_REVERSAL_DEG = 10.0
 RANKING = (("dry_concrete", "dry_asphalt"), ("wet_asphalt",), ("wet_concrete",), ("dry_earth",), ("gravel",))

@@ -12,6 +12,7 @@ from lugre_steering.simulate import plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, LIMIT_DEG, motion_of
 from lugre_steering.simulate.paper.bench import (
     PUBLISHED_EXTREMES_NM,
+    RATES_DEG_S,
     Bench,
     arrivals,
     direction,
@@ -29,7 +30,6 @@ from lugre_steering.vehicle.tables import limit_device
 
 TOLERANCE = 0.015
 EQUAL = 0.005
-RATES_DEG_S = (2.0, 4.0, 6.0, 8.0, 10.0)
 PARTS = ("elastic", "damping", "aligning")
 
 
