@@ -37,10 +37,10 @@ def diagnose(
     check_number("seed", seed, 0, whole=True)
     check_number("material", material, 0.0, 1.0)
     model = vehicle_of(vehicle)
-    items = each(data)
-    recordings = given_recordings(items, model.channels, progress)
     unsought = [without] if isinstance(without, str) else list(without)
     with leaving_out(unsought), one_blas_thread():
+        items = each(data)
+        recordings = given_recordings(items, model.channels, progress)
         found = diagnose_recordings(recordings, model, seed=seed, material=material, progress=progress)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
     return replace(found, provenance=made("diagnose", {"seed": seed, "material": material, "without": unsought}, sheet, files(items)))
