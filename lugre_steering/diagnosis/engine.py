@@ -47,6 +47,8 @@ MATERIAL_SHARE = 0.005
 
 MISPLACED_RAD = 0.05
 """Error of an angle's zero (3 deg) that is no small misalignment."""
+UNLIKE_SHEET = {"wiring_suspect", "noisy_sensor", "dead_sensor"}
+"""Findings of the check by comparison with the vehicle file, which may be what is wrong."""
 WORTH_A_SHEET = 0.5
 """Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
@@ -78,6 +80,8 @@ def diagnose_recordings(
     progress("checking the data")
     case = Case(vehicle, [inspect(recording, vehicle) for recording in recordings])
     if case.blocking:
+        if (wrong := _sheet_of_another(case)) is not None:
+            return case.wrong_sheet(wrong)
         return case.insufficient("The data must be put right first. " + " ".join(case.blocking), more=case.miswired())
     progress("estimating the motion")
     try:
@@ -109,7 +113,8 @@ def _searched(
         case.found(clocks.findings)
         return case.wrong_sheet(suspected)
     if lacking := _lacking(problem, samples):
-        return case.undetermined(problem, lacking)
+        wrong = _put_right(problem) if samples >= MIN_SAMPLES else None
+        return case.undetermined(problem, lacking) if wrong is None else case.wrong_sheet(wrong)
     progress("recalibrating the baseline")
     done = investigate(problem, seed, progress)
     if suspected is not None and not physics_instead(problem, done.found.final.effects, suspected):
@@ -130,6 +135,24 @@ def _searched(
         done = investigate(Problem(case.vehicle, runs), seed, progress)
     wrong = _misplaced(done) or _wrong_entry(done)
     return (done, clocks) if wrong is None else case.wrong_sheet(wrong)
+
+
+def _sheet_of_another(case: Case) -> WrongSheet | None:
+    """A mistake in the vehicle file that explains the recordings, where they had only been held to be none of this machine for being unlike
+    it: as wires, as a contact that never slides, or as angles too noisy for a contact so stiff."""
+    if not {finding.finding for quality in case.qualities for finding in quality.blocking} <= UNLIKE_SHEET:
+        return None
+    try:
+        problem = synchronised(in_pieces(case.usable)[0], case.vehicle).problem
+    except DataError:
+        return None
+    return _put_right(problem) if int(split(problem).fit.sum()) >= MIN_SAMPLES else None
+
+
+def _put_right(problem: Problem) -> WrongSheet | None:
+    """An entry of the vehicle file with which, put right, next to nothing is left."""
+    wrong = wrong_entry(problem)
+    return wrong if wrong is not None and wrong.suspects[0].puts_right else None
 
 
 def _misplaced(done: Finished) -> WrongSheet | None:

@@ -22,7 +22,7 @@ from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.model import Model, baseline_parameters, build_model
 from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
 
 LEAST_ARM = 0.1
@@ -342,8 +342,13 @@ class Problem:
     @cached_property
     def _sheet(self) -> dict[str, float]:
         """What the record of the vehicle file holds of the fields that calibrations change; read one by one it takes long."""
+        return {field: self.sheet[field] for field in {"coulomb_torque", *(f for c in self.calibrations for f in c.fields)}}
+
+    @cached_property
+    def sheet(self) -> dict[str, float]:
+        """The baseline's fields of the parameter record, as the vehicle file has them."""
         record = self.model.parameters[0][0]
-        return {field: float(record[field]) for field in {"coulomb_torque", *(f for c in self.calibrations for f in c.fields)}}
+        return {field: float(record[field]) for field in (*baseline_parameters(self.vehicle), "aligning_torque")}
 
     @cached_property
     def _at(self) -> dict[str, int | slice]:
