@@ -223,16 +223,16 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
         return None
     floor = float(np.count_nonzero(thin.valid))
     left, excess, beside_names = found[0].cost - floor, baseline.cost - floor, named.cost - floor
-    if excess <= 0.0 or left > min(1.0 - EXPLAINED, BETTER * rival) * excess:
-        return None
     # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
     clearly = max((1.0 - BETTER) * beside_names, SURPRISE)
-    if effects and beside_names - left < clearly:
-        # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
-        claims = [suspect for suspect in found if suspect.claims_more and suspect.cost - floor - beside_names < clearly]
-        if not claims:
-            return None
+    # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
+    claims = [suspect for suspect in found if effects and suspect.claims_more and suspect.cost - floor - beside_names < clearly]
+    if claims:
         found = [*claims, *(suspect for suspect in found if suspect not in claims)]
+        return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet claims what the recordings do not show")
+    most = min(1.0 - EXPLAINED, BETTER * rival) * excess
+    if excess <= 0.0 or left > most or (effects and beside_names - left < clearly):
+        return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 
 
