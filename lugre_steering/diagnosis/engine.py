@@ -178,7 +178,11 @@ def _wrong_entry(done: Finished) -> WrongSheet | None:
         return None
     form = done.beside_form
     rival = 1.0 if form is None else max(excess(form.problem, form.found.baseline, form.fitted), 0.0) / left
-    return wrong_entry(done.problem, done.found.final.effects, rival)
+    wrong = wrong_entry(done.problem, done.found.final.effects, rival)
+    if wrong is not None or form is None or not excess(form.problem, form.found.baseline, form.fitted) > WORTH_A_SHEET:
+        return wrong
+    # Where friction is of another form than the model's, what that makes is no error of any entry.
+    return wrong_entry(form.problem.unshaped(), form.found.final.effects)
 
 
 def _other_clocks(pieces: Sequence[Recording], clocks: Synchronised, final: Fit) -> Synchronised | None:

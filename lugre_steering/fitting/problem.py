@@ -20,7 +20,7 @@ from lugre_steering.chain.step import torque_in_phases
 from lugre_steering.data.dataset import Run
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, baseline_parameters, build_model
 from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
@@ -284,6 +284,23 @@ class Problem:
         bent._last_bending = None, np.zeros(0)
         bent.shapes = int(bent.bends.shape[1] - self.bends.shape[1] + self.shapes)
         return bent
+
+    def unshaped(self) -> Problem:
+        """The same without the bends of names."""
+        plain = copy(self)
+        plain.bends = self.bends[:, : self.bends.shape[1] - self.shapes]
+        plain._last_bending, plain.shapes = (None, np.zeros(0)), 0
+        return plain
+
+    def of_sheet(
+        self, vehicle: Vehicle | None = None, calibrations: Sequence[SheetValue] | None = None, runs: Sequence[Run] | None = None,
+        kept: IntArray | slice = slice(None),
+    ) -> Problem:
+        """The same with another sheet, other calibrations, or ``runs`` of the samples ``kept``, as bent and in as much doubt."""
+        calibrations = self.calibrations if calibrations is None else calibrations
+        other = Problem(vehicle or self.vehicle, runs or self.runs, calibrations, bends=self.bends[kept])
+        other.doubt, other.typical, other.shapes = self.doubt, self.typical, self.shapes
+        return other
 
     def over(self, runs: Sequence[Run]) -> Problem:
         """The same vehicle, with as many places for laws, in other runs; without bends."""

@@ -258,7 +258,8 @@ def thinned(problem: Problem, most: int = SAMPLES, rate_Hz: float = RATE_HZ) -> 
         stride = max(1, round(1.0 / rate_Hz / step), -(-total // most) if step < 0.1 else 1)
         runs.append(_every(run, stride))
         kept.append(first + np.arange(0, run.time.size, stride))
-    return Problem(problem.vehicle, runs, problem.calibrations), np.concatenate(kept)
+    every = np.concatenate(kept)
+    return problem.of_sheet(runs=runs, kept=every), every
 
 
 def _doubted(problem: Problem) -> tuple[Problem, float]:
@@ -269,7 +270,7 @@ def _doubted(problem: Problem) -> tuple[Problem, float]:
     misfit = max(_fitted(problem).cost / max(int(np.count_nonzero(problem.valid)), 1), 1.0)
     step = max(float(run.time[1] - run.time[0]) for run in problem.runs)
     doubt = misfit * max(ERROR_S / step, 1.0)
-    return Problem(problem.vehicle, [replace(run, sigma=run.sigma * doubt**0.5) for run in problem.runs], problem.calibrations), doubt
+    return problem.of_sheet(runs=[replace(run, sigma=run.sigma * doubt**0.5) for run in problem.runs]), doubt
 
 
 def _every(run: Run, stride: int) -> Run:
@@ -310,7 +311,7 @@ def _levels(problem: Problem) -> Iterator[_Tried]:
 
     def tried(key: str, values: Sequence[SheetValue], starts: Sequence[float], factor: Callable[[float], float] | None) -> _Tried:
         freed = [value.name for value in values]
-        trial = Problem(problem.vehicle, problem.runs, [*values, *(c for c in known if c.name not in freed)])
+        trial = problem.of_sheet(calibrations=[*values, *(c for c in known if c.name not in freed)])
         begun = (np.concatenate([[start], trial.start()[1:]]) for start in starts)
         result = min((_fitted(trial, start=x) for x in begun), key=lambda each: each.cost)
         return _tried(problem, trial, result, key, None if factor is None else factor(float(result.x[0])), freed)
@@ -409,7 +410,7 @@ def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:
     vehicle: Vehicle = problem.vehicle.replace(
         hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, **cylinders})
     )
-    return Problem(vehicle, [with_hydraulics(run, vehicle) for run in problem.runs], problem.calibrations)
+    return problem.of_sheet(vehicle, runs=[with_hydraulics(run, vehicle) for run in problem.runs])
 
 
 def _tried(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None, freed: Sequence[str] = ()) -> _Tried:

@@ -300,6 +300,16 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
     assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
 
 
+@pytest.mark.parametrize("noise", [1e-4, 1e-2])
+def test_the_noise_of_a_slow_channel_is_not_its_motion(noise: float) -> None:
+    """10 Hz, and a start or a stop in nearly every second: up to 0.05 rad from sample to sample, of which not even thrice the noise is left."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 120.0, 0.1)
+    rate = np.repeat(rng.uniform(-0.5, 0.5, 120) * (rng.random(120) > 0.4), 10)
+    seen = np.cumsum(rate) * 0.1 + 0.1 * np.sin(4.0 * time) + noise * rng.standard_normal(time.size)
+    assert 0.7 * noise < sensed(Signal(time, seen)).noise < 2.5 * noise
+
+
 def other_cylinders(changed: dict[str, dict[str, Any]]) -> Vehicle:
     assert VEHICLE.hydraulics is not None
     cylinders = VEHICLE.hydraulics.cylinders
