@@ -19,6 +19,7 @@ from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.level_jump import level_jumps
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.errors import DataError
@@ -94,6 +95,7 @@ def diagnose_recordings(
     if isinstance(searched, Diagnosis):
         return searched
     done, clocks = searched
+    case.found(level_jumps(done))
     case.found(weather_findings(in_doubt(done.problem, done.fitted, done.found.final), done.found.final))
     progress("verifying on held-out data")
     result = conclude(done, case.findings, pieces, seed=seed, material=material, progress=progress)

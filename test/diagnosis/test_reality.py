@@ -302,7 +302,7 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
 
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
 def test_the_noise_of_a_slow_channel_is_not_its_motion(noise: float) -> None:
-    """10 Hz, and a start or a stop in nearly every second: up to 0.05 rad from sample to sample, of which not even thrice the noise is left."""
+    """10 Hz, and a start or a stop in nearly every second: up to 0.05 rad between samples, of which not thrice the noise is left."""
     rng = np.random.default_rng(4)
     time = np.arange(0.0, 120.0, 0.1)
     rate = np.repeat(rng.uniform(-0.5, 0.5, 120) * (rng.random(120) > 0.4), 10)
