@@ -135,7 +135,7 @@ def _searched(
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
         case.found(disturbed)
         done = investigate(Problem(case.vehicle, runs), seed, progress)
-    wrong = _misplaced(done) or _wrong_entry(done)
+    wrong = _wrong_entry(done) or _misplaced(done)  # an entry must do better than any name, a zero too
     return (done, clocks) if wrong is None else case.wrong_sheet(wrong)
 
 
