@@ -22,8 +22,6 @@ FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 """Fourth difference: blind to motion and to pump ripple far below the sampling rate, sqrt(70) times white noise."""
 SIXTH = np.convolve(FOURTH, [1.0, -2.0, 1.0])
 """Sixth difference, of slow channels: blind to motion up to a tenth of the sampling rate, sqrt(924) times white noise."""
-CALM = 0.1
-"""Share of a slow channel's samples that motion leaves alone at least: their differences, the least, are those of its noise."""
 WINDOW_S = 1.0
 DITHERED = 0.3
 """White noise, in steps of the resolution, from which it makes the error of rounding white too."""
@@ -72,11 +70,11 @@ def resolution(value: Array) -> float:
 
 def white_noise(signal: Signal) -> float:
     """Standard deviation of the white part of a channel: the usual one of windows of a second without a lost message; of a slow channel,
-    each of whose windows holds a start or a stop, that of its calmest samples."""
+    each of whose windows holds a start or a stop, the usual one of its samples."""
     spacing = np.diff(signal.time_s)
     period = float(np.median(spacing))
     if period > 1.1 / SLOWEST_HZ:
-        return _calm_noise(signal, spacing, period)
+        return _slow_noise(signal, spacing, period)
     whole = sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
     squares = np.convolve(signal.value, FOURTH, mode="valid") ** 2
     window = (signal.time_s[2:-2] / WINDOW_S).astype(np.int64)
@@ -89,12 +87,12 @@ def white_noise(signal: Signal) -> float:
     return float(np.sqrt(np.median(mean) / (FOURTH @ FOURTH)))
 
 
-def _calm_noise(signal: Signal, spacing: Array, period: float) -> float:
+def _slow_noise(signal: Signal, spacing: Array, period: float) -> float:
     if spacing.size < SIXTH.size - 1:
         return 0.0
     whole = sliding_window_view(spacing, SIXTH.size - 1).max(axis=1) < 1.5 * period
     size = np.abs(np.convolve(signal.value, SIXTH, mode="valid"))[whole]
-    return float(np.quantile(size, CALM) / norm.ppf(0.5 + 0.5 * CALM) / np.sqrt(SIXTH @ SIXTH)) if size.size else 0.0
+    return float(np.median(size) / norm.ppf(0.75) / np.sqrt(SIXTH @ SIXTH)) if size.size else 0.0
 
 
 def local_noise(signal: Signal, period: float) -> Array:
