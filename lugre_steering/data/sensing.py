@@ -8,7 +8,7 @@ A sensor worse than its sheet is believed; one that seems better keeps the sheet
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -69,12 +69,10 @@ def resolution(value: Array) -> float:
 
 
 def white_noise(signal: Signal) -> float:
-    """Standard deviation of the white part of a channel: the usual one of windows of a second without a lost message; of a slow channel,
-    each of whose windows holds a start or a stop, the usual one of its samples."""
+    """Standard deviation of the white part of a channel: the usual one of windows of a second without a lost message. Of a slow channel
+    it holds what the motion does between the samples, which is as unknown as noise; ``own_noise`` does not."""
     spacing = np.diff(signal.time_s)
     period = float(np.median(spacing))
-    if period > 1.1 / SLOWEST_HZ:
-        return _slow_noise(signal, spacing, period)
     whole = sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
     squares = np.convolve(signal.value, FOURTH, mode="valid") ** 2
     window = (signal.time_s[2:-2] / WINDOW_S).astype(np.int64)
@@ -87,7 +85,12 @@ def white_noise(signal: Signal) -> float:
     return float(np.sqrt(np.median(mean) / (FOURTH @ FOURTH)))
 
 
-def _slow_noise(signal: Signal, spacing: Array, period: float) -> float:
+def own_noise(signal: Signal) -> float:
+    """The same, of the sensor alone: of a slow channel, each of whose windows holds a start or a stop, the usual one of its samples."""
+    spacing = np.diff(signal.time_s)
+    period = float(np.median(spacing))
+    if period < 1.1 / SLOWEST_HZ:
+        return white_noise(signal)
     if spacing.size < SIXTH.size - 1:
         return 0.0
     whole = sliding_window_view(spacing, SIXTH.size - 1).max(axis=1) < 1.5 * period
@@ -157,7 +160,7 @@ def samples_in(duration_s: float, period: float) -> int:
 def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -> str | None:
     """What a channel shows of its sensor that is clearly worse than its noise by the vehicle file, in words; None if it is not."""
     even, scatter = evened(signal)
-    sensor = sensed(even)
+    sensor = replace(sensed(even), noise=own_noise(even))
     said = []
     if sensor.coarse and sensor.sigma() > WORSE * sheet:
         said.append(f"steps of {say(sensor.resolution)}")

@@ -22,8 +22,6 @@ EXPLAINED, FURTHER = 0.5, 0.1
 the recording the second takes a quarter of the first."""
 SURE = 5.0
 """Standard deviations that a jump must be, as errors last."""
-TELLING = {"surface_patch", "load_transfer"}
-"""Names that say it themselves."""
 
 
 class Jump(NamedTuple):
@@ -37,8 +35,8 @@ class Jump(NamedTuple):
 def level_jumps(done: Finished) -> dict[str, Finding]:
     """By recording: when its friction jumped, and by how much; none where a name says so."""
     problem, final = done.problem, done.found.final
-    if TELLING & {candidate.effect.id for candidate, _ in final.effects}:
-        return {}
+    if any("level" in candidate.effect.hooks for candidate, _ in final.effects):
+        return {}  # a name says it itself
     # What acts in parallel, as inertia, gravity or viscous friction, is no level of friction.
     friction = (problem.predict_all(final.x) if final.effects else final.prediction) - _conservative(problem)
     error, found = problem.measured - final.prediction, dict[str, Finding]()

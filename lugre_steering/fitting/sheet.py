@@ -55,6 +55,8 @@ FAR_BETTER, LITTLE = 0.5, 0.1
 bound; and share of what the baseline leaves from which they are tried there at all."""
 KEPT = 0.5
 """Share of what named physics takes that it must still take with a suspected entry put right, to be no part of that entry's error."""
+CLAIMED = 0.5
+"""Share of what an entry claims that is there at most, if its error is what names take back."""
 PUT_RIGHT = 0.03
 """Error that is left, as share of the torque, with which a sheet counts as put right."""
 FORETOLD = 0.5
@@ -318,7 +320,7 @@ def _levels(problem: Problem) -> Iterator[_Tried]:
 
     for level in levels(problem.vehicle, problem.sheet):
         found = tried(level.key, [level.value], level.starts, level.factor)
-        claims = level.value is CONSERVATIVE and abs(found.suspect.factor or 0.0) < 1.0
+        claims = level.value is CONSERVATIVE and abs(found.suspect.factor or 0.0) < CLAIMED
         yield found._replace(suspect=replace(found.suspect, claims_more=claims))
     other = tried("several entries: another vehicle", [LEVEL, STIFF, PRESSURES], (0.0,), None)
     yield other._replace(suspect=replace(other.suspect, cost=SEVERAL * other.suspect.cost))

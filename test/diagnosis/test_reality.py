@@ -20,7 +20,7 @@ from lugre_steering.data.dataset import prepare, with_hydraulics
 from lugre_steering.data.dead import inspect_dead
 from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
 from lugre_steering.data.quality import inspect
-from lugre_steering.data.sensing import sensed
+from lugre_steering.data.sensing import own_noise, sensed
 from lugre_steering.data.stamps import evened
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.engine import diagnose_recordings
@@ -307,7 +307,7 @@ def test_the_noise_of_a_slow_channel_is_not_its_motion(noise: float) -> None:
     time = np.arange(0.0, 120.0, 0.1)
     rate = np.repeat(rng.uniform(-0.5, 0.5, 120) * (rng.random(120) > 0.4), 10)
     seen = np.cumsum(rate) * 0.1 + 0.1 * np.sin(4.0 * time) + noise * rng.standard_normal(time.size)
-    assert 0.7 * noise < sensed(Signal(time, seen)).noise < 2.5 * noise
+    assert 0.7 * noise < own_noise(Signal(time, seen)) < 2.5 * noise
 
 
 def other_cylinders(changed: dict[str, dict[str, Any]]) -> Vehicle:
