@@ -39,12 +39,13 @@ RATE_LIMIT = 100.0  # rad/s, far beyond any steering: such a rate counts as not 
 AIR_LIMIT_DEGC = 100.0  # no air is warmer or colder: kelvin, or no temperature at all
 
 
+FARTHEST = {"rad": np.pi, "m": 100.0}
+"""Largest magnitude of an angle, or of the position of a linear axis, by its unit: beyond, it comes in another one."""
 Samples = ArrayLike | tuple[ArrayLike, ArrayLike]
 """One channel as arrays: values on the clock of the recording, or a pair of its own times [s] and values."""
 BySide = ArrayLike | Mapping[str, Samples]
 _LIMITS = {
-    "angle/": (np.pi, "rad"), "rate/": (RATE_LIMIT, "rad/s"), "pressure/": (1e9, "Pa"), "measured_torque": (1e9, "N m"),
-    "air_temperature": (AIR_LIMIT_DEGC, "degC"),
+    "rate/": (RATE_LIMIT, "rad/s"), "pressure/": (1e9, "Pa"), "measured_torque": (1e9, "N m"), "air_temperature": (AIR_LIMIT_DEGC, "degC"),
 }  # fmt: skip
 """Largest magnitude of each channel: beyond, it comes in another unit."""
 
@@ -62,8 +63,8 @@ class Kind(IntEnum):
 class Channel:
     """One wanted quantity and the topic (relative name) that carries it; ``joint`` selects inside a JointState.
 
-    With ``ackermann`` (signed kingpin distance over wheelbase) the topic carries the other track, and this one's angle
-    follows from the steering geometry.
+    ``unit``: of an angle, "rad", or "m" of a linear axis. With ``ackermann`` (signed kingpin distance over wheelbase) the topic
+    carries the other track, and this one's angle follows from the steering geometry.
     """
 
     kind: Kind
@@ -71,6 +72,7 @@ class Channel:
     topic: str
     joint: str = ""
     ackermann: float = 0.0
+    unit: str = "rad"
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +157,7 @@ class Recording:
         rate: BySide | None = None,
         air: Samples | None = None,
         name: str = "recording",
+        unit: str = "rad",
     ) -> Recording:
         """A recording made of arrays, for everything that takes a bag.
 
@@ -162,8 +165,11 @@ class Recording:
         samples}, or one array for the joint 'left' of a vehicle with a single one; ``torque`` [N m] of a torque sensor, or
         ``pressure`` [Pa] as {line: samples}, gauge or absolute as the vehicle file says; ``air`` [degC]. Samples are an array
         (n,), or a pair (time, array) where a sensor has a clock of its own. Samples that are no finite number are left out and
-        counted in ``rejected``. ``DataError`` for anything that cannot be meant.
+        counted in ``rejected``. ``unit``: "m" where ``angle`` holds positions [m] of a linear axis, ``rate`` speeds [m/s] and ``torque``
+        forces [N]. ``DataError`` for anything that cannot be meant.
         """
+        if unit not in FARTHEST:
+            raise DataError(f"unit: got {unit!r}, expected {' or '.join(FARTHEST)}")
         given = {f"angle/{side}": samples for side, samples in _by_side(angle).items()}
         given |= {f"rate/{side}": samples for side, samples in _by_side({} if rate is None else rate).items()}
         lines = {} if pressure is None else pressure
@@ -174,7 +180,7 @@ class Recording:
         clock = _clock(time, "time")
         signals, rejected = {}, {}
         for label, samples in given.items():
-            signals[label], lost = _signal(label, samples, clock)
+            signals[label], lost = _signal(label, samples, clock, unit)
             if lost:
                 rejected[label] = {"not_finite": lost}
         start = min(float(signal.time_s[0]) for signal in signals.values())
@@ -187,6 +193,9 @@ class Recording:
             name=name, start_ns=max(round(start * 1e9), 1), angle=part("angle/"), pressure=part("pressure/"), rate=part("rate/"),
             air_temperature=signals.get("air_temperature"), measured_torque=signals.get("measured_torque"), rejected=rejected,
         )  # fmt: skip
+
+
+AXIS = "; unit='m' says that they are positions [m] of a linear axis"
 
 
 def _by_side(samples: BySide) -> Mapping[str, Samples]:
@@ -209,7 +218,7 @@ def _seconds(time: ArrayLike) -> ArrayLike:
     return np.asarray(time) / np.timedelta64(1, "s") if kind == "m" else time
 
 
-def _signal(label: str, samples: Samples, clock: Array) -> tuple[Signal, int]:
+def _signal(label: str, samples: Samples, clock: Array, angles_in: str) -> tuple[Signal, int]:
     """The finite samples of one channel, checked, and how many are left out."""
     if isinstance(samples, tuple):
         if len(samples) != 2:
@@ -221,10 +230,11 @@ def _signal(label: str, samples: Samples, clock: Array) -> tuple[Signal, int]:
     finite = np.isfinite(value)
     if not finite.any():
         raise DataError(f"{label}: got no finite sample, expected some")
-    limit, unit = next(bound for kind, bound in _LIMITS.items() if label.startswith(kind))
+    limits = {"angle/": (FARTHEST[angles_in], angles_in), **_LIMITS}
+    limit, unit = next(bound for kind, bound in limits.items() if label.startswith(kind))
     largest = float(np.abs(value[finite]).max())
     if largest > limit:
-        raise DataError(f"{label}: got {largest:g}, expected values in {unit} up to {limit:g}")
+        raise DataError(f"{label}: got {largest:g}, expected values in {unit} up to {limit:g}{AXIS if unit == 'rad' else ''}")
     return Signal(clock[finite], value[finite]), int((~finite).sum())
 
 

@@ -85,3 +85,31 @@ def test_a_joint_that_never_comes_back_gives_no_verdict() -> None:
     times = np.arange(3.0, 57.0, 2.0)
     found = find_bursts(joint, noise(joint.time.size) + kicks(joint.time, times, np.ones(times.size), 40.0))
     assert found is None or not found.matter
+
+
+def trapezoids(seed: int) -> Run:
+    """A joint that goes from rest to rest, each time elsewhere and at another speed: no state comes again."""
+    rng, rate = np.random.default_rng(seed), []
+    for way in rng.uniform(0.2, 1.0, 40) * (-1.0) ** np.arange(40):
+        up = np.linspace(0.0, way, round(rng.uniform(5, 40)), endpoint=False)
+        rate += [*up, *np.full(round(rng.uniform(20, 120)), way), *up[::-1], *np.zeros(round(rng.uniform(20, 100)))]
+    time = np.arange(len(rate)) * STEP_S
+    theta = np.cumsum(rate)[None, :] * STEP_S
+    omega, alpha = motion(time, theta)
+    none = np.zeros((1, 1, time.size))
+    return Run(
+        "made up", time, theta, omega, alpha, none, none[0], none[0], none[0], none[0, 0], none[0, 0] + 1.0, np.ones(time.size, bool),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("own", [True, False])
+def test_bursts_at_starts_are_of_the_motion_and_others_are_not(own: bool, seed: int) -> None:
+    """Each start lets go a little later, and by another size; the same bursts at any time come from outside."""
+    joint, rng = trapezoids(seed), np.random.default_rng(seed + 100)
+    moves = np.abs(joint.omega[0]) > 0.02
+    starts = joint.time[1:][moves[1:] & ~moves[:-1]]
+    times = starts + rng.uniform(0.0, 0.15, starts.size) if own else np.sort(rng.uniform(0.0, joint.time[-1], starts.size))
+    sizes = rng.uniform(20.0, 60.0, times.size) * np.where(rng.random(times.size) < 0.5, -1.0, 1.0)
+    found = find_bursts(joint, noise(joint.time.size, seed) + kicks(joint.time, times, sizes, 1.0))
+    assert (found is not None and found.matter) == (not own)

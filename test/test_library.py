@@ -249,6 +249,8 @@ TIME = np.arange(5) * 0.1
         ({"angle": np.zeros(4)}, "angle/left: got 4 samples for 5 times"),
         ({"angle": np.zeros((5, 2))}, "angle/left: got an array of shape"),
         ({"angle": np.full(5, 30.0)}, "angle/left: got 30, expected values in rad"),
+        ({"angle": np.full(5, 300.0), "unit": "m"}, "angle/left: got 300, expected values in m up to 100"),
+        ({"unit": "deg"}, "unit: got 'deg', expected rad or m"),
         ({"angle": np.full(5, np.nan)}, "angle/left: got no finite sample"),
         ({"angle": ["a"] * 5}, "angle/left: got list, expected an array of numbers"),
         ({"torque": (TIME,)}, "measured_torque: got 1 arrays"),
@@ -277,6 +279,11 @@ def test_samples_that_are_no_number_are_left_out_and_counted() -> None:
     made = ls.Recording.from_arrays(TIME, angle=np.array([0.0, np.nan, 0.1, np.inf, 0.2]), torque=np.ones(5))
     assert made.rejected == {"angle/left": {"not_finite": 2}}
     np.testing.assert_allclose(made.angle["left"].time_s, [0.0, 0.2, 0.4])
+
+
+def test_positions_of_a_linear_axis_are_metres_where_that_is_said() -> None:
+    made = ls.Recording.from_arrays(TIME, angle=np.full(5, 12.0), unit="m")
+    assert made.angle["left"].value.tolist() == [12.0] * 5
 
 
 UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})

@@ -18,6 +18,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
+from lugre_steering import replay
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
@@ -29,7 +30,7 @@ from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.report.page import write_report
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.errors import VehicleFileError
+from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.estimator import Estimator
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Recording, Signal
@@ -368,10 +369,10 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
     write_recorded(real, tmp_path / "bag", 40.0)
     found = {e.id: e.parameters for e in diagnose([tmp_path / "bag"], base).effects}
     assert set(found) == {"kingpin_jacking", "viscous_friction", "yaw_inertia"}
-    for name, parameter, value in (
-        ("kingpin_jacking", "amplitude", 350.0), ("viscous_friction", "sigma_2", 30.0), ("yaw_inertia", "inertia", 40.0),
+    for name, parameter, value, error in (
+        ("kingpin_jacking", "amplitude", 350.0, 0.01), ("viscous_friction", "sigma_2", 30.0, 0.12), ("yaw_inertia", "inertia", 40.0, 0.1),
     ):  # fmt: skip
-        assert found[name][parameter].value == pytest.approx(value, rel=0.1)
+        assert found[name][parameter].value == pytest.approx(value, rel=error)
 
 
 @pytest.mark.parametrize(("engage", "shift"), [(0.2, 0.3), (0.5, -0.3)])
@@ -457,3 +458,19 @@ def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_s
     assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.02)
     assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
     assert result.json["augmented"]["heldout_rmse_Nm"] < 1.5 * vehicle.torque_sensor.noise_Nm
+
+
+def test_a_long_stiff_axis_is_read_replayed_and_planned_whole(tmp_path: Path) -> None:
+    """12 m along an axis that yields by micrometres: neither its positions nor its stiffness are refused, as radians would be."""
+    sheet = yaml.safe_load((CONFIG / "linear_axis_example.yaml").read_text())
+    sheet["contact"]["stiffness_Nm_per_deg"] = 1e10
+    (tmp_path / "axis.yaml").write_text(yaml.safe_dump(sheet))
+    vehicle = vehicle_file.load(tmp_path / "axis.yaml")
+    estimator = Estimator(vehicle)
+    estimator.set_plan(np.array([10**9, 20 * 10**9]), np.array([[0.0, 12.0]]))
+    with pytest.raises(DataError, match="from -100 to 100"):
+        estimator.set_plan(np.array([10**9]), np.array([[120.0]]))
+    time = np.arange(0.0, 60.0, 0.01)
+    axis = Recording.from_arrays(time, angle=6.0 - 6.0 * np.cos(0.5 * time), torque=50.0 * np.sign(np.sin(0.5 * time)), unit="m")
+    replayed = replay([axis], vehicle)
+    assert replayed.overall.rmse_Nm < 5.0

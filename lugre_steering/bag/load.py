@@ -18,6 +18,7 @@ from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import (
     AIR_LIMIT_DEGC,
+    FARTHEST,
     RATE_LIMIT,
     Array,
     Channel,
@@ -31,7 +32,6 @@ from lugre_steering.recording import (
 )
 
 LIMITS = {
-    Kind.ANGLE: (-np.pi, np.pi),
     Kind.PRESSURE: (-1e9, 1e9),
     Kind.AIR_TEMPERATURE: (-AIR_LIMIT_DEGC, AIR_LIMIT_DEGC),
     Kind.TORQUE: (-1e9, 1e9),
@@ -229,7 +229,7 @@ def _usable(
             reasons[reason] += int(bad.sum())
             use = use[~bad]
 
-    low, high = LIMITS[channel.kind]
+    low, high = (-FARTHEST[channel.unit], FARTHEST[channel.unit]) if channel.kind is Kind.ANGLE else LIMITS[channel.kind]
     reject("zero_stamp", stamp[use] <= 0)
     reject("not_finite", ~np.isfinite(value[use]))
     reject("absurd", (value[use] < low) | (value[use] > high))

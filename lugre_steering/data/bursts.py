@@ -4,7 +4,8 @@
 
 A law of the motion acts again whenever the joint comes back to the same angle and rate; a kick from outside, or an
 event in the measuring chain, does not. So each short event is held against the other visits to its state (recurrence in
-state space, as Eckmann, Kamphorst, Ruelle, Europhys. Lett. 4 (1987) 973), and only those that stay alone are kept.
+state space, as Eckmann, Kamphorst, Ruelle, Europhys. Lett. 4 (1987) 973), and only those that stay alone are kept. Where they lie at the
+starts, stops and reversals of the motion far more often than by chance, those that do are its own, whatever its state was.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.stats import binom
 
 from lugre_steering.data.dataset import Run
 from lugre_steering.recording import Array, Finding, IntArray, Mask
@@ -29,6 +31,10 @@ VISITS = 3
 OTHER_VISIT_S = 1.0
 SAME_STATE = 0.3
 """Farthest distance of a visit, in standard deviations of angle and rate."""
+SLOW = 0.1
+"""Share of the usual rate below which a joint counts as at rest."""
+BY_CHANCE = 1e-3
+"""Probability from which bursts at starts, stops and reversals lie there by chance."""
 MIN_COUNT = 5
 MIN_SHARE = 0.3
 REGULAR = 0.8
@@ -73,7 +79,8 @@ def find_bursts(run: Run, residual: Array) -> Bursts | None:
     """Short events in a residual (n,) of one run that its motion does not make; None without any."""
     groups = _events(run, residual)
     peaks = np.array([group[np.argmax(np.abs(residual[group]))] for group in groups], np.int64)
-    alone = [i for i in range(len(groups)) if not _comes_again(run, residual, peaks, i)]
+    turns = _at_turns(run, groups)
+    alone = [i for i in range(len(groups)) if not turns[i] and not _comes_again(run, residual, peaks, i)]
     if not alone:
         return None
     groups, peaks = [groups[i] for i in alone], peaks[alone]
@@ -94,6 +101,26 @@ def _events(run: Run, residual: Array) -> list[IntArray]:
     above = np.flatnonzero((fast > THRESHOLD * 1.4826 * float(np.median(fast[run.valid]))) & run.valid)
     groups = np.split(above, np.flatnonzero(np.diff(run.time[above]) > MERGE_S) + 1)
     return [g for g in groups if g.size and run.time[g[-1]] - run.time[g[0]] <= LONGEST_S]
+
+
+def _at_turns(run: Run, groups: Sequence[IntArray]) -> Mask:
+    """Which events lie where the motion starts, stops or turns back; none where they do so no more often than by chance.
+
+    As near as the longest of them lasts: friction lets go only once the contact is wound up.
+    """
+    rate = run.omega.mean(axis=0)
+    way = np.sign(rate) * (np.abs(rate) > SLOW * float(np.sqrt(np.mean(rate[run.valid] ** 2))))
+    turns = run.time[np.flatnonzero(np.diff(way))]
+    if not turns.size or not groups:
+        return np.zeros(len(groups), bool)
+
+    def near(time: Array) -> Mask:
+        after = np.clip(np.searchsorted(turns, time), 1, max(turns.size - 1, 1))
+        return np.asarray(np.minimum(np.abs(time - turns[after - 1]), np.abs(turns[np.minimum(after, turns.size - 1)] - time)) < LONGEST_S)
+
+    found = near(np.array([0.5 * (run.time[group[0]] + run.time[group[-1]]) for group in groups]))
+    share = float(np.mean(near(run.time[run.valid])))
+    return found & (float(binom.sf(np.count_nonzero(found) - 1, len(groups), share)) < BY_CHANCE)
 
 
 def _comes_again(run: Run, residual: Array, peaks: IntArray, index: int) -> bool:

@@ -8,17 +8,20 @@ A sensor worse than its sheet is believed; one that seems better keeps the sheet
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import uniform_filter1d
+from scipy.stats import norm
 
 from lugre_steering.data.stamps import evened
 from lugre_steering.recording import Array, Mask, Signal
 
 FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 """Fourth difference: blind to motion and to pump ripple far below the sampling rate, sqrt(70) times white noise."""
+SIXTH = np.convolve(FOURTH, [1.0, -2.0, 1.0])
+"""Sixth difference, of slow channels: blind to motion up to a tenth of the sampling rate, sqrt(924) times white noise."""
 WINDOW_S = 1.0
 DITHERED = 0.3
 """White noise, in steps of the resolution, from which it makes the error of rounding white too."""
@@ -66,7 +69,8 @@ def resolution(value: Array) -> float:
 
 
 def white_noise(signal: Signal) -> float:
-    """Standard deviation of the white part of a channel: the usual one of windows of a second without a lost message."""
+    """Standard deviation of the white part of a channel: the usual one of windows of a second without a lost message. Of a slow channel
+    it holds what the motion does between the samples, which is as unknown as noise; ``own_noise`` does not."""
     spacing = np.diff(signal.time_s)
     period = float(np.median(spacing))
     whole = sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
@@ -79,6 +83,19 @@ def white_noise(signal: Signal) -> float:
         return 0.0
     mean = np.bincount(window, squares * whole)[full] / count[full]
     return float(np.sqrt(np.median(mean) / (FOURTH @ FOURTH)))
+
+
+def own_noise(signal: Signal) -> float:
+    """The same, of the sensor alone: of a slow channel, each of whose windows holds a start or a stop, the usual one of its samples."""
+    spacing = np.diff(signal.time_s)
+    period = float(np.median(spacing))
+    if period < 1.1 / SLOWEST_HZ:
+        return white_noise(signal)
+    if spacing.size < SIXTH.size - 1:
+        return 0.0
+    whole = sliding_window_view(spacing, SIXTH.size - 1).max(axis=1) < 1.5 * period
+    size = np.abs(np.convolve(signal.value, SIXTH, mode="valid"))[whole]
+    return float(np.median(size) / norm.ppf(0.75) / np.sqrt(SIXTH @ SIXTH)) if size.size else 0.0
 
 
 def local_noise(signal: Signal, period: float) -> Array:
@@ -143,7 +160,7 @@ def samples_in(duration_s: float, period: float) -> int:
 def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -> str | None:
     """What a channel shows of its sensor that is clearly worse than its noise by the vehicle file, in words; None if it is not."""
     even, scatter = evened(signal)
-    sensor = sensed(even)
+    sensor = replace(sensed(even), noise=own_noise(even))
     said = []
     if sensor.coarse and sensor.sigma() > WORSE * sheet:
         said.append(f"steps of {say(sensor.resolution)}")

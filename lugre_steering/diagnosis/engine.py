@@ -19,6 +19,7 @@ from lugre_steering.diagnosis.conclude.conclusion import conclude
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import investigate
+from lugre_steering.diagnosis.level_jump import level_jumps
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.errors import DataError
@@ -47,6 +48,8 @@ MATERIAL_SHARE = 0.005
 
 MISPLACED_RAD = 0.05
 """Error of an angle's zero (3 deg) that is no small misalignment."""
+UNLIKE_SHEET = {"wiring_suspect", "noisy_sensor", "dead_sensor"}
+"""Findings of the check by comparison with the vehicle file, which may be what is wrong."""
 WORTH_A_SHEET = 0.5
 """Energy that the baseline leaves, in noise variances, from which single entries of the vehicle file are tried against it."""
 
@@ -78,6 +81,8 @@ def diagnose_recordings(
     progress("checking the data")
     case = Case(vehicle, [inspect(recording, vehicle) for recording in recordings])
     if case.blocking:
+        if (wrong := _sheet_of_another(case)) is not None:
+            return case.wrong_sheet(wrong)
         return case.insufficient("The data must be put right first. " + " ".join(case.blocking), more=case.miswired())
     progress("estimating the motion")
     try:
@@ -90,6 +95,7 @@ def diagnose_recordings(
     if isinstance(searched, Diagnosis):
         return searched
     done, clocks = searched
+    case.found(level_jumps(done))
     case.found(weather_findings(in_doubt(done.problem, done.fitted, done.found.final), done.found.final))
     progress("verifying on held-out data")
     result = conclude(done, case.findings, pieces, seed=seed, material=material, progress=progress)
@@ -109,7 +115,8 @@ def _searched(
         case.found(clocks.findings)
         return case.wrong_sheet(suspected)
     if lacking := _lacking(problem, samples):
-        return case.undetermined(problem, lacking)
+        wrong = _put_right(problem) if samples >= MIN_SAMPLES else None
+        return case.undetermined(problem, lacking) if wrong is None else case.wrong_sheet(wrong)
     progress("recalibrating the baseline")
     done = investigate(problem, seed, progress)
     if suspected is not None and not physics_instead(problem, done.found.final.effects, suspected):
@@ -128,8 +135,26 @@ def _searched(
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.
         case.found(disturbed)
         done = investigate(Problem(case.vehicle, runs), seed, progress)
-    wrong = _misplaced(done) or _wrong_entry(done)
+    wrong = _wrong_entry(done) or _misplaced(done)  # an entry must do better than any name, a zero too
     return (done, clocks) if wrong is None else case.wrong_sheet(wrong)
+
+
+def _sheet_of_another(case: Case) -> WrongSheet | None:
+    """A mistake in the vehicle file that explains the recordings, where they had only been held to be none of this machine for being unlike
+    it: as wires, as a contact that never slides, or as angles too noisy for a contact so stiff."""
+    if not {finding.finding for quality in case.qualities for finding in quality.blocking} <= UNLIKE_SHEET:
+        return None
+    try:
+        problem = synchronised(in_pieces(case.usable)[0], case.vehicle).problem
+    except DataError:
+        return None
+    return _put_right(problem) if int(split(problem).fit.sum()) >= MIN_SAMPLES else None
+
+
+def _put_right(problem: Problem) -> WrongSheet | None:
+    """An entry of the vehicle file with which, put right, next to nothing is left."""
+    wrong = wrong_entry(problem)
+    return wrong if wrong is not None and wrong.suspects[0].puts_right else None
 
 
 def _misplaced(done: Finished) -> WrongSheet | None:
@@ -155,7 +180,11 @@ def _wrong_entry(done: Finished) -> WrongSheet | None:
         return None
     form = done.beside_form
     rival = 1.0 if form is None else max(excess(form.problem, form.found.baseline, form.fitted), 0.0) / left
-    return wrong_entry(done.problem, done.found.final.effects, rival)
+    wrong = wrong_entry(done.problem, done.found.final.effects, rival)
+    if wrong is not None or form is None or not excess(form.problem, form.found.baseline, form.fitted) > WORTH_A_SHEET:
+        return wrong
+    # Where friction is of another form than the model's, what that makes is no error of any entry.
+    return wrong_entry(form.problem.unshaped(), form.found.final.effects)
 
 
 def _other_clocks(pieces: Sequence[Recording], clocks: Synchronised, final: Fit) -> Synchronised | None:

@@ -41,7 +41,7 @@ from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
 from lugre_steering.given_number import check_number
-from lugre_steering.recording import Array, IntArray, Kind
+from lugre_steering.recording import FARTHEST, Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle, vehicle_of
 from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
@@ -201,8 +201,10 @@ class Estimator:
             raise DataError(f"{stamp_ns.size} times and angles of shape {theta.shape}; expected an angle of each side at each time")
         if stamp_ns.size > PLAN_POINTS:
             raise DataError(f"more than {PLAN_POINTS} points")
-        if not (np.abs(theta) <= math.pi).all():  # nan is refused too
-            raise DataError("an angle that is not a number from -pi to pi")
+        farthest = FARTHEST[self.vehicle.coordinate.unit]
+        if not (np.abs(theta) <= farthest).all():  # nan is refused too
+            bounds = "-pi to pi" if farthest == math.pi else f"{-farthest:g} to {farthest:g}"
+            raise DataError(f"an angle that is not a number from {bounds}")
         if (np.diff(stamp_ns) <= 0).any():
             raise DataError("points that are not in order of time")
         faster = np.abs(np.diff(theta)) > self.options.max_rate_rad_s * np.diff(stamp_ns) * 1e-9
@@ -370,7 +372,7 @@ def _side_ratio(vehicle: Vehicle) -> float:
 def _config(vehicle: Vehicle, model: Model) -> Records:
     """What the compiled loop needs to know of the vehicle, but for the options."""
     config = np.zeros(1, CONFIG)
-    config["max_angle"] = math.pi
+    config["max_angle"] = FARTHEST[vehicle.coordinate.unit]
     config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0

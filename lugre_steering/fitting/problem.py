@@ -20,9 +20,9 @@ from lugre_steering.chain.step import torque_in_phases
 from lugre_steering.data.dataset import Run
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.model import Model, baseline_parameters, build_model
 from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
 
 LEAST_ARM = 0.1
@@ -285,6 +285,23 @@ class Problem:
         bent.shapes = int(bent.bends.shape[1] - self.bends.shape[1] + self.shapes)
         return bent
 
+    def unshaped(self) -> Problem:
+        """The same without the bends of names."""
+        plain = copy(self)
+        plain.bends = self.bends[:, : self.bends.shape[1] - self.shapes]
+        plain._last_bending, plain.shapes = (None, np.zeros(0)), 0
+        return plain
+
+    def of_sheet(
+        self, vehicle: Vehicle | None = None, calibrations: Sequence[SheetValue] | None = None, runs: Sequence[Run] | None = None,
+        kept: IntArray | slice = slice(None),
+    ) -> Problem:
+        """The same with another sheet, other calibrations, or ``runs`` of the samples ``kept``, as bent and in as much doubt."""
+        calibrations = self.calibrations if calibrations is None else calibrations
+        other = Problem(vehicle or self.vehicle, runs or self.runs, calibrations, bends=self.bends[kept])
+        other.doubt, other.typical, other.shapes = self.doubt, self.typical, self.shapes
+        return other
+
     def over(self, runs: Sequence[Run]) -> Problem:
         """The same vehicle, with as many places for laws, in other runs; without bends."""
         more_laws, beside_names = self._places
@@ -342,8 +359,13 @@ class Problem:
     @cached_property
     def _sheet(self) -> dict[str, float]:
         """What the record of the vehicle file holds of the fields that calibrations change; read one by one it takes long."""
+        return {field: self.sheet[field] for field in {"coulomb_torque", *(f for c in self.calibrations for f in c.fields)}}
+
+    @cached_property
+    def sheet(self) -> dict[str, float]:
+        """The baseline's fields of the parameter record, as the vehicle file has them."""
         record = self.model.parameters[0][0]
-        return {field: float(record[field]) for field in {"coulomb_torque", *(f for c in self.calibrations for f in c.fields)}}
+        return {field: float(record[field]) for field in (*baseline_parameters(self.vehicle), "aligning_torque")}
 
     @cached_property
     def _at(self) -> dict[str, int | slice]:

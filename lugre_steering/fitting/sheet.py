@@ -11,22 +11,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering.data.dataset import Run, motion, with_hydraulics
-from lugre_steering.fitting.fit import Fit, fit, normalised
-from lugre_steering.fitting.problem import FRICTION, GAIN, STIFFNESS, Candidate, Problem, SheetValue, Values
+from lugre_steering.fitting.entries import (
+    CONSERVATIVE,
+    LEVEL,
+    PRESSURES,
+    STIFF,
+    Resized,
+    exchanges,
+    knuckle,
+    levels,
+    resized,
+    sizes,
+)
+from lugre_steering.fitting.fit import Fit, fit
+from lugre_steering.fitting.problem import Candidate, Problem, SheetValue, Values
 from lugre_steering.recording import Array, BagFinding, IntArray
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.loads import vertical_load
-from lugre_steering.vehicle.sections import Cylinder, Hydraulics
+from lugre_steering.vehicle.sections import Cylinder
 
-WIDE, FARTHEST = 1.0, 2.6
-"""Standard deviation and bound of the logarithm of an entry under suspicion: a factor of e, up to 13."""
 SURPRISE = 10.0
 """Squared prior deviations, of friction level, stiffness and weather together, from which a sheet is suspect."""
 RELIEVED = 0.5
@@ -47,10 +55,14 @@ FAR_BETTER, LITTLE = 0.5, 0.1
 bound; and share of what the baseline leaves from which they are tried there at all."""
 KEPT = 0.5
 """Share of what named physics takes that it must still take with a suspected entry put right, to be no part of that entry's error."""
+CLAIMED = 0.5
+"""Share of what an entry claims that is there at most, if its error is what names take back."""
 PUT_RIGHT = 0.03
 """Error that is left, as share of the torque, with which a sheet counts as put right."""
 FORETOLD = 0.5
 """Share of what a wrong entry must explain that its linearisation foretells at least."""
+STEPS, MOST_SIZES = 6, 8
+"""Steps that look for a factor; sizes that promise most, to which recalibration is fitted anew."""
 OFF, SEVERAL = 0.03, 1.1
 """Relative error from which an entry is wrong, and what several wrong entries must be worth against one."""
 TIED = 1.1
@@ -58,25 +70,20 @@ TIED = 1.1
 SHOWN = 5
 SAME_SIZE = 0.1
 """Share by which torques differ that are told to be of one size."""
-LOAD = SheetValue("load", ("static_torque", "coulomb_torque", "aligning_torque"), WIDE, -FARTHEST, FARTHEST)
-LEVEL = replace(FRICTION, prior=WIDE, low=-FARTHEST, high=FARTHEST)
-PRESSURES = replace(GAIN, prior=WIDE, low=-FARTHEST, high=FARTHEST)
 LEVELS = ("friction_level", "stiffness")
-Resized = Callable[[float], Mapping[str, Cylinder]]
-"""Cylinders by name with a size of theirs times a factor."""
-STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST, high=FARTHEST)
-
 
 @dataclass(frozen=True)
 class Suspect:
     """An entry of the vehicle file: its key, by which factor it seems wrong (None: exchanged), and the error that is left with it
-    put right, as share of the measured torque (None: not fitted); ``right``: the problem with it put right."""
+    put right, as share of the measured torque (None: not fitted); ``right``: the problem with it put right; ``claims_more``: a torque of
+    its own, which is larger in the file than it is."""
 
     key: str
     factor: float | None
     relative_error: float | None
     cost: float = field(metadata=IN_MEMORY)
     right: Problem | None = field(default=None, metadata=IN_MEMORY, repr=False)
+    claims_more: bool = field(default=False, metadata=IN_MEMORY)
 
     @property
     def words(self) -> str:
@@ -212,33 +219,28 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, thin.sensor_weight, [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
-    least = FORETOLD * EXPLAINED
-    levels = _levels(thin) if _foretold(thin, baseline) > least else ()
-    found = sorted((tried.suspect for tried in _off((*levels, *_geometries(thin, baseline, least)))), key=lambda item: item.cost)
+    every = (*_levels(thin), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
+    found = sorted((tried.suspect for tried in _off(every)), key=lambda item: item.cost)
     if not found:
         return None
     floor = float(np.count_nonzero(thin.valid))
     left, excess, beside_names = found[0].cost - floor, baseline.cost - floor, named.cost - floor
-    if excess <= 0.0 or left > min(1.0 - EXPLAINED, BETTER * rival) * excess:
-        return None
     # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
-    if effects and beside_names - left < max((1.0 - BETTER) * beside_names, SURPRISE):
+    clearly = max((1.0 - BETTER) * beside_names, SURPRISE)
+    # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
+    claims = [suspect for suspect in found if effects and suspect.claims_more and suspect.cost - floor - beside_names < clearly]
+    if claims:
+        found = [*claims, *(suspect for suspect in found if suspect not in claims)]
+        return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet claims what the recordings do not show")
+    most = min(1.0 - EXPLAINED, BETTER * rival) * excess
+    if excess <= 0.0 or left > most or (effects and beside_names - left < clearly):
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 
 
-def _foretold(problem: Problem, baseline: Fit) -> float:
-    """Share of what is left beyond noise that levels without any prior would explain, to first order."""
-    weight = problem.sensor_weight
-    left = (problem.measured - baseline.prediction) * weight
-    columns = np.column_stack([baseline.jacobian, baseline.prediction * weight])
-    along = np.linalg.qr(normalised(columns))[0].T @ left
-    return float(along @ along) / max(float(left @ left) - float(np.count_nonzero(weight)), 1e-30)
-
-
 def _off(found: Iterable[_Tried]) -> list[_Tried]:
     """Those whose entry is off by more than drawings and tapes are."""
-    return [tried for tried in found if tried.suspect.factor is None or abs(np.log(tried.suspect.factor)) > OFF]
+    return [tried for tried in found if (factor := tried.suspect.factor) is None or not 1.0 - OFF < factor < 1.0 + OFF]
 
 
 def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
@@ -258,7 +260,8 @@ def thinned(problem: Problem, most: int = SAMPLES, rate_Hz: float = RATE_HZ) -> 
         stride = max(1, round(1.0 / rate_Hz / step), -(-total // most) if step < 0.1 else 1)
         runs.append(_every(run, stride))
         kept.append(first + np.arange(0, run.time.size, stride))
-    return Problem(problem.vehicle, runs, problem.calibrations), np.concatenate(kept)
+    every = np.concatenate(kept)
+    return problem.of_sheet(runs=runs, kept=every), every
 
 
 def _doubted(problem: Problem) -> tuple[Problem, float]:
@@ -269,7 +272,7 @@ def _doubted(problem: Problem) -> tuple[Problem, float]:
     misfit = max(_fitted(problem).cost / max(int(np.count_nonzero(problem.valid)), 1), 1.0)
     step = max(float(run.time[1] - run.time[0]) for run in problem.runs)
     doubt = misfit * max(ERROR_S / step, 1.0)
-    return Problem(problem.vehicle, [replace(run, sigma=run.sigma * doubt**0.5) for run in problem.runs], problem.calibrations), doubt
+    return problem.of_sheet(runs=[replace(run, sigma=run.sigma * doubt**0.5) for run in problem.runs]), doubt
 
 
 def _every(run: Run, stride: int) -> Run:
@@ -306,101 +309,70 @@ def _ratio(problem: Problem) -> float:
 
 def _levels(problem: Problem) -> Iterator[_Tried]:
     """Hypotheses about whole levels."""
-    vehicle = problem.vehicle
-    known = [c for c in problem.calibrations if c.name != GAIN.name]
-    others = [c for c in known if c.name != LEVEL.name]
-    level = "friction.coulomb" if vehicle.friction is not None else "contact.coulomb_torque_Nm"
-    stiff = level.split(".")[0] + ".stiffness_Nm_per_deg"
-    trials: list[tuple[str, list[SheetValue], str]] = [(level, [LEVEL, *others], LEVEL.name)]
-    trials.append((stiff, [STIFF, *(c for c in known if c.name != STIFF.name)], STIFF.name))
-    if vehicle.axle is not None:
-        trials.append(("axle.load_N", [LOAD, *known], LOAD.name))
-    pressures = "bores of all cylinders, or unit of the pressures" if vehicle.hydraulics is not None else "unit of the measured torque"
-    trials.append((pressures, [PRESSURES, *known], PRESSURES.name))
-    trials.append((
-        "several entries: another vehicle", [LEVEL, STIFF, PRESSURES, *(c for c in others if c.name != STIFF.name)], "",
-    ))  # fmt: skip
-    for key, calibrations, name in trials:
-        trial = Problem(vehicle, problem.runs, calibrations)
-        result = _fitted(trial)
-        names = [c.name for c in calibrations]
-        factor = float(np.exp(result.x[names.index(name)])) if name else None
-        if key == pressures and factor is not None:  # a torque goes with the square of a bore
-            factor = factor**0.5 if vehicle.hydraulics is not None else factor
-        if vehicle.axle is not None and vehicle.track is not None and name == LOAD.name and factor is not None:
-            share = vertical_load(vehicle.axle, vehicle.track) / (0.5 * vehicle.axle.load_N)  # the tracks' own weight is no load
-            factor = max((factor - 1.0) * share + 1.0, 1e-3)
-        tried = _tried(problem, trial, result, key, factor, (name,) if name else (LEVEL.name, STIFF.name))
-        yield tried if name else tried._replace(suspect=replace(tried.suspect, cost=SEVERAL * tried.suspect.cost))
+    known = [c for c in problem.calibrations if c.name != PRESSURES.name]
+
+    def tried(key: str, values: Sequence[SheetValue], starts: Sequence[float], factor: Callable[[float], float] | None) -> _Tried:
+        freed = [value.name for value in values]
+        trial = problem.of_sheet(calibrations=[*values, *(c for c in known if c.name not in freed)])
+        begun = (np.concatenate([[start], trial.start()[1:]]) for start in starts)
+        result = min((_fitted(trial, start=x) for x in begun), key=lambda each: each.cost)
+        return _tried(problem, trial, result, key, None if factor is None else factor(float(result.x[0])), freed)
+
+    for level in levels(problem.vehicle, problem.sheet):
+        found = tried(level.key, [level.value], level.starts, level.factor)
+        claims = level.value is CONSERVATIVE and abs(found.suspect.factor or 0.0) < CLAIMED
+        yield found._replace(suspect=replace(found.suspect, claims_more=claims))
+    other = tried("several entries: another vehicle", [LEVEL, STIFF, PRESSURES], (0.0,), None)
+    yield other._replace(suspect=replace(other.suspect, cost=SEVERAL * other.suspect.cost))
 
 
 def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tried]:
-    """Hypotheses about single cylinders, those of one circuit, and the arms of all; only those of which is foretold that ``least`` of
-    what is left beyond noise goes, or, of exchanged lines, anything."""
+    """Hypotheses about sizes of cylinders, the arms of all, and what may be exchanged; only those of which is foretold that ``least`` of
+    what is left beyond noise goes, or, of what is exchanged, anything."""
     hydraulics = problem.vehicle.hydraulics
     if hydraulics is None:
         return
-    sizes: list[tuple[str, Resized]] = []
-    for name, cylinder in hydraulics.cylinders.items():
-        key = f"hydraulics.cylinders.{name}"
-        for entry, scale in (("bore_m", _bore), ("knuckle_m", _knuckle)):
-            sizes.append((f"{key}.{entry}", partial(_resized, {name: cylinder}, scale)))
-    for names in circuits(hydraulics):
-        key = "hydraulics.cylinders." + " and ".join(f"{name}.bore_m" for name in names)
-        sizes.append((key, partial(_resized, {name: hydraulics.cylinders[name] for name in names}, _bore)))
-    for key, change in sizes:
-        factor, share = _better(problem, problem, baseline, change, 1.0)
-        if share < least:
-            continue
+    shares = {key: (change, *_best(problem, baseline, change)) for key, change in sizes(hydraulics)}
+    promising = sorted((key for key in shares if shares[key][2] >= least), key=lambda key: -shares[key][2])
+    for key in promising[:MOST_SIZES]:
+        change, factor, _ = shares[key]
         factor, _ = _better(problem, *_refitted(problem, baseline, change(factor)), change, factor)
         yield _tried(problem, *_refitted(problem, baseline, change(factor)), key, factor)
     if not least:  # levers of half or twice the length are too far off for a linearisation
-        arms = [(_resized(hydraulics.cylinders, _knuckle, factor), factor) for factor in ARMS]
+        arms = [(resized(hydraulics.cylinders, knuckle, factor), factor) for factor in ARMS]
         tried = [_tried(problem, *_refitted(problem, baseline, each), "knuckle_m of all cylinders", f) for each, f in arms]
         yield min(tried, key=_least)
-    for names in (*((name,) for name in hydraulics.cylinders), *circuits(hydraulics)):
-        turned = {name: _turned(hydraulics.cylinders[name]) for name in names}
-        trial = _changed(problem, turned)
-        if least and not _could_be_better(problem, trial, baseline):
-            continue
-        result = _fitted(trial, start=baseline.x)
-        yield _tried(problem, trial, result, f"hydraulics.cylinders.{' and '.join(names)}.cap and .rod exchanged", None)
+    for key, cylinders in exchanges(hydraulics):
+        trial = _changed(problem, cylinders)
+        if _could_be_better(problem, trial, baseline):
+            yield _tried(problem, trial, _fitted(trial, start=baseline.x), key, None)
 
 
-def circuits(hydraulics: Hydraulics) -> list[tuple[str, ...]]:
-    """Several cylinders, but not all, that lines connect: their bores are read off one drawing."""
-    groups: list[tuple[set[str], set[str]]] = []
-    for name, cylinder in hydraulics.cylinders.items():
-        names, lines = {name}, {line for line in (cylinder.cap, cylinder.rod) if line}
-        for group in [group for group in groups if group[1] & lines]:
-            groups.remove(group)
-            names, lines = names | group[0], lines | group[1]
-        groups.append((names, lines))
-    ordered = [tuple(name for name in hydraulics.cylinders if name in names) for names, _ in groups]
-    return [names for names in ordered if 1 < len(names) < len(hydraulics.cylinders)]
+def _best(problem: Problem, baseline: Fit, change: Resized) -> tuple[float, float]:
+    """The factor on a size with which, whatever is recalibrated, least is left to first order in that, and the share of what is left beyond
+    noise that it would explain: by steps, since arms and areas are no lines."""
+    weight, basis, factor = problem.sensor_weight, baseline.basis(), 1.0
+
+    def left(trial: Problem) -> float:
+        error = (trial.measured - baseline.prediction) * weight
+        own = error - basis @ (basis.T @ error)
+        return float(own @ own) * _seen(problem) / _seen(trial)
+
+    before = least = left(problem)
+    for _ in range(STEPS):
+        trial = _changed(problem, change(factor))
+        further, _ = _better(problem, trial, baseline, change, factor)
+        reached = left(_changed(problem, change(further)))
+        if not reached < least:
+            break
+        factor, least = further, reached
+    return factor, (before - least) / max(before - float(np.count_nonzero(weight)), 1e-30)
 
 
 def _refitted(problem: Problem, baseline: Fit, cylinders: Mapping[str, Cylinder]) -> tuple[Problem, Fit]:
     """The problem of a vehicle with other cylinders, and its fit."""
     trial = _changed(problem, cylinders)
     return trial, _fitted(trial, start=baseline.x)
-
-
-def _resized(cylinders: Mapping[str, Cylinder], scale: Callable[[Cylinder, float], Cylinder], factor: float) -> dict[str, Cylinder]:
-    return {name: scale(cylinder, factor) for name, cylinder in cylinders.items()}
-
-
-def _bore(cylinder: Cylinder, factor: float) -> Cylinder:
-    bore = cylinder.bore_m * factor
-    return replace(cylinder, bore_m=bore, rod_m=min(cylinder.rod_m, 0.95 * bore))
-
-
-def _knuckle(cylinder: Cylinder, factor: float) -> Cylinder:
-    return replace(cylinder, knuckle_m=tuple(factor * value for value in cylinder.knuckle_m))
-
-
-def _turned(cylinder: Cylinder) -> Cylinder:
-    return replace(cylinder, cap=cylinder.rod, rod=cylinder.cap)
 
 
 def _better(
@@ -425,8 +397,12 @@ def _could_be_better(problem: Problem, trial: Problem, baseline: Fit) -> bool:
     weight, basis = trial.sensor_weight, baseline.basis()
     before, after = ((each.measured - baseline.prediction) * weight for each in (problem, trial))
     own = after - basis @ (basis.T @ after)
-    shown, seen = (float(np.sum(each.measured[each.valid] ** 2)) for each in (trial, problem))
-    return float(own @ own) * seen < float(before @ before) * shown
+    return float(own @ own) * _seen(problem) < float(before @ before) * _seen(trial)
+
+
+def _seen(problem: Problem) -> float:
+    """Sum of squares of the measured torque."""
+    return float(np.sum(problem.measured[problem.valid] ** 2))
 
 
 def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:
@@ -436,7 +412,7 @@ def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:
     vehicle: Vehicle = problem.vehicle.replace(
         hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, **cylinders})
     )
-    return Problem(vehicle, [with_hydraulics(run, vehicle) for run in problem.runs], problem.calibrations)
+    return problem.of_sheet(vehicle, runs=[with_hydraulics(run, vehicle) for run in problem.runs])
 
 
 def _tried(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None, freed: Sequence[str] = ()) -> _Tried:
@@ -447,7 +423,6 @@ def _tried(problem: Problem, trial: Problem, result: Fit, key: str, factor: floa
 
 def _suspect(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None) -> Suspect:
     """Judged in the torque as measured: a smaller bore makes all errors smaller, which explains nothing."""
-    shown = float(np.sum(trial.measured[trial.valid] ** 2))
-    seen = float(np.sum(problem.measured[problem.valid] ** 2))
+    shown = _seen(trial)
     left = float(np.sum((trial.measured - result.prediction)[trial.valid] ** 2))
-    return Suspect(key, factor, float(np.sqrt(left / max(shown, 1e-30))), result.cost * seen / max(shown, 1e-30), trial)
+    return Suspect(key, factor, float(np.sqrt(left / max(shown, 1e-30))), result.cost * _seen(problem) / max(shown, 1e-30), trial)

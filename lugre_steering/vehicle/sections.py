@@ -114,13 +114,13 @@ class Contact:
     """Static friction torque."""
     coulomb_torque_Nm: float = quantity(1e-12, 1e8)
     """Sliding friction torque."""
-    stiffness_Nm_per_deg: float = quantity(1e-12, 1e9)
+    stiffness_Nm_per_deg: float = quantity(1e-12, 1e14)
     """Presliding stiffness."""
     stribeck_speed_deg_s: float = quantity(1e-9, 1e3)
     """Rate at which sticking gives way to sliding."""
     stribeck_exponent: float = positive(10.0, default=2.0)
     """Shape of the passage from static to sliding friction."""
-    presliding_damping_Nms: float = quantity(0.0, 1e8, default=0.0)
+    presliding_damping_Nms: float = quantity(0.0, 1e12, default=0.0)
     """Damping of the bristles, per rad/s."""
     reference_temperature_degC: float = quantity(-80.0, 150.0, default=15.0)
     """Rubber temperature at which the torques hold."""
@@ -376,7 +376,7 @@ class Vehicle:
         if sensor != side:
             assert self.axle is not None  # checked when the file was read
             ratio = self.axle.kingpin_distance_m / self.axle.wheelbase_m * (1.0 if sensor == "left" else -1.0)
-        return Channel(Kind.ANGLE, side, getattr(self.topics, sensor), getattr(self.topics, f"{sensor}_joint"), ratio)
+        return Channel(Kind.ANGLE, side, getattr(self.topics, sensor), getattr(self.topics, f"{sensor}_joint"), ratio, self.coordinate.unit)
 
     def __repr__(self) -> str:
         about = "; ".join(f"{row['what']}: {row['is']}" for row in self._rows())

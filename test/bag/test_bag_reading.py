@@ -406,3 +406,13 @@ def test_single_joint_of_a_linear_axis(tmp_path: Path) -> None:
     axis = Channel(Kind.ANGLE, "left", "axis/joint_state")
     message = ("/axis/joint_state", make.JOINT_STATE, T0 + 1, make.joint_state(T0 + 1, ["any"], [0.1]))
     assert read_recording(make.write(tmp_path / "run", [message]), [axis]).angle["left"].value.tolist() == [0.1]
+
+
+def test_an_axis_in_metres_may_be_longer_than_half_a_turn(tmp_path: Path) -> None:
+    """12 is a position [m] of a long axis, and no angle [rad]."""
+    stamped = ((T0 + 10**7, 0.1), (T0 + 2 * 10**7, 12.0))
+    messages = [("/axis/joint_state", make.JOINT_STATE, at, make.joint_state(at, ["any"], [x])) for at, x in stamped]
+    bag = make.write(tmp_path / "run", messages)
+    metres, radians = (Channel(Kind.ANGLE, "left", "axis/joint_state", unit=unit) for unit in ("m", "rad"))
+    assert read_recording(bag, [metres]).angle["left"].value.tolist() == [0.1, 12.0]
+    assert read_recording(bag, [radians]).angle["left"].value.tolist() == [0.1]

@@ -10,13 +10,13 @@ import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
-from lugre_steering.diagnosis.conclude import effects, experiment, left_over, limits
+from lugre_steering.diagnosis.conclude import experiment, left_over, limits
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.statement import _gain, at_end, calibrations_at_bounds
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect
-from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search import locate, surely
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.diagnosis.verify import Judged, rmse
 from lugre_steering.effects.registry import CATALOGUE
@@ -148,7 +148,6 @@ def test_a_value_is_no_surer_than_blocks_agree(doubt: float, expected: float) ->
     cluster = np.repeat(np.arange(40), 20)
     measured = np.where(cluster // 4 % 2 == 0, 1.0, -1.0)
     problem, roles = SimpleNamespace(measured=measured, doubt=doubt), SimpleNamespace(cluster=cluster)
-    there = SimpleNamespace(problem=problem, weight=np.ones(800), roles=roles)
     mean = SimpleNamespace(prediction=np.zeros(800), jacobian=np.ones((800, 1)), covariance=np.array([[1.0 / 800.0]]))
-    found = effects._deviation(SimpleNamespace(compared=there), mean)  # type: ignore[arg-type]
+    found = surely.deviations(problem, np.ones(800), roles, mean)  # type: ignore[arg-type]
     assert found[0] == pytest.approx(expected, rel=1e-9)

@@ -9,6 +9,7 @@ import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from lugre_steering.data.dataset import prepare, with_hydraulics
 from lugre_steering.data.dead import inspect_dead
 from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
 from lugre_steering.data.quality import inspect
-from lugre_steering.data.sensing import sensed
+from lugre_steering.data.sensing import own_noise, sensed
 from lugre_steering.data.stamps import evened
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.engine import diagnose_recordings
@@ -27,13 +28,13 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.fitting import clocks
 from lugre_steering.fitting.clocks import synchronised
+from lugre_steering.fitting.entries import circuits
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.sheet import (
     Suspect,
     WrongSheet,
-    circuits,
     physics_beside,
     physics_instead,
     wrong_entry,
@@ -297,6 +298,86 @@ def test_the_bore_of_one_cylinder_is_found() -> None:
     assert found is not None
     assert found.suspects[0].key == "hydraulics.cylinders.left_main.bore_m"
     assert found.suspects[0].factor == pytest.approx(1.0 / 1.1, rel=0.02)
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-2])
+def test_the_noise_of_a_slow_channel_is_not_its_motion(noise: float) -> None:
+    """10 Hz, and a start or a stop in nearly every second: up to 0.05 rad between samples, of which not thrice the noise is left."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 120.0, 0.1)
+    rate = np.repeat(rng.uniform(-0.5, 0.5, 120) * (rng.random(120) > 0.4), 10)
+    seen = np.cumsum(rate) * 0.1 + 0.1 * np.sin(4.0 * time) + noise * rng.standard_normal(time.size)
+    assert 0.7 * noise < own_noise(Signal(time, seen)) < 2.5 * noise
+
+
+def other_cylinders(changed: dict[str, dict[str, Any]]) -> Vehicle:
+    assert VEHICLE.hydraulics is not None
+    cylinders = VEHICLE.hydraulics.cylinders
+    wrong = {name: replace(cylinders[name], **fields) for name, fields in changed.items()}
+    return VEHICLE.replace(hydraulics=replace(VEHICLE.hydraulics, cylinders={**cylinders, **wrong}))
+
+
+def pivots_of(name: str) -> dict[str, Any]:
+    assert VEHICLE.hydraulics is not None
+    cylinder = VEHICLE.hydraulics.cylinders[name]
+    return {"chassis_m": cylinder.chassis_m, "knuckle_m": cylinder.knuckle_m}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "key", "factor"),
+    [
+        (lambda: with_friction(stribeck_speed_deg_s=1.5 * np.pi / 180.0), "friction.stribeck_speed_deg_s", 180.0 / np.pi),
+        (lambda: with_friction(stribeck_speed_deg_s=1.5 * 6.0), "friction.stribeck_speed_deg_s", 1.0 / 6.0),
+        (lambda: with_friction(stiffness_Nm_per_deg=5393.7 * 57.3), "friction.stiffness_Nm_per_deg", 1.0 / 57.3),
+        (lambda: with_friction(static=1.4), "friction.static", 0.85 / 1.4),
+        (lambda: other_cylinders({"right_aux": {"bore_m": 0.04, "rod_m": 0.02}}), "hydraulics.cylinders.right_aux.bore_m and .rod_m", 2.0),
+        (lambda: other_cylinders({"right_aux": {"bore_m": 0.04}}), "hydraulics.cylinders.right_aux.bore_m", 2.0),
+        (lambda: other_cylinders({"left_main": {"knuckle_m": (-0.377, 0.06)}}), "hydraulics.cylinders.left_main.knuckle_m (x)", 1.0 / 1.3),
+        (lambda: other_cylinders({"left_main": {"chassis_m": (-0.62, -0.44)}}), "hydraulics.cylinders.left_main.chassis_m (y)", 1.5),
+        (
+            lambda: other_cylinders({"left_main": pivots_of("left_aux"), "left_aux": pivots_of("left_main")}),
+            "hydraulics.cylinders: chassis_m and .knuckle_m of left_main and left_aux exchanged", None,
+        ),
+        (
+            lambda: other_cylinders({"right_main": {"bore_m": 0.08, "rod_m": 0.04}, "right_aux": {"bore_m": 0.09, "rod_m": 0.045}}),
+            "hydraulics.cylinders: bore_m and .rod_m of right_main and right_aux exchanged", None,
+        ),
+    ],
+)  # fmt: skip
+def test_whatever_entry_is_wrong_is_among_the_first_suspects(wrong: Callable[[], Vehicle], key: str, factor: float | None) -> None:
+    """Units, radii for diameters, one coordinate of a pivot, what two cylinders have exchanged."""
+    found = wrong_entry(synchronised(sound(), wrong()).problem)
+    assert found is not None
+    (told,) = (suspect for suspect in found.suspects[:3] if suspect.key == key)
+    assert told.factor == (None if factor is None else pytest.approx(factor, rel=0.25))
+    assert told.puts_right
+
+
+def with_friction(**entries: float) -> Vehicle:
+    assert VEHICLE.friction is not None
+    return VEHICLE.replace(friction=replace(VEHICLE.friction, **entries))
+
+
+@pytest.mark.parametrize(("lever", "blamed"), [(10.0, True), (-3.0, True), (0.1, False)])
+def test_a_name_that_only_takes_back_what_an_entry_claims_is_that_entry(lever: float, blamed: bool) -> None:
+    """A lever arm ten times too long needs a jacking torque of the other sign; one too short lacks what a kingpin may well do."""
+    assert VEHICLE.axle is not None
+    true = VEHICLE.axle.kingpin_lever_arm_m
+    problem = synchronised(sound(), VEHICLE.replace(axle=replace(VEHICLE.axle, kingpin_lever_arm_m=lever * true))).problem
+    lacking = problem.sheet["aligning_torque"] * (1.0 / lever - 1.0)
+    found = wrong_entry(problem, [effect("kingpin_jacking", amplitude=lacking)])
+    assert (found is not None) == blamed
+    if found is not None:
+        assert found.suspects[0].key == "axle.kingpin_lever_arm_m"
+        assert found.suspects[0].factor == pytest.approx(1.0 / lever, abs=0.03)
+
+
+def test_arms_of_two_cylinders_exchanged_are_told_though_the_torque_is_nothing_like_the_model() -> None:
+    exchanged = other_cylinders({"left_main": pivots_of("left_aux"), "left_aux": pivots_of("left_main")})
+    result = diagnose_recordings(sound(), exchanged).json
+    (entry,) = [f for f in result["data_quality"] if f["finding"] == "wrong_sheet"]
+    assert "chassis_m and .knuckle_m of left_main and left_aux exchanged" in entry["suspects"][0]["key"]
+    assert result["effects"] == []
 
 
 def test_physics_that_explains_all_is_no_wrong_arm_though_sensors_are_quieter_than_the_sheet_says() -> None:

@@ -230,7 +230,8 @@ def test_a_name_does_not_go_because_its_own_bends_could_stand_in_for_it(problem:
 
 
 @pytest.mark.parametrize("given", [False, True])
-def test_a_name_of_no_sure_size_goes_unless_it_is_given(problem: Problem, given: bool) -> None:
+@pytest.mark.parametrize("last", [False, True])
+def test_what_is_of_no_sure_size_goes_what_every_joint_may_have_last(problem: Problem, given: bool, last: bool) -> None:
     """A loss that is there, and an offset that is not."""
     loss, nothing = effect("line_loss_linear", b=2e4), effect("slope_bias", torque=0.0)
     hidden = with_torque(problem, problem.predict_all(problem.start(), [loss]))
@@ -238,10 +239,34 @@ def test_a_name_of_no_sure_size_goes_unless_it_is_given(problem: Problem, given:
     hidden = hidden.doubted(doubt(hidden, both, weight(hidden)), hidden.typical)
     score = Score(loss[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     found = [search.Found(replace(score, candidate=candidate), (), (), 1.0, given=given) for candidate, _ in (nothing, loss)]
-    kept, current = search._of_sure_size(hidden, weight(hidden), both, found)
-    names = ["slope_bias", "line_loss_linear"] if given else ["line_loss_linear"]
+    kept, current = search._of_sure_size(hidden, weight(hidden), split.split(hidden), both, found, given=last)
+    names = ["slope_bias", "line_loss_linear"] if given and not last else ["line_loss_linear"]
     assert [item.score.candidate.effect.id for item in kept] == names
     assert [candidate.effect.id for candidate, _ in current.effects] == names
+
+
+def test_an_optional_part_that_may_be_nothing_goes_alone(problem: Problem) -> None:
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [effect("kingpin_jacking", amplitude=2e3)]))
+    whole = effect("kingpin_jacking", amplitude=2e3, second_harmonic=0.0)
+    both = fit(hidden, weight(hidden), [whole])
+    hidden = hidden.doubted(doubt(hidden, both, weight(hidden)), hidden.typical)
+    found = [search.Found(Score(whole[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1.0, given=True)]
+    kept, current = search._of_sure_size(hidden, weight(hidden), split.split(hidden), both, found, given=True)
+    assert len(kept) == 1
+    ((candidate, values),) = current.effects
+    assert candidate.free == ("amplitude",)
+    assert values["amplitude"] == pytest.approx(2e3, rel=0.1)
+
+
+@pytest.mark.parametrize("slip_scale", [0.05, 1.0])
+def test_a_law_that_has_acted_before_any_recording_shows_it_is_no_name(slower: Problem, slip_scale: float) -> None:
+    """Polishing within the shortest slip that it may take is another level of friction."""
+    polished = effect("wear_polishing", amount=0.1, slip_scale=slip_scale)
+    hidden = with_torque(slower, slower.predict_all(slower.start(), [polished]))
+    named = fit(hidden, weight(hidden), [polished])
+    found = [search.Found(Score(polished[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1.0)]
+    kept, _ = search._of_sure_size(hidden, weight(hidden), split.split(hidden), named, found)
+    assert bool(kept) == (slip_scale > 0.05)
 
 
 @pytest.mark.parametrize(("range_bar", "names"), [(10.0, ["slope_bias", "viscous_friction"]), (250.0, ["viscous_friction"])])
@@ -268,7 +293,7 @@ def test_a_value_is_no_surer_than_the_form_of_its_law(problem: Problem, given: b
     named = fit(hidden, weight(hidden), [loss])
     item = search.Found(Score(loss[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1.0, given=given)
     white = noise.Noise(np.full(hidden.valid.size, SIGMA), np.zeros((1, hidden.valid.size)), 0.0)
-    done = Finished(hidden, white, split.split(hidden), search.Search(fit(hidden, weight(hidden)), named, (item,), (), ()))
+    done = Finished(hidden, white, split.split.split(hidden), search.Search(fit(hidden, weight(hidden)), named, (item,), (), ()))
     low, high = effects._intervals(done, named, named)[0]["b"].ci95
     share = 0.5 * (high - low) / named.effects[0][1]["b"]
     assert share < 0.05 if given else 0.02**0.5 < share < 0.02**0.5 + 0.05

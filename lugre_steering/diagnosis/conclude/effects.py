@@ -16,19 +16,17 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.loudness import FORM_LEFT
 from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Place, Stage
 from lugre_steering.diagnosis.search import locate
-from lugre_steering.diagnosis.search.compare import NAME_TAKEN, tied
+from lugre_steering.diagnosis.search.compare import tied
 from lugre_steering.diagnosis.search.search import Found
+from lugre_steering.diagnosis.search.surely import deviations, moved_by_form
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate
-from lugre_steering.fitting.split import BLOCK_S, CLUSTER_S
 from lugre_steering.fitting.trial import Trial, cost
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 
 BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
-ALONG = 0.5
-"""Share of the energy of a law's other form that lies along the law itself, and so in its values."""
 IN_PLACE = "small changes of the form of the friction law, all of them together, would explain as much"
 
 
@@ -63,42 +61,25 @@ def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedVa
     their torque that they may have wrong, as they too are of another form than nature. So is the law of a name itself: a value may
     be off by what makes so much of its torque, but for inertia, viscous friction and the like of a single joint.
     """
-    deviation = _deviation(done, bent)[done.compared.problem.nuisances :]
+    there = done.compared
+    deviation = deviations(there.problem, there.weight, there.roles, bent)[there.problem.nuisances :]
     position = 0
     found: list[dict[str, FittedValue]] = []
     share = float(np.sqrt(FORM_LEFT)) if done.around else 1.0
-    without, beside = (done.freely, done.compared.found.final) if done.around else (whole, bent)
-    per_value = np.linalg.norm(bent.jacobian[:, done.compared.problem.nuisances :], axis=0)
+    without, beside = (done.freely, there.found.final) if done.around else (whole, bent)
     those = zip(whole.effects, without.effects, beside.effects, done.found.found, strict=False)
     for index, ((candidate, values), (_, freely), (_, shifted), item) in enumerate(those):
         parameters: dict[str, FittedValue] = {}
-        torque = locate.contribution(done.compared.problem, bent, index) * done.compared.weight
-        other_form = 0.0 if item.given else float(np.sqrt(ALONG * NAME_TAKEN) * np.linalg.norm(torque))
+        form = moved_by_form(there.problem, there.weight, bent, index)
         for key in candidate.free:
             known = verify.NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
-            moved = other_form / max(per_value[position], 1e-300)
-            if key not in candidate.effect.amplitudes:  # at most as far as matters: some, like the end of a rest, hardly act
-                moved = min(moved, candidate.parameter(key).scale)
-            half = float(np.hypot(known, moved))
+            half = float(np.hypot(known, 0.0 if item.given else form[key]))
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)
             )
             position += 1
         found.append(parameters)
     return found
-
-
-def _deviation(done: Finished, bent: Fit) -> Array:
-    """Standard deviation of each fitted value (q,): by the doubt about the errors, or by how much whole blocks of the recordings pull it
-    apart (Liang and Zeger, Biometrika 73 (1986) 13), whichever is more: a law of another form errs alike for seconds on end."""
-    problem, weight, roles = done.compared.problem, done.compared.weight, done.compared.roles
-    known = np.maximum(np.diag(bent.covariance), 0.0) * problem.doubt
-    error = (problem.measured - bent.prediction) * weight
-    _, block = np.unique(roles.cluster // round(BLOCK_S / CLUSTER_S), return_inverse=True)
-    pulls = np.zeros((int(block.max()) + 1, known.size))
-    np.add.at(pulls, block, bent.jacobian * error[:, None])
-    moved = pulls @ bent.covariance
-    return np.asarray(np.sqrt(np.maximum(known, np.sum(moved**2, axis=0) * len(pulls) / max(len(pulls) - 1, 1))))
 
 
 def _statement(

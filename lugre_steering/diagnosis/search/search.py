@@ -8,7 +8,7 @@ neither makes up for their form nor is made up for by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -31,6 +31,7 @@ from lugre_steering.diagnosis.search.compare import (
 )
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal, closer, in_its_place, proposed
+from lugre_steering.diagnosis.search.surely import idle, in_deviations
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
@@ -117,13 +118,15 @@ def search(
     if len(sure[0]) > given and (instead := _in_place(problem, noise, weight, split, sure, progress)) is not None:
         problem, baseline, sure = instead
     found, now, current = sure
-    if len(found) > given and is_rig(problem.vehicle):
-        found, current = _given_beside(now, noise, weight, split, current, found)
-        now, current = settled(now, weight, current)
-        sure_ones, fitted = _of_sure_size(now, weight, current, found)
-        if len(sure_ones) < len(found):
-            found, current = _given_beside(now, noise, weight, split, fitted, sure_ones)
+    if found and is_rig(problem.vehicle):
+        if len(found) > given:
+            found, current = _given_beside(now, noise, weight, split, current, found)
             now, current = settled(now, weight, current)
+            sure_ones, fitted = _of_sure_size(now, weight, split, current, found)
+            if len(sure_ones) < len(found):
+                found, current = _given_beside(now, noise, weight, split, fitted, sure_ones)
+                now, current = settled(now, weight, current)
+        found, current = _of_sure_size(now, weight, split, current, found, given=True)
         given = sum(item.given for item in found)
     while (index := _of_sensors(now, weight, current, found)) is not None:
         bare, without = _spared(problem, now, weight, current, range(given, len(found)), index)
@@ -200,16 +203,39 @@ def _given_beside(
     return [*(_told(item, _rivals(problem, noise, weight, split, current, item, i)) for i, item in enumerate(given)), *names], current
 
 
-def _of_sure_size(problem: Problem, weight: Array, current: Fit, found: Sequence[Found]) -> tuple[list[Found], Fit]:
-    """Without names whose size may be none: so little is known of the friction of a single joint that they make up for it."""
+def _of_sure_size(
+    problem: Problem, weight: Array, split: Split, current: Fit, found: Sequence[Found], *, given: bool = False
+) -> tuple[list[Found], Fit]:
+    """Without what may be nothing: names whose size is not sure, or whose law has acted before any recording shows it; with ``given`` also
+    what every joint may have, and optional parts of that. So little is known of the friction of a single joint that they make up for it."""
     kept = list(found)
-    while True:
-        sizes = [_size_in_deviations(problem, current, i) if not item.given else np.inf for i, item in enumerate(kept)]
-        least = int(np.argmin(sizes))
-        if sizes[least] > SURE_OF_SIZE:
+    while kept:
+        sizes = [in_deviations(problem, weight, split, current, i) for i in range(len(kept))]
+        whole = [max(own.values(), default=np.inf) if given or not item.given else np.inf for item, own in zip(kept, sizes, strict=True)]
+        shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
+        least = shapeless[-1] if shapeless else int(np.argmin(whole))
+        effects = list(current.effects)
+        if shapeless or whole[least] < SURE_OF_SIZE:
+            del kept[least], effects[least]
+        elif not given or not (parts := _unsure_parts(kept, sizes, current)):
             return kept, current
-        del kept[least]
-        current = fit(problem, weight, [own for i, own in enumerate(current.effects) if i != least], current)
+        else:
+            _, least, part = min(parts)
+            candidate, values = effects[least]
+            free = tuple(name for name in candidate.free if name != part)
+            effects[least] = replace(candidate, free=free), {name: value for name, value in values.items() if name != part}
+        current = fit(problem, weight, effects, current.x)
+    return kept, current
+
+
+def _unsure_parts(kept: Sequence[Found], sizes: Sequence[Mapping[str, float]], current: Fit) -> list[tuple[float, int, str]]:
+    """Optional parts of the terms of every joint whose size is not sure: that, which term and which part."""
+    return [
+        (size, i, name)
+        for i, (item, own) in enumerate(zip(kept, sizes, strict=True))
+        for name, size in own.items()
+        if item.given and size < SURE_OF_SIZE and current.effects[i][0].parameter(name).optional
+    ]
 
 
 def _of_sensors(problem: Problem, weight: Array, current: Fit, found: Sequence[Found]) -> int | None:
@@ -227,18 +253,6 @@ def _of_sensors(problem: Problem, weight: Array, current: Fit, found: Sequence[F
     takes = {i: taken(i) for i in names}
     least = min(names, key=lambda i: takes[i])
     return least if takes[least] < SURE * problem.doubt else None
-
-
-def _size_in_deviations(problem: Problem, current: Fit, index: int) -> float:
-    """The amplitude of an effect of a fit that is surest, in its standard deviations."""
-    first = problem.nuisances + sum(len(candidate.free) for candidate, _ in current.effects[:index])
-    candidate, values = current.effects[index]
-    variances = np.diag(current.covariance)[first:] * problem.doubt
-    sizes = [
-        abs(values[name]) / max(float(np.sqrt(variance)), 1e-300)
-        for name, variance in zip(candidate.free, variances, strict=False) if name in candidate.effect.amplitudes
-    ]  # fmt: skip
-    return max(sizes, default=np.inf)
 
 
 def _closest(
