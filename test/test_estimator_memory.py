@@ -70,6 +70,21 @@ def test_heat_is_aged_by_the_cooling_law() -> None:
     assert float(hour[0]["total"]) == pytest.approx(float(last["total"]), rel=0.15)  # stiffer, as it is colder
 
 
+def test_the_first_feed_forward_of_a_kept_bristle_keeps_to_the_limit_of_rate() -> None:
+    """Nobody was told of a torque before: it begins at zero, and is the whole of it as soon as the limit allows."""
+    estimator, options = Estimator(VEHICLE), Options(feed_forward_rate_limit_Nm_s=1e5)
+    steer(estimator, 0, 1000)
+    resumed = Estimator(VEHICLE, options)
+    resumed.resume(estimator.memory)
+    rows = steer(resumed, 1010, 1100)
+    fed, torque = (np.array([row[name] for row in rows]) for name in ("feed_forward", "torque"))
+    assert np.abs(torque[0]).min() > 5e3
+    assert not fed[0].any()
+    steps, seconds = np.abs(np.diff(fed, axis=0)), np.diff([int(row["stamp_ns"]) for row in rows])[:, None] * 1e-9
+    assert np.all(steps <= 1e5 * seconds + 1e-6)
+    np.testing.assert_array_equal(fed[-1], torque[-1])
+
+
 def test_a_pipe_in_place_of_the_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "state.json")
     with pytest.raises(DataError, match="is no regular file"):
