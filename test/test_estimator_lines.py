@@ -146,7 +146,7 @@ def test_lines_that_never_explained_the_torque_are_not_exchanged_but_wrong(drive
     assert any("residual implausible" in words for words in came.doubts)
 
 
-def test_a_line_that_comes_below_its_range_step_by_step_shows_a_difference(drive: Array) -> None:
+def test_a_line_that_comes_below_its_range_step_by_step_shows_a_difference() -> None:
     estimator = Estimator(VEHICLE)
     for i in range(400):
         estimator.push(FIRST_LINE, T0 + i * 10_000_000, -5e6 * math.sin(0.02 * i))
