@@ -32,7 +32,7 @@ LATENCY_WINDOW = 4096
 REPORT_S = 1.0
 NEWS_S = 0.1
 """What is new is reported at once, or this long after the news before."""
-STEP_S = 0.002
+STEP_S = 0.001
 """From one part of such a report to the next, so that torques that have come meanwhile go out between."""
 LOOK_TICKS = 4
 """At one tick in so many the middleware is asked who else is there, at another what it lost: while messages come, asking takes a tenth
