@@ -48,6 +48,7 @@ def test_a_restart_of_a_second_is_as_if_a_second_of_samples_were_lost(tmp_path: 
     rows = steer(second, 1100, 1200)
     np.testing.assert_allclose([row["total"] for row in rows], [row["total"] for row in expected], rtol=1e-12)
     assert list(tmp_path.iterdir()) == [tmp_path / "state.json"]
+    assert not (tmp_path / "state.json").stat().st_mode & 0o077  # for its user alone
 
 
 def test_heat_is_aged_by_the_cooling_law() -> None:
