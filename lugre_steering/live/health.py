@@ -265,14 +265,11 @@ class Health:
 
     def _latency(self) -> DiagnosticStatus:
         values: dict[str, object] = {"torques published": self.estimates}
-        for name, window in (
-            ("arrival to publish", self.arrival_to_publish),
-            ("stamp to publish", self.stamp_to_publish),
-        ):
+        windows = {"stamp to publish": self.stamp_to_publish, "arrival to publish": self.arrival_to_publish}  # the latter is said, too
+        for name, window in windows.items():
             p50, p99 = window.percentiles_ms(50.0, 99.0)
             values |= {f"{name} p50 [ms]": p50, f"{name} p99 [ms]": p99, f"{name} max [ms]": window.max_ns * 1e-6}
         values["samples in window"] = min(self.stamp_to_publish.count, self.stamp_to_publish.values.size)
-        p50, p99 = self.arrival_to_publish.percentiles_ms(50.0, 99.0)
         said = f"from arrival to publish: p50 {p50:.2g} ms, p99 {p99:.2g} ms" if self.estimates else "nothing published yet"
         return self._status("latency", OK, said, values)
 

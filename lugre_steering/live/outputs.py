@@ -25,7 +25,7 @@ from lugre_steering.vehicle import Vehicle
 
 
 def publish_if_heard(publisher: Publisher, message: Any) -> None:
-    """Publish what is for looking at, unless nobody does: to ask costs a seventh of handing over a message."""
+    """Publish, unless nobody would hear it: to ask costs a seventh of handing over a message."""
     if publisher.get_subscription_count():
         publisher.publish(message)
 
@@ -161,7 +161,7 @@ class Outputs:
         self._set_stamp(stamp_ns)
         message, publisher = self._feed_forward
         message.effort = self.released = wanted
-        publisher.publish(message)
+        publish_if_heard(publisher, message)
         self.fading = None
         if self._commands is not None:
             command, publisher = self._commands
