@@ -146,6 +146,16 @@ def test_lines_that_never_explained_the_torque_are_not_exchanged_but_wrong(drive
     assert any("residual implausible" in words for words in came.doubts)
 
 
+def test_a_line_that_never_changed_is_shown_as_it_is(drive: Array) -> None:
+    """Of a bag without noise, or of a sensor that was dead from the start: only the feed-forward is withheld."""
+    still = drive.copy()
+    still[FIRST_LINE:] = 1e6
+    came = drive_through(still, lambda _, lines: lines)
+    assert not any(came.troubles)
+    assert len(came.residuals) > SAMPLES - 50
+    assert "pressure frozen" in came.doubts[-1]
+
+
 def test_a_line_that_comes_below_its_range_step_by_step_shows_a_difference() -> None:
     estimator = Estimator(VEHICLE)
     for i in range(400):

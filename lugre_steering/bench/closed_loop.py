@@ -33,6 +33,7 @@ from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
 from lugre_steering.bench.neighbour import SECOND, NodeProcess, use_own_domain
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.diagnosis.library import diagnose
+from lugre_steering.proof.field.hidden import cylinder_friction
 from lugre_steering.proof.field.hydraulics import gains
 from lugre_steering.proof.field.machine import Machine, track_angles
 from lugre_steering.proof.field.motion import strokes
@@ -231,7 +232,7 @@ def models(setting: Setting, folder: Path) -> Mapping[str, Fed]:
     wrong = improved.replace(axle=dataclasses.replace(axle, load_N=2.0 * axle.load_N))
     limit = 1.1 * float(baseline_parameters(found)["static_torque"])
     coulomb_Nm = 2.0 * SEAL_SHARE * setting.ground.sliding_Nm  # of both sides
-    seals = EffectEntry("cylinder_friction", {"coulomb": coulomb_Nm, "load_share": SEAL_LOAD_SHARE, "holding": 0.0})
+    seals = EffectEntry(cylinder_friction.__name__, {"coulomb": coulomb_Nm, "load_share": SEAL_LOAD_SHARE, "holding": 0.0})
     others = tuple(effect for effect in found.effects if effect.id != seals.id)
     return {
         "original LuGre": Fed(improved.replace(rubber=None)),

@@ -48,6 +48,7 @@ def _clear(ch):
     ch.head = 0
     ch.cursor = 0
     ch.wrong_from_ns = ch.wrong_until_ns = 0
+    ch.below = False
 
 
 @inner
@@ -244,8 +245,10 @@ def _jump_of_line(c, ch, stamp_ns, value, follows_suspect):
     """
     if below_range(c, value) and not ch.goes_below:
         if ch.suspect_ns != 0 or abs(value - ch.last_value) > STEP_SHARE * c.pressure_range:
+            ch.below = True
             return _suspect(ch, BELOW, stamp_ns, value)
         ch.goes_below = True
+    ch.below = False
     if stamp_ns - ch.last_ns > c.max_gap_ns:
         return _GOES_ON
     lead_ns, change = ch.suspect_ns - ch.last_ns, abs(value - ch.last_value)

@@ -73,13 +73,14 @@ DOUBTS = (
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
     "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
     "command refused", "time jumped", "pressures exchanged",
+    "pressure below range",
 )  # fmt: skip
 (
     JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED, SET_BACK,
-    EXCHANGED,
+    EXCHANGED, BROKEN,
 ) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
-INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK | EXCHANGED
+INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK | EXCHANGED | BROKEN
 """What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
@@ -474,6 +475,8 @@ def standing_doubts(core, stamp_ns):
     for i in range(core.motion.size, core.channels.size):
         if core.channels[i].kind == Kind.PRESSURE and core.channels[i].frozen:
             found |= LINE
+        if core.channels[i].below:
+            found |= BROKEN
     if c.exchanged != 0:
         found |= EXCHANGED
     # What is wanted now is not known: an earlier plan is not what was meant last.

@@ -36,7 +36,7 @@ from lugre_steering.estimator.layout import (
     records_of,
     rows_of,
 )
-from lugre_steering.estimator.lines import watch_line
+from lugre_steering.estimator.lines import LIVED, watch_line
 from lugre_steering.estimator.memory import Memory, hand_over, recall, remembered
 from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
@@ -255,8 +255,10 @@ class Estimator:
         """Which pressure lines are not believed now, and why; while there are any no residual is formed."""
         names = [_label(channel.kind, channel.name) for channel in self.channels]
         lines = [i for i, channel in enumerate(self.channels) if channel.kind is Kind.PRESSURE]
-        found = [f"{names[i]} frozen" for i in lines if self._core.channels[i]["frozen"]]
-        found += [f"{names[i]} jumped" for i in lines if self._core.channels[i]["wrong_until_ns"] > self._core.channels[i]["last_ns"]]
+        rows = self._core.channels
+        found = [f"{names[i]} frozen" for i in lines if rows[i]["frozen"] and rows[i]["lived"] >= LIVED]
+        found += [f"{names[i]} below its range" for i in lines if rows[i]["below"]]
+        found += [f"{names[i]} jumped" for i in lines if rows[i]["wrong_until_ns"] > rows[i]["last_ns"]]
         if pair := int(self._core.config[0]["exchanged"]):
             first, second = divmod(pair - 1, len(lines))
             found.append(f"{names[lines[first]]} and {names[lines[second]]} exchanged")

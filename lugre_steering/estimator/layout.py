@@ -109,7 +109,9 @@ CHANNEL = np.dtype(
         ("repeats", np.float64),  # share of samples of late that were equal to the one before
         ("still", np.int64),  # samples equal to the one before, in a row
         ("still_ns", np.int64),  # stamp of the first of them
+        ("lived", np.int64),  # readings of a line that differed from the one before
         ("frozen", np.bool_),  # a line whose readings hardly ever repeat has given the same one for a while
+        ("below", np.bool_),  # the last reading of a line was refused as below its range
         ("wrong_from_ns", np.int64),  # between these stamps a line is not believed
         ("wrong_until_ns", np.int64),
         ("goes_below", np.bool_),  # a line that has come below the range without a jump: it shows differences

@@ -12,6 +12,7 @@ from lugre_steering.chain.doors import call_number, row
 from lugre_steering.chain.hydraulics import moment_arm
 from lugre_steering.chain.layout import BASELINE
 from lugre_steering.estimator.doubt import (
+    BROKEN,
     EXCHANGED,
     INPUTS,
     LINE,
@@ -31,6 +32,8 @@ JUMPED_NS = 200_000_000
 """After a jump so long no residual is formed: by then what has frozen there, or was exchanged, is known."""
 REPEATING, REPEATS_MEMORY = 0.1, 50.0
 """Of a line whose samples have repeated less often than this, over so many of them, a standstill is no measurement."""
+LIVED = 50
+"""Only a line that has changed so often is known to live: one that never did may have no noise to be seen, and is shown as it is."""
 AGREED_S = 1.0
 """Only lines that have explained the torque for so long, while there was one to be explained, can have been exchanged since."""
 LONGEST_S = 0.1
@@ -64,9 +67,9 @@ def watch_line(ch, stamp_ns, value):
     """Learn from the next reading of a line how often its readings repeat, and whether it stands still now."""
     same = ch.last_ns != 0 and value == ch.last_value
     if not same:
-        if ch.frozen:
+        if ch.frozen and ch.lived >= LIVED:
             distrust(ch, ch.still_ns, stamp_ns)
-        ch.still, ch.still_ns = 0, stamp_ns
+        ch.still, ch.still_ns, ch.lived = 0, stamp_ns, ch.lived + 1
     else:
         ch.still += 1
     if ch.still < STILL_SAMPLES:  # a frozen line teaches nothing about a sound one
@@ -80,7 +83,8 @@ def believed_at(core, at_ns):
     """Whether every line can be believed at a stamp."""
     for i in range(core.motion.size, core.channels.size):
         ch = core.channels[i]
-        if ch.kind == Kind.PRESSURE and (ch.wrong_from_ns < at_ns < ch.wrong_until_ns or (ch.frozen and at_ns > ch.still_ns)):
+        frozen = ch.frozen and ch.lived >= LIVED and at_ns > ch.still_ns
+        if ch.kind == Kind.PRESSURE and (frozen or ch.wrong_from_ns < at_ns < ch.wrong_until_ns):
             return False
     return True
 
@@ -129,7 +133,7 @@ def look_for_exchange(core, e, at_ns, value, measured):
     c = core.config[0]
     dt = min(LONGEST_S, (at_ns - c.explained_ns) * 1e-9) if c.explained_ns != 0 else 0.0
     c.explained_ns = at_ns
-    if core.lines.shape[0] == 0 or abs(e.predicted) < SUDDEN_SHARE * c.friction or e.doubts & INPUTS & ~LINE & ~EXCHANGED != 0:
+    if core.lines.shape[0] == 0 or abs(e.predicted) < SUDDEN_SHARE * c.friction or e.doubts & INPUTS & ~(LINE | EXCHANGED | BROKEN) != 0:
         return
     explained = abs(measured - e.predicted) < SUPPORT_SHARE * abs(e.predicted)
     pair = 0

@@ -51,15 +51,16 @@ def form_residuals(core, first_line, residuals, count):
             continue
         measured, believed = measured_torque(core, e, value), believed_at(core, at_ns)
         look_for_exchange(core, e, at_ns, value, measured)
+        # As well of a line that has jumped: that the torque is not what it should be is told, though not shown.
+        weigh_residual(c, e.stamp_ns, measured, measured - e.predicted)
         if not believed or c.exchanged != 0:
             c.agreed_ns = 0
             continue
+        weigh_pressures(core, e.stamp_ns, measured)
         r = residuals[count]
         r.stamp_ns = e.stamp_ns
         r.measured_torque = measured
-        r.residual = r.measured_torque - e.predicted
+        r.residual = measured - e.predicted
         r.message = c.message
-        weigh_pressures(core, e.stamp_ns, r.measured_torque)
-        weigh_residual(c, e.stamp_ns, r.measured_torque, r.residual)
         count += 1
     return count
