@@ -55,6 +55,17 @@ def test_a_closed_valve_holds_and_an_open_one_turns_the_track(setting: Setting) 
     assert 0.7 * setting.ground.sliding_Nm < load_torque < 1.6 * setting.ground.sliding_Nm  # what friction needs while it slides
 
 
+def test_seals_that_rub_are_carried_by_the_cylinders(setting: Setting) -> None:
+    """Turning steadily they take their friction beyond what the track needs: ``seal`` and its share of the load."""
+    free, rubbing = side_of(setting), side_of(setting)
+    seal = 0.05 * setting.ground.sliding_Nm
+    rubbing.par = rubbing.par._replace(seal=seal, seal_share=0.1)
+    for side in (free, rubbing):
+        while side.angle < 0.1:
+            side.advance(0.25, PERIOD_S)
+    assert rubbing.load == pytest.approx((free.load + seal) / 0.9, rel=0.05)  # the law falls by a twentieth from rest to sliding
+
+
 def test_without_feed_forward_the_loop_is_stable_but_off(setting: Setting) -> None:
     run = drive(NONE, setting, 8.0)
     time_s, wanted, _ = reference(setting.machine, 8.0)

@@ -400,7 +400,7 @@ def first_value() -> Callable[[float, int, float], float]:
     ("change", "reason"),
     [
         (lambda _t, _line, value: 1e-5 * value, "residual implausible"),
-        (lambda _t, _line, value: -value, "residual implausible"),
+        (lambda _t, _line, value: -value, "pressure below range"),
         (first_value(), "pressure frozen"),
     ],
 )

@@ -48,6 +48,7 @@ def test_a_restart_of_a_second_is_as_if_a_second_of_samples_were_lost(tmp_path: 
     rows = steer(second, 1100, 1200)
     np.testing.assert_allclose([row["total"] for row in rows], [row["total"] for row in expected], rtol=1e-12)
     assert list(tmp_path.iterdir()) == [tmp_path / "state.json"]
+    assert not (tmp_path / "state.json").stat().st_mode & 0o077  # for its user alone
 
 
 def test_heat_is_aged_by_the_cooling_law() -> None:
@@ -68,6 +69,21 @@ def test_heat_is_aged_by_the_cooling_law() -> None:
     assert excess > 5.0
     assert float(hour[0]["temperature"][0]) - 15.0 == pytest.approx(excess * math.exp(-rate * (3600.0 - 30.0)), rel=1e-3)
     assert float(hour[0]["total"]) == pytest.approx(float(last["total"]), rel=0.15)  # stiffer, as it is colder
+
+
+def test_the_first_feed_forward_of_a_kept_bristle_keeps_to_the_limit_of_rate() -> None:
+    """Nobody was told of a torque before: it begins at zero, and is the whole of it as soon as the limit allows."""
+    estimator, options = Estimator(VEHICLE), Options(feed_forward_rate_limit_Nm_s=1e5)
+    steer(estimator, 0, 1000)
+    resumed = Estimator(VEHICLE, options)
+    resumed.resume(estimator.memory)
+    rows = steer(resumed, 1010, 1100)
+    fed, torque = (np.array([row[name] for row in rows]) for name in ("feed_forward", "torque"))
+    assert np.abs(torque[0]).min() > 5e3
+    assert not fed[0].any()
+    steps, seconds = np.abs(np.diff(fed, axis=0)), np.diff([int(row["stamp_ns"]) for row in rows])[:, None] * 1e-9
+    assert np.all(steps <= 1e5 * seconds + 1e-6)
+    np.testing.assert_array_equal(fed[-1], torque[-1])
 
 
 def test_a_pipe_in_place_of_the_file_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ plan is published as steering/command; the node looks one period and the valve's
 constant size against the planned motion; the original LuGre model (no heating) and the improved one, both calibrated on recordings of
 this plant without feed-forward, whose sheet does not know its rubber stop; the vehicle file that a diagnosis of the same recordings
 writes; nine tenths of what these say; and a wrong model (twice the friction), without and with the limit of value that the node keeps.
+At last the seals of the same axle's cylinders rub too: nothing fed forward, the diagnosed file that does not know of it, and the same
+file with that friction declared.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
 from lugre_steering.bench.neighbour import SECOND, NodeProcess, use_own_domain
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.diagnosis.library import diagnose
+from lugre_steering.proof.field.hidden import cylinder_friction
 from lugre_steering.proof.field.hydraulics import gains
 from lugre_steering.proof.field.machine import Machine, track_angles
 from lugre_steering.proof.field.motion import strokes
@@ -38,7 +41,7 @@ from lugre_steering.proof.field.rubber import table
 from lugre_steering.proof.field.simulator import Setting, draw_setting
 from lugre_steering.provenance import Provenance, provenance
 from lugre_steering.recording import NODE, Array, Recording
-from lugre_steering.vehicle import Vehicle, load, save
+from lugre_steering.vehicle import EffectEntry, Vehicle, load, save
 from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.model import baseline_parameters
 
@@ -49,6 +52,8 @@ ANSWER_S = 2.0
 T0_NS = 1_000 * SECOND
 RECORD_S = 60.0
 NONE, STATIC = "none", "constant friction"
+SEAL_SHARE, SEAL_LOAD_SHARE = 0.02, 0.05
+"""Friction of the cylinders' seals: of what the tracks need while they slide, and of the load."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,7 @@ class Fed:
     vehicle: Vehicle
     arguments: tuple[str, ...] = ()
     share: float = 1.0
+    seals: bool = False  # whether the axle that it is fed to has seals that rub
 
 
 def reference(machine: Machine, seconds: float, way: float = 1.0) -> tuple[Array, Array, Array]:
@@ -157,13 +163,15 @@ class Controller:
 
 def drive(
     name: str, setting: Setting, seconds: float, controller: Controller | None = None, *, constant_Nm: float = 0.0, share: float = 1.0,
-    way: float = 1.0,
+    way: float = 1.0, seals: bool = False,
 ) -> Run:
     """The whole manoeuvre; without a controller nothing is fed forward but a constant friction against the planned motion."""
     time_s, wanted, rate = reference(setting.machine, seconds, way)
     drive_ = setting.drives[0]
     ground = setting.ground._replace(rubber_degC=drive_.rubber_degC, air_degC=drive_.air_degC)
     par = hydraulics_of(setting.machine, gains(setting.machine, np.zeros((2, 1)))[:, 0])
+    if seals:
+        par = par._replace(seal=SEAL_SHARE * ground.sliding_Nm, seal_share=SEAL_LOAD_SHARE)
     sides = [Side(par, ground, setting.ratios, cells) for cells in setting.cells]
     rng = np.random.default_rng(1)
     angles, loads, commands = np.zeros((3, 2, time_s.size))
@@ -223,6 +231,9 @@ def models(setting: Setting, folder: Path) -> Mapping[str, Fed]:
     assert axle is not None
     wrong = improved.replace(axle=dataclasses.replace(axle, load_N=2.0 * axle.load_N))
     limit = 1.1 * float(baseline_parameters(found)["static_torque"])
+    coulomb_Nm = 2.0 * SEAL_SHARE * setting.ground.sliding_Nm  # of both sides
+    seals = EffectEntry(cylinder_friction.__name__, {"coulomb": coulomb_Nm, "load_share": SEAL_LOAD_SHARE, "holding": 0.0})
+    others = tuple(effect for effect in found.effects if effect.id != seals.id)
     return {
         "original LuGre": Fed(improved.replace(rubber=None)),
         "improved": Fed(improved),
@@ -231,6 +242,8 @@ def models(setting: Setting, folder: Path) -> Mapping[str, Fed]:
         "as diagnosed, nine tenths": Fed(found, share=0.9),
         "wrong model": Fed(wrong),
         "wrong model, limited": Fed(wrong, ("-p", f"feed_forward_limit_Nm:={limit:.1f}")),
+        "seals rub, not known": Fed(found, share=0.9, seals=True),
+        "seals rub, known": Fed(found.replace(effects=(*others, seals)), share=0.9, seals=True),
     }
 
 
@@ -243,6 +256,7 @@ def campaign(seed: int, seconds: float) -> list[Run]:
         compared = models(setting, folder)
         constant_Nm = float(baseline_parameters(compared["improved"].vehicle)["coulomb_torque"])
         runs.append(drive(STATIC, setting, seconds, constant_Nm=constant_Nm))
+        rubbing = drive(f"seals rub, {NONE}", setting, seconds, seals=True)
         for label, fed in compared.items():
             file = folder / f"{label.replace(' ', '_').replace(',', '')}.yaml"
             save(fed.vehicle, file)
@@ -251,11 +265,12 @@ def campaign(seed: int, seconds: float) -> list[Run]:
             controller = Controller(fed.vehicle)
             try:
                 controller.join()
-                runs.append(drive(label, setting, seconds, controller, share=fed.share))
+                runs.append(drive(label, setting, seconds, controller, share=fed.share, seals=fed.seals))
             finally:
                 controller.close()
                 node.stop(signal.SIGTERM)
-    return runs
+    last = next(i for i, run_ in enumerate(runs) if run_.feed_forward.startswith("seals"))
+    return [*runs[:last], rubbing, *runs[last:]]
 
 
 def draw(runs: list[Run], file: Path, made: Provenance) -> None:

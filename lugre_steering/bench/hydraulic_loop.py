@@ -5,7 +5,8 @@
 Friction is the third simulator's (``proof.field``), which is not of the estimator's form. Each side has a proportional valve (second
 order, dead band, flow by the root of the pressure drop), a cylinder with leakage and oil and hoses that give, and a controller:
 proportional-integral on the angle, and the valve opening that the planned rate needs. A torque fed forward is the load
-pressure to come: it sets the opening for the pressure drop that is left, the leakage, and what the oil takes up.
+pressure to come: it sets the opening for the pressure drop that is left, the leakage, and what the oil takes up. The seals of the
+cylinders may rub, as those do that the third simulator hides.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from lugre_steering.proof.field.rubber import Ratios
 from lugre_steering.recording import Array
 
 STEP_S = 2.5e-4
+SEAL_RAD_S = 0.1 * np.pi / 180.0
 P_GAIN, I_GAIN = 5.0, 3.0
 """Of the angle controller [1/s, 1/s2]."""
 
@@ -29,7 +31,7 @@ P_GAIN, I_GAIN = 5.0, 3.0
 class Hydraulics(NamedTuple):
     """One side (SI): displacement [m3/rad], supply [Pa], largest flow [m3/s], compliance of oil and hoses [m3/Pa], leakage [m3/s/Pa],
     natural frequency [rad/s] and damping ratio of the valve, dead band (share of its stroke), inertia [kg m2]; a rubber stop from
-    an angle [rad] on, with a stiffness [N m/rad]."""
+    an angle [rad] on, with a stiffness [N m/rad]; friction of the seals [N m], and as a share of the load."""
 
     displacement: float
     supply: float
@@ -42,6 +44,8 @@ class Hydraulics(NamedTuple):
     inertia: float
     stop_angle: float
     stop_stiffness: float
+    seal: float = 0.0
+    seal_share: float = 0.0
 
 
 def hydraulics_of(machine: Machine, gain: Array) -> Hydraulics:
@@ -69,11 +73,15 @@ def _advance(s, command, duration, h, par, track, ground, rubber, cells, hide):
         friction = turn_step(s[0], s[1], h, track, ground, rubber, cells, hide)
         beyond = abs(s[0]) - par.stop_angle
         stop = np.sign(s[0]) * par.stop_stiffness * beyond * (1.0 + 8.0 * beyond) if beyond > 0.0 else 0.0
+        # ``hidden.cylinder_friction``, as a damper of this moment: its sign changes within 0.1 deg/s.
+        seal = par.seal + par.seal_share * abs(s[2] * par.displacement)
+        x = abs(s[1]) / SEAL_RAD_S
+        damper = seal / SEAL_RAD_S / np.sqrt(1.0 + x * x) * (0.95 + 0.1 / (1.0 + 0.1 * x))
         # Implicit in rate and pressure together: the oil is stiff.
         free = s[1] + h / par.inertia * (-friction - stop)
         drawn = s[2] + h / par.compliance * (flow - par.leakage * s[2])
         coupling = h * h * par.displacement**2 / (par.inertia * par.compliance)
-        s[1] = (free + h / par.inertia * par.displacement * drawn) / (1.0 + coupling)
+        s[1] = (free + h / par.inertia * par.displacement * drawn) / (1.0 + coupling + h / par.inertia * damper)
         s[2] = min(max(drawn - h / par.compliance * par.displacement * s[1], -1.2 * par.supply), 1.2 * par.supply)
         s[0] += h * s[1]
 

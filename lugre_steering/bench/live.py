@@ -172,6 +172,8 @@ def publish(vehicle_file: str, rate_Hz: float, seconds: float, results: Connecti
                 woken_late_s.append(time.monotonic() - due)
             if is_angle:  # where it is now: a publisher that was held up must not make the angle jump
                 message.position = [0.3 * math.sin(0.4 * math.pi * (time.monotonic() - begin))]
+            else:  # one that repeats would be taken for frozen
+                message.fluid_pressure = 1e6 + 1e3 * (7 * i % 11)
             stamp = message.header.stamp
             stamp.sec, stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)
             publisher.publish(message)

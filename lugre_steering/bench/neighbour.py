@@ -143,6 +143,7 @@ class Neighbour:
         self.clean: list[Sample] = []
         self.torque: list[tuple[int, float]] = []
         self.feed_forward: list[tuple[int, float]] = []
+        self.residual: list[tuple[int, float]] = []
         self.left: list[tuple[int, float]] = []
         self.commands: list[tuple[float, float]] = []
         self.told: list[tuple[int, str]] = []
@@ -166,6 +167,7 @@ class Neighbour:
             self.node.create_subscription(kind, topic, keep, QoSProfile(depth=1000))
 
         listen(WrenchStamped, f"/{NODE}/torque", lambda m: self.torque.append((_ns(m.header.stamp), m.wrench.torque.z)))
+        listen(WrenchStamped, f"/{NODE}/residual", lambda m: self.residual.append((_ns(m.header.stamp), m.wrench.torque.z)))
         listen(JointState, f"/{NODE}/feed_forward", lambda m: self.feed_forward.append((_ns(m.header.stamp), m.effort[0])))
         listen(JointState, f"/{NODE}/estimate", lambda m: self.left.append((_ns(m.header.stamp), m.effort[0])))
         # At the time of sending: how fast they change must not depend on when this busy process hears them.

@@ -13,6 +13,7 @@ from lugre_steering.estimator.doubt import leapt, reachable, runs
 from lugre_steering.estimator.layout import (
     ABSURD,
     BACKWARD,
+    BELOW,
     DUPLICATE,
     GAP,
     JUMP,
@@ -22,6 +23,7 @@ from lugre_steering.estimator.layout import (
     SPIKE,
     ZERO,
 )
+from lugre_steering.estimator.lines import JUMPED_NS, STEP_SHARE, below_range, distrust, line_step
 from lugre_steering.recording import Kind
 
 HOTTEST_AIR_DEGC = 75.0
@@ -45,6 +47,8 @@ def _clear(ch):
     ch.period_ns = 0
     ch.head = 0
     ch.cursor = 0
+    ch.wrong_from_ns = ch.wrong_until_ns = 0
+    ch.below = False
 
 
 @inner
@@ -88,6 +92,9 @@ def _forget_samples(core, k):
     c.plan_refused_ns = 0
     c.residual_ns = 0
     c.agreed_ns = 0
+    c.explained_ns = 0
+    c.explained = 0.0
+    c.exchange_seen = c.exchange_count = c.exchanged = 0
 
 
 @inner
@@ -231,6 +238,29 @@ def _jump_of_angle(core, ch, stamp_ns, value, follows_suspect):
 
 
 @inner
+def _jump_of_line(c, ch, stamp_ns, value, follows_suspect):
+    """What a pressure means that the line cannot have come to: refused, until the next one agrees; below its range always.
+
+    A line that comes there without a jump shows a difference of pressures.
+    """
+    if below_range(c, value) and not ch.goes_below:
+        if ch.suspect_ns != 0 or abs(value - ch.last_value) > STEP_SHARE * c.pressure_range:
+            ch.below = True
+            return _suspect(ch, BELOW, stamp_ns, value)
+        ch.goes_below = True
+    ch.below = False
+    if stamp_ns - ch.last_ns > c.max_gap_ns:
+        return _GOES_ON
+    lead_ns, change = ch.suspect_ns - ch.last_ns, abs(value - ch.last_value)
+    jumped = follows_suspect and lead_ns > 0 and abs(ch.suspect_value - ch.last_value) > line_step(c, lead_ns)
+    if jumped and abs(value - ch.suspect_value) < change:
+        distrust(ch, ch.last_ns, stamp_ns + JUMPED_NS)
+    elif change > line_step(c, stamp_ns - ch.last_ns):
+        return _suspect(ch, SPIKE, stamp_ns, value)
+    return _GOES_ON
+
+
+@inner
 def admit(core, k, stamp_ns, value):
     """Whether channel ``k`` accepts the sample, and whether its angle jumps; counts the reason if not."""
     c, ch = core.config[0], core.channels[k]
@@ -242,6 +272,7 @@ def admit(core, k, stamp_ns, value):
             core.guard[ch.index].absurd = True
         return REJECTED
     if ch.last_ns == 0 or ch.kind == Kind.AIR_TEMPERATURE:
+        ch.goes_below = ch.kind == Kind.PRESSURE and below_range(c, value)
         return ACCEPTED  # air may come as rarely as it likes, and no sample of it is needed at any instant
     verdict = _GOES_ON
     follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < CONFIRM_NS
@@ -253,6 +284,8 @@ def admit(core, k, stamp_ns, value):
         follows_suspect or core.guard[ch.index].absurd or core.guard[ch.index].leap_ns != 0 or abs(value - ch.last_value) > _reach(c, ahead)
     ):
         verdict = _jump_of_angle(core, ch, stamp_ns, value, follows_suspect)
+    if verdict == _GOES_ON and ch.kind == Kind.PRESSURE:
+        verdict = _jump_of_line(c, ch, stamp_ns, value, follows_suspect)
     if verdict != _GOES_ON:
         return verdict
     if stamp_ns - ch.last_ns > c.max_gap_ns:

@@ -67,20 +67,20 @@ REFUSED_S = 0.5
 """A command that could not be used, with no plan in force, is forgotten after this."""
 BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
-REPEATING, REPEATS_MEMORY = 0.1, 50.0
-"""Of a line whose samples have repeated less often than this, over so many of them, a standstill is no measurement."""
 
 DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
     "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
-    "command refused", "time jumped",
+    "command refused", "time jumped", "pressures exchanged",
+    "pressure below range",
 )  # fmt: skip
 (
     JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED, SET_BACK,
+    EXCHANGED, BROKEN,
 ) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
-INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK
+INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK | EXCHANGED | BROKEN
 """What speaks against the sensors and not against the model."""
 
 GUARD = np.dtype(
@@ -415,25 +415,6 @@ def re_anchor(core, side, ch, stamp_ns, value, running):
 
 
 @inner
-def watch_line(ch, stamp_ns, value):
-    """Learn from the next reading of a line how often its readings repeat, and whether it stands still now."""
-    same = ch.last_ns != 0 and value == ch.last_value
-    if not same:
-        ch.still, ch.still_ns = 0, stamp_ns
-    else:
-        ch.still += 1
-    if ch.still < STILL_SAMPLES:  # a frozen line teaches nothing about a sound one
-        ch.repeats += ((1.0 if same else 0.0) - ch.repeats) / REPEATS_MEMORY
-    ch.last_value = value
-
-
-@inner
-def line_frozen(ch):
-    """Whether a line whose readings hardly ever repeat has given the same one for a while."""
-    return ch.repeats < REPEATING and ch.still >= STILL_SAMPLES and ch.last_ns - ch.still_ns >= STILL_NS
-
-
-@inner
 def _sudden(c):
     """Whether residuals have just become as large as the torque, and that is large."""
     larger = math.sqrt(max(c.measured_now, c.estimate_now))
@@ -492,8 +473,12 @@ def standing_doubts(core, stamp_ns):
         if large or c.beyond > 1.0 or _sudden(c):
             found |= RESIDUAL
     for i in range(core.motion.size, core.channels.size):
-        if core.channels[i].kind == Kind.PRESSURE and line_frozen(core.channels[i]):
+        if core.channels[i].kind == Kind.PRESSURE and core.channels[i].frozen:
             found |= LINE
+        if core.channels[i].below:
+            found |= BROKEN
+    if c.exchanged != 0:
+        found |= EXCHANGED
     # What is wanted now is not known: an earlier plan is not what was meant last.
     refused = c.plan_refused_ns != 0 and (c.plan_size > 0 or stamp_ns - c.plan_refused_ns < REFUSED_S * 1e9)
     if c.horizon > 0.0 and refused:

@@ -21,7 +21,7 @@ from lugre_steering.chain.step import Records, has_effects
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import REJECTED, admit
-from lugre_steering.estimator.doubt import DOUBTS, GUARD, watch_line
+from lugre_steering.estimator.doubt import DOUBTS, GUARD
 from lugre_steering.estimator.held import hold
 from lugre_steering.estimator.known import known_range
 from lugre_steering.estimator.layout import (
@@ -36,6 +36,7 @@ from lugre_steering.estimator.layout import (
     records_of,
     rows_of,
 )
+from lugre_steering.estimator.lines import LIVED, watch_line
 from lugre_steering.estimator.memory import Memory, hand_over, recall, remembered
 from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
@@ -252,6 +253,20 @@ class Estimator:
         return reasons
 
     @property
+    def line_troubles(self) -> list[str]:
+        """Which pressure lines are not believed now, and why; while there are any no residual is formed."""
+        names = [_label(channel.kind, channel.name) for channel in self.channels]
+        lines = [i for i, channel in enumerate(self.channels) if channel.kind is Kind.PRESSURE]
+        rows = self._core.channels
+        found = [f"{names[i]} frozen" for i in lines if rows[i]["frozen"] and rows[i]["lived"] >= LIVED]
+        found += [f"{names[i]} below its range" for i in lines if rows[i]["below"]]
+        found += [f"{names[i]} jumped" for i in lines if rows[i]["wrong_until_ns"] > rows[i]["last_ns"]]
+        if pair := int(self._core.config[0]["exchanged"]):
+            first, second = divmod(pair - 1, len(lines))
+            found.append(f"{names[lines[first]]} and {names[lines[second]]} exchanged")
+        return found
+
+    @property
     def latest_ns(self) -> Mapping[str, int]:
         """Stamp of the latest accepted sample per channel name; 0 before the first."""
         return {
@@ -373,7 +388,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     """What the compiled loop needs to know of the vehicle, but for the options."""
     config = np.zeros(1, CONFIG)
     config["max_angle"] = FARTHEST[vehicle.coordinate.unit]
-    config["max_pressure"] = 4.0 * vehicle.sensors.pressure_range_Pa
+    config["pressure_range"], config["max_pressure"] = vehicle.sensors.pressure_range_Pa, 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
     config["pressure_gain"] = vehicle.sensors.pressure_gain

@@ -13,10 +13,10 @@ from lugre_steering.recording import Array, IntArray
 
 REASONS = (
     "duplicate", "backward", "zero_stamp", "not_finite", "absurd", "spike", "time_jump", "unpaired", "gap", "overrun",
-    "restart", "absurd_rate", "angle_jump",
+    "restart", "absurd_rate", "angle_jump", "below_range",
 )  # fmt: skip
 (
-    DUPLICATE, BACKWARD, ZERO, NOT_FINITE, ABSURD, SPIKE, JUMP, UNPAIRED, GAP, OVERRUN, RESTART, RATE, ANGLE_JUMP,
+    DUPLICATE, BACKWARD, ZERO, NOT_FINITE, ABSURD, SPIKE, JUMP, UNPAIRED, GAP, OVERRUN, RESTART, RATE, ANGLE_JUMP, BELOW,
 ) = range(len(REASONS))  # fmt: skip
 
 ESTIMATE = np.dtype(
@@ -45,6 +45,7 @@ CONFIG = np.dtype(
         ("forward_jump_ns", np.int64),
         ("max_angle", np.float64),
         ("max_rate", np.float64),
+        ("pressure_range", np.float64),
         ("max_pressure", np.float64),
         ("angle_noise", np.float64),
         ("gauge_offset", np.float64),
@@ -75,6 +76,11 @@ CONFIG = np.dtype(
         ("measured_now", np.float64),
         ("estimate_now", np.float64),
         ("beyond", np.float64),  # share of the bound that residuals have had of late, squared
+        ("explained_ns", np.int64),  # stamp of the last measured torque that was compared with the estimate
+        ("explained", np.float64),  # time for which the lines have explained the estimate [s]
+        ("exchange_seen", np.int64),  # pair of lines that explains the last one, exchanged (see ``lines``); 0: they do as they are
+        ("exchange_count", np.int64),  # how often in a row the same was seen
+        ("exchanged", np.int64),  # the pair that is taken for exchanged; 0: none
         ("residual_bound", np.float64),  # RMS [N m] beyond which a residual is implausible; 0: none is known
         ("friction", np.float64),  # static torque of all sides [N m]
         ("seen_angle", np.float64),  # largest angle [rad] and rate [rad/s] that the calibration saw; inf: not told
@@ -103,6 +109,12 @@ CHANNEL = np.dtype(
         ("repeats", np.float64),  # share of samples of late that were equal to the one before
         ("still", np.int64),  # samples equal to the one before, in a row
         ("still_ns", np.int64),  # stamp of the first of them
+        ("lived", np.int64),  # readings of a line that differed from the one before
+        ("frozen", np.bool_),  # a line whose readings hardly ever repeat has given the same one for a while
+        ("below", np.bool_),  # the last reading of a line was refused as below its range
+        ("wrong_from_ns", np.int64),  # between these stamps a line is not believed
+        ("wrong_until_ns", np.int64),
+        ("goes_below", np.bool_),  # a line that has come below the range without a jump: it shows differences
         ("accepted", np.int64),
         ("period_ns", np.int64),  # from the last but one accepted sample to the last
         ("head", np.int64),  # samples stored so far in the ring of this line or side

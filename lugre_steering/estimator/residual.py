@@ -6,34 +6,14 @@ from __future__ import annotations
 
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_number, row
-from lugre_steering.chain.hydraulics import moment_arm
-from lugre_steering.chain.layout import BASELINE, LINE
+from lugre_steering.chain.layout import LINE
 from lugre_steering.estimator.doubt import weigh_pressures, weigh_residual
-
-
-@inner
-def measured_torque(core, e, value):
-    """Torque [N m] on the steering axis from the interpolated line values (or the torque sensor as it is)."""
-    c = core.config[0]
-    if core.lines.shape[0] == 0:
-        return value[0]
-    torque = 0.0
-    for i in range(core.lines.shape[0]):
-        side = int(core.geometry[i, 0])
-        theta = e.theta[side]
-        force = 0.0
-        if core.lines[i, 0] >= 0:
-            force += value[core.lines[i, 0]] * core.areas[i, 0]
-        if core.lines[i, 1] >= 0:
-            force -= value[core.lines[i, 1]] * core.areas[i, 1]
-        arm = moment_arm(theta, core.geometry[i, 1], core.geometry[i, 2], core.geometry[i, 3], core.geometry[i, 4])
-        torque += force * arm * call_number(c.arm_door, row(core.parameters, side, BASELINE), theta)
-    return torque * c.pressure_gain
+from lugre_steering.estimator.lines import believed_at, look_for_exchange, measured_torque
 
 
 @inner
 def form_residuals(core, first_line, residuals, count):
-    """Form every residual whose pressures have all come, in stamp order."""
+    """Form every residual whose pressures have all come and can be believed, in stamp order."""
     c = core.config[0]
     lines = core.line_ns.shape[0]
     value = core.scratch_value
@@ -69,12 +49,18 @@ def form_residuals(core, first_line, residuals, count):
         c.pending_count -= 1
         if not usable:
             continue
+        measured, believed = measured_torque(core, e, value), believed_at(core, at_ns)
+        look_for_exchange(core, e, at_ns, value, measured)
+        # As well of a line that has jumped: that the torque is not what it should be is told, though not shown.
+        weigh_residual(c, e.stamp_ns, measured, measured - e.predicted)
+        if not believed or c.exchanged != 0:
+            c.agreed_ns = 0
+            continue
+        weigh_pressures(core, e.stamp_ns, measured)
         r = residuals[count]
         r.stamp_ns = e.stamp_ns
-        r.measured_torque = measured_torque(core, e, value)
-        r.residual = r.measured_torque - e.predicted
+        r.measured_torque = measured
+        r.residual = measured - e.predicted
         r.message = c.message
-        weigh_pressures(core, e.stamp_ns, r.measured_torque)
-        weigh_residual(c, e.stamp_ns, r.measured_torque, r.residual)
         count += 1
     return count

@@ -32,6 +32,8 @@ LATENCY_WINDOW = 4096
 REPORT_S = 1.0
 NEWS_S = 0.1
 """What is new is reported at once, or this long after the news before."""
+STEP_S = 0.001
+"""From one part of such a report to the next, so that torques that have come meanwhile go out between."""
 LOOK_TICKS = 4
 """At one tick in so many the middleware is asked who else is there, at another what it lost: while messages come, asking takes a tenth
 of a millisecond, and a torque may wait for it."""
@@ -56,7 +58,10 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._console = Console(self.get_logger())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Steady, so that health is reported while simulated time stands still.
-        self.create_timer(TICK_S, self.guarded(self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(TICK_S, self.guarded(self._tick), clock=steady)
+        self._urgent = 0  # reports to be made one part after the other
+        self._telling = self.create_timer(STEP_S, self.guarded(self._tell_on), clock=steady, autostart=False)
         self._answering = [Later(self, f"~/{name}", work, self.fault) for name, work in (("reload", self._reload), ("mark", self._mark))]
         self._writer: threading.Thread | None = None
         self._ownership = Ownership()
@@ -205,15 +210,25 @@ class SteeringTorqueEstimator(LifecycleNode):
         news = now_ns - self._news_ns >= NEWS_S * 1e9 and session.untold
         if news:
             self._news_ns = now_ns
-        if news:
-            self._report(session, now_ns)
-        elif self._reporting is not None or waited_s >= REPORT_S:
+        if news:  # which a report that is under way may not tell any more
+            self._urgent = 1 if self._reporting is None else 2
+            self._telling.reset()
+        elif self._urgent == 0 and (self._reporting is not None or waited_s >= REPORT_S):
             self._go_on_reporting(session, now_ns)
         if session.alarm:
             session.alarm = False
             write = session.window("the residual is not what it was")
             if write is not None:
                 threading.Thread(target=self.guarded(self._write_window), args=(session, write), daemon=True).start()
+
+    def _tell_on(self) -> None:
+        """The next part of what is to be told at once."""
+        session = self.session
+        if session is None or self._urgent == 0:
+            self._urgent = 0
+            self._telling.cancel()
+        elif not self._go_on_reporting(session, time.monotonic_ns()):
+            self._urgent -= 1
 
     def _report(self, session: Session, monotonic_ns: int) -> None:
         """The whole report at once, after the rest of one that is under way."""

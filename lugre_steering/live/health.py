@@ -175,15 +175,17 @@ class Health:
         elapsed_s: float,
         counters: Mapping[str, Mapping[str, int]],
         saturated_steps: int,
+        line_troubles: Sequence[str] = (),
     ) -> Iterator[DiagnosticStatus]:
-        """The status messages of the last ``elapsed_s`` seconds, each made when asked for; ``counters`` as the estimator keeps them."""
+        """The status messages of the last ``elapsed_s`` seconds, each made when asked for; ``counters`` and troubles as the
+        estimator tells them."""
         self._period_s += elapsed_s
         if self._period_s >= PERIOD_S:
             self._take_levels()
         yield self._inputs(now_ns, list(counters))
         yield self._rejected(counters)
         yield self._latency()
-        yield self._residual(saturated_steps)
+        yield self._residual(saturated_steps, line_troubles)
         yield self._outputs(monotonic_ns)
         self._then_arrivals = list(self.arrivals)
 
@@ -263,18 +265,15 @@ class Health:
 
     def _latency(self) -> DiagnosticStatus:
         values: dict[str, object] = {"torques published": self.estimates}
-        for name, window in (
-            ("arrival to publish", self.arrival_to_publish),
-            ("stamp to publish", self.stamp_to_publish),
-        ):
+        windows = {"stamp to publish": self.stamp_to_publish, "arrival to publish": self.arrival_to_publish}  # the latter is said, too
+        for name, window in windows.items():
             p50, p99 = window.percentiles_ms(50.0, 99.0)
             values |= {f"{name} p50 [ms]": p50, f"{name} p99 [ms]": p99, f"{name} max [ms]": window.max_ns * 1e-6}
         values["samples in window"] = min(self.stamp_to_publish.count, self.stamp_to_publish.values.size)
-        p50, p99 = self.arrival_to_publish.percentiles_ms(50.0, 99.0)
         said = f"from arrival to publish: p50 {p50:.2g} ms, p99 {p99:.2g} ms" if self.estimates else "nothing published yet"
         return self._status("latency", OK, said, values)
 
-    def _residual(self, saturated_steps: int) -> DiagnosticStatus:
+    def _residual(self, saturated_steps: int, line_troubles: Sequence[str]) -> DiagnosticStatus:
         *squares, count = self._sums(RESIDUAL_SECONDS)
         rms, estimate, measured = (math.sqrt(s / count) if count else math.nan for s in squares)
         large = is_large(rms, estimate, measured, self._vehicle)
@@ -287,7 +286,8 @@ class Health:
         unlike = math.isfinite(self.mismatch_s)
         if unlike:  # without the time, which would make news of it each second
             message = "; ".join(filter(None, [message, "the residual is not what it was: the model no longer matches; diagnose"]))
-        message = "; ".join(filter(None, [message, words]))
+        withheld = f"withheld: {', '.join(line_troubles)}" if line_troubles else ""
+        message = "; ".join(filter(None, [withheld, message, words]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
         values: dict[str, object] = {
             f"RMS over {RESIDUAL_SECONDS} s [N m]": rms,
@@ -298,7 +298,7 @@ class Health:
             values["no longer matches since [s]"] = self.mismatch_s
         if self.mark:
             values["last mark"] = self.mark
-        return self._status("residual", WARN if saturated or large or words or unlike or not count else OK, message, values)
+        return self._status("residual", WARN if saturated or large or withheld or words or unlike or not count else OK, message, values)
 
     def _wrong_sheet(self) -> str:
         """What to check in the vehicle file, where the measured torque has the shape of the estimate but another size."""

@@ -169,7 +169,8 @@ class Session:
         self.health.simulated, self.health.active = self.simulated, self.active
         self.health.mismatch_s = (now_ns - self.watch.since_ns) * 1e-9 if self.watch.since_ns else math.nan
         self.health.told(now_ns, estimator.rejections)
-        return self.health.statuses(now_ns, monotonic_ns, elapsed_s, estimator.counters, estimator.saturated_steps)
+        counters, steps = estimator.counters, estimator.saturated_steps
+        return self.health.statuses(now_ns, monotonic_ns, elapsed_s, counters, steps, estimator.line_troubles)
 
     # --------------------------------------------------------------- samples
 

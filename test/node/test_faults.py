@@ -41,7 +41,13 @@ def assert_passed(judge: Callable[[], faults.Score]) -> None:
     raise AssertionError(score)
 
 
-@pytest.mark.parametrize("name", ["left angle frozen", "noise of one degree", "pressures in bar", "frame of another sensor"])
+NAMES = (
+    "left angle frozen", "noise of one degree", "pressures in bar", "one pressure stuck at zero", "one pressure exchanged",
+    "frame of another sensor",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_a_fault_is_told_limited_and_recovered(campaign: faults.Campaign, name: str) -> None:
     assert_passed(lambda: campaign.samples(name, *faults.faults_of(campaign.vehicle, campaign.rng)[name]))
 

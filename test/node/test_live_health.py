@@ -34,6 +34,7 @@ from live_harness import (
 from rosgraph_msgs.msg import Clock
 
 from lugre_steering.estimator import Estimator
+from lugre_steering.estimator.layout import REASONS
 from lugre_steering.live.health import Health
 from lugre_steering.vehicle import load
 
@@ -369,6 +370,15 @@ def test_silence_of_all_pressures_is_told_as_what_it_means() -> None:
         assert ("no measured torque" in values.get("plausibility", "")) == (len(silent) == 4)
 
 
+def test_a_pressure_line_that_is_not_believed_is_told_by_its_name() -> None:
+    health = Health(load(VEHICLE), 0.2, 0.5, 16)
+    labels = {f"input {i}": {"accepted": 0} for i in range(7)}
+    for troubles in ([], ["pressure/main_a frozen", "pressure/aux_b jumped"]):
+        health.add_residual(1.0, 1e4)
+        status = list(health.statuses(SECOND, 1, 1.0, labels, 0, troubles))[3]
+        assert (status.level, status.message) == ((WARN, f"withheld: {', '.join(troubles)}") if troubles else (OK, "residual formed"))
+
+
 def test_angles_without_a_torque_are_an_error() -> None:
     health = Health(load(VEHICLE), 0.2, 0.5, 16)
     assert outputs_of(health) == (OK, "running")
@@ -412,7 +422,7 @@ def test_a_torque_of_the_right_shape_and_another_size_tells_the_sheet() -> None:
 
 def test_what_is_new_is_to_be_told_at_once_and_what_goes_on_is_not() -> None:
     health = Health(load(VEHICLE), 0.2, 0.5, 16)
-    rejected = np.zeros((7, 13), np.int64)
+    rejected = np.zeros((7, len(REASONS)), np.int64)
     health.arrivals, health.arrived_ns = [1] * 7, [SECOND] * 7
     health.told(SECOND, rejected)
     assert not health.untold(SECOND, rejected)

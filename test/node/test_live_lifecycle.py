@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import signal
 import time
 from collections.abc import Iterator
@@ -35,9 +36,12 @@ from live_harness import (
     commands,
     jump,
     set_parameters,
+    to_ns,
 )
 
 COMMANDS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5")
+RATE_LIMIT_NM_S = math.degrees(5393.7)
+"""What the sheet's stiffness makes of a radian a second."""
 AT_ONCE = 3e3
 """0.05 s of that ramp, at most, are one step; of the static friction of a side that are 2.8 kN m."""
 
@@ -208,6 +212,15 @@ def test_the_state_survives_a_kill_and_a_damaged_one_is_refused(tmp_path: Path) 
         first = world.heard["torque"][0].wrench.torque.z
         assert first == pytest.approx(torque, rel=0.1)  # ten samples of turning are between
         assert world.heard["rubber_temperature/left"][0].temperature == pytest.approx(heat, abs=0.1)
+        # The bristle holds 20 kN m at once; nobody was told of a torque before, so that its feed-forward begins at zero.
+        world.wait(lambda: len(world.heard["feed_forward"]) >= 1)
+        assert world.heard["feed_forward"][0].effort.tolist() == [0.0, 0.0]
+        driver = Driver(world)
+        driver.time = last
+        driver.steer_until(lambda: abs(world.heard["feed_forward"][-1].effort[0]) > 1e4)
+        for before, after in itertools.pairwise(world.heard["feed_forward"]):
+            passed_s = (to_ns(after.header.stamp) - to_ns(before.header.stamp)) * 1e-9
+            assert abs(after.effort[0] - before.effort[0]) <= RATE_LIMIT_NM_S * passed_s + 1e-6
     damaged = file.read_text()
     file.write_text(damaged[: len(damaged) // 2])
     with LiveNode(*arguments) as node, World() as world:

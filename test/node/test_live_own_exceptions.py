@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -33,6 +34,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator.state_file import read_state
 from lugre_steering.live import estimator_node, run
 from lugre_steering.live.estimator_node import SteeringTorqueEstimator
+from lugre_steering.live.outputs import publish_if_heard
 from lugre_steering.recording import Kind
 from lugre_steering.vehicle import load
 from lugre_steering.watch.window import read_window
@@ -287,3 +289,34 @@ def test_arguments_that_are_none_are_refused_in_one_line(capsys: pytest.CaptureF
     said = capsys.readouterr().err
     assert said.startswith("estimator: ")
     assert said.count("\n") == 1
+
+
+def test_what_is_new_is_told_one_status_after_the_other(node: SteeringTorqueEstimator, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a report is under way, which began before it was new: two are made, and between any two parts torques may go out."""
+    node.start()
+    assert node.session is not None
+    reports: list[str] = []
+    monkeypatch.setattr(node, "_diagnose", lambda statuses: reports.append("; ".join(status.message for status in statuses)))
+    now_ns = time.monotonic_ns()
+    node._finish_reporting(node.session, now_ns)
+    assert node._go_on_reporting(node.session, now_ns)  # the next one begins
+    node.session.health.fault(MemoryError("made to fail"), now_ns)
+    reports.clear()
+    node._tick()
+    made = []
+    for _ in range(11):
+        made.append(len(reports))
+        node._tell_on()
+    assert made == [0] * 5 + [1] * 6  # four statuses of the old report and five of the new one, each then sent
+    assert "made to fail" in reports[1]
+    node._tell_on()
+    assert node._urgent == 0
+    assert node._telling.is_canceled()
+
+
+@pytest.mark.parametrize("listeners", [0, 1])
+def test_what_is_for_looking_at_is_sent_where_somebody_looks(listeners: int) -> None:
+    sent: list[Any] = []
+    publisher = SimpleNamespace(get_subscription_count=lambda: listeners, publish=sent.append)
+    publish_if_heard(publisher, "message")
+    assert sent == ["message"] * listeners
