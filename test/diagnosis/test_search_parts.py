@@ -293,7 +293,7 @@ def test_a_value_is_no_surer_than_the_form_of_its_law(problem: Problem, given: b
     named = fit(hidden, weight(hidden), [loss])
     item = search.Found(Score(loss[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1.0, given=given)
     white = noise.Noise(np.full(hidden.valid.size, SIGMA), np.zeros((1, hidden.valid.size)), 0.0)
-    done = Finished(hidden, white, split.split.split(hidden), search.Search(fit(hidden, weight(hidden)), named, (item,), (), ()))
+    done = Finished(hidden, white, split.split(hidden), search.Search(fit(hidden, weight(hidden)), named, (item,), (), ()))
     low, high = effects._intervals(done, named, named)[0]["b"].ci95
     share = 0.5 * (high - low) / named.effects[0][1]["b"]
     assert share < 0.05 if given else 0.02**0.5 < share < 0.02**0.5 + 0.05
