@@ -163,6 +163,16 @@ def test_a_line_that_comes_below_its_range_step_by_step_shows_a_difference() -> 
     assert estimator.counters["pressure/main_a"] == {"accepted": 400}
 
 
+def test_a_line_that_was_negative_for_a_while_is_broken_below_its_range_afterwards() -> None:
+    """A low pressure with the wrong sign goes below the range step by step."""
+    estimator = Estimator(VEHICLE)
+    for i in range(400):
+        pressure = -1e6 * math.sin(0.02 * i) if i < 200 else (0.5e6 + 1e4 * (i % 7) if i < 300 else -6.25e6)
+        estimator.push(FIRST_LINE, T0 + i * 10_000_000, pressure)
+    assert estimator.counters["pressure/main_a"] == {"accepted": 300, "below_range": 100}
+    assert estimator.line_troubles == ["pressure/main_a below its range"]
+
+
 def test_a_pressure_that_steps_costs_one_sample_and_a_fifth_of_a_second(drive: Array) -> None:
     """As at a stop: it is believed as soon as the next sample agrees."""
     came = drive_through(drive, only(0, lambda _, p: p + 8e6))

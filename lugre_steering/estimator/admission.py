@@ -243,11 +243,11 @@ def _jump_of_line(c, ch, stamp_ns, value, follows_suspect):
 
     A line that comes there without a jump shows a difference of pressures.
     """
-    if below_range(c, value) and not ch.goes_below:
-        if ch.suspect_ns != 0 or abs(value - ch.last_value) > STEP_SHARE * c.pressure_range:
-            ch.below = True
-            return _suspect(ch, BELOW, stamp_ns, value)
-        ch.goes_below = True
+    below = below_range(c, value)
+    if below and not ch.goes_below and (ch.suspect_ns != 0 or abs(value - ch.last_value) > STEP_SHARE * c.pressure_range):
+        ch.below = True
+        return _suspect(ch, BELOW, stamp_ns, value)
+    ch.goes_below = below
     ch.below = False
     if stamp_ns - ch.last_ns > c.max_gap_ns:
         return _GOES_ON

@@ -114,7 +114,7 @@ CHANNEL = np.dtype(
         ("below", np.bool_),  # the last reading of a line was refused as below its range
         ("wrong_from_ns", np.int64),  # between these stamps a line is not believed
         ("wrong_until_ns", np.int64),
-        ("goes_below", np.bool_),  # a line that has come below the range without a jump: it shows differences
+        ("goes_below", np.bool_),  # a line has come below its range without a jump: it shows a difference
         ("accepted", np.int64),
         ("period_ns", np.int64),  # from the last but one accepted sample to the last
         ("head", np.int64),  # samples stored so far in the ring of this line or side
