@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +23,11 @@ from typer.testing import CliRunner
 from lugre_steering.chain.step import torque_side
 from lugre_steering.cli import app
 from lugre_steering.effects import registry
+from lugre_steering.effects.entry import Seen
 from lugre_steering.effects.own import read_effects
 from lugre_steering.errors import EffectError
 from lugre_steering.estimator import Estimator
+from lugre_steering.fitting.fingerprint import _suggested
 from lugre_steering.resources import config_folder
 from lugre_steering.vehicle import EffectEntry, load
 from lugre_steering.vehicle.model import build_model
@@ -223,20 +225,26 @@ def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, 
     assert len(refusal(tmp_path / "mine.py", text, old, new, words).splitlines()) == 1
 
 
+def test_variants_that_fail_are_an_error_of_their_effect(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(OWN_PYTHON.replace("tier=2", "tier=2, variants=lambda seen: 1 / 0"))
+    told = run("effects", "own_spring", "--effects", file)
+    assert told.returncode == 2
+    assert "effect 'own_spring': variants: ZeroDivisionError: division by zero; expected" in " ".join(told.stderr.split())
+
+
 @pytest.mark.parametrize(
     ("variants", "words"),
     [
-        ("lambda seen: 1 / 0", "ZeroDivisionError: division by zero; expected"),
-        ("lambda seen: 5", "TypeError: 'int' object is not iterable; expected"),
-        ("lambda seen: [{'stifness': 1.0}]", "got stifness, expected parameters of it (stiffness)"),
+        (lambda _: 5, "TypeError: 'int' object is not iterable; expected"),
+        (lambda _: [{"treshold": 1.0}], "got treshold, expected parameters of it"),
+        (lambda _: [{"threshold": "far"}], "ValueError: could not convert string to float: 'far'; expected"),
     ],
 )
-def test_variants_that_fail_are_an_error_of_their_effect(tmp_path: Path, variants: str, words: str) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text(OWN_PYTHON.replace("tier=2", f"tier=2, variants={variants}"))
-    told = run("effects", "own_spring", "--effects", file)
-    assert told.returncode == 2
-    assert f"effect 'own_spring': variants: {words}" in " ".join(told.stderr.split())
+def test_variants_are_shapes_of_their_effect(variants: Callable[[Seen], Any], words: str) -> None:
+    seen = Seen(np.zeros(3), -1.0, 1.0, 10.0, np.zeros((2, 3)), np.zeros(3))
+    with pytest.raises(EffectError, match=words):
+        _suggested(registry.CATALOGUE["end_stop"], variants, seen)
 
 
 @pytest.mark.usefixtures("catalogue")
