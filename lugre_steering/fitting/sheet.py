@@ -72,6 +72,7 @@ SAME_SIZE = 0.1
 """Share by which torques differ that are told to be of one size."""
 LEVELS = ("friction_level", "stiffness")
 
+
 @dataclass(frozen=True)
 class Suspect:
     """An entry of the vehicle file: its key, by which factor it seems wrong (None: exchanged), and the error that is left with it

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lugre_steering.diagnosis.search.compare import NAME_TAKEN
+from lugre_steering.diagnosis.search.compare import END, NAME_TAKEN
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.verify import NORMAL
 from lugre_steering.fitting.fit import Fit
@@ -16,7 +16,6 @@ from lugre_steering.recording import Array
 
 ALONG = 0.5
 """Share of the energy of a law's other form that lies along the law itself, and so in its values."""
-EDGE = 0.01
 
 
 def deviations(problem: Problem, weight: Array, roles: Split, fitted: Fit) -> Array:
@@ -31,12 +30,17 @@ def deviations(problem: Problem, weight: Array, roles: Split, fitted: Fit) -> Ar
     return np.asarray(np.sqrt(np.maximum(known, np.sum(moved**2, axis=0) * len(pulls) / max(len(pulls) - 1, 1))))
 
 
+def _columns(problem: Problem, fitted: Fit, index: int) -> slice:
+    """Where the values of one effect stand among all that were fitted."""
+    first = problem.nuisances + sum(len(own.free) for own, _ in fitted.effects[:index])
+    return slice(first, first + len(fitted.effects[index][0].free))
+
+
 def moved_by_form(problem: Problem, weight: Array, fitted: Fit, index: int) -> dict[str, float]:
     """By how much each value of one effect may be off because its law is of another form; a shape at most as far as matters: some, like
     the end of a rest, hardly act."""
     candidate, _ = fitted.effects[index]
-    first = problem.nuisances + sum(len(own.free) for own, _ in fitted.effects[:index])
-    per_value = np.linalg.norm(fitted.jacobian[:, first : first + len(candidate.free)], axis=0)
+    per_value = np.linalg.norm(fitted.jacobian[:, _columns(problem, fitted, index)], axis=0)
     torque = float(np.sqrt(ALONG * NAME_TAKEN) * np.linalg.norm(contribution(problem, fitted, index) * weight))
     found = {key: torque / max(float(size), 1e-300) for key, size in zip(candidate.free, per_value, strict=True)}
     shapes = {key: candidate.parameter(key).scale for key in found if key not in candidate.effect.amplitudes}
@@ -45,25 +49,23 @@ def moved_by_form(problem: Problem, weight: Array, fitted: Fit, index: int) -> d
 
 def in_deviations(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> dict[str, float]:
     """The amplitudes of one effect of a fit in their standard deviations."""
-    first = problem.nuisances + sum(len(own.free) for own, _ in fitted.effects[:index])
     candidate, values = fitted.effects[index]
-    own = zip(candidate.free, deviations(problem, weight, roles, fitted)[first:], strict=False)
+    own = zip(candidate.free, deviations(problem, weight, roles, fitted)[_columns(problem, fitted, index)], strict=True)
     return {key: abs(values[key]) / max(float(known), 1e-300) for key, known in own if key in candidate.effect.amplitudes}
 
 
 def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> bool:
     """Whether a shape of one effect stands at its bound and may as well be zero: at so short a slip or time a law has acted before any
     recording shows it, and is another level of what is there."""
-    first = problem.nuisances + sum(len(own.free) for own, _ in fitted.effects[:index])
     candidate, values = fitted.effects[index]
     form = moved_by_form(problem, weight, fitted, index)
-    for key, known in zip(candidate.free, deviations(problem, weight, roles, fitted)[first:], strict=False):
+    for key, known in zip(candidate.free, deviations(problem, weight, roles, fitted)[_columns(problem, fitted, index)], strict=True):
         parameter = candidate.parameter(key)
         if key in candidate.effect.amplitudes or parameter.low < 0.0 < parameter.high:
             continue
         at = parameter.scaled(values[key])
         low, high = sorted((parameter.scaled(parameter.low), parameter.scaled(parameter.high)))
-        at_bound = not low + EDGE * (high - low) < at < high - EDGE * (high - low)
+        at_bound = not low + END * (high - low) < at < high - END * (high - low)
         if at_bound and abs(values[key]) < float(np.hypot(NORMAL * known, form[key])):
             return True
     return False
