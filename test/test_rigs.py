@@ -369,10 +369,11 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
     write_recorded(real, tmp_path / "bag", 40.0)
     found = {e.id: e.parameters for e in diagnose([tmp_path / "bag"], base).effects}
     assert set(found) == {"kingpin_jacking", "viscous_friction", "yaw_inertia"}
-    for name, parameter, value, error in (
-        ("kingpin_jacking", "amplitude", 350.0, 0.01), ("viscous_friction", "sigma_2", 30.0, 0.12), ("yaw_inertia", "inertia", 40.0, 0.1),
+    for name, parameter, value in (
+        ("kingpin_jacking", "amplitude", 350.0), ("viscous_friction", "sigma_2", 30.0), ("yaw_inertia", "inertia", 40.0),
     ):  # fmt: skip
-        assert found[name][parameter].value == pytest.approx(value, rel=error)
+        assert found[name][parameter].value == pytest.approx(value, rel=0.1)
+    assert found["kingpin_jacking"]["amplitude"].value == pytest.approx(350.0, rel=0.01)
 
 
 @pytest.mark.parametrize(("engage", "shift"), [(0.2, 0.3), (0.5, -0.3)])

@@ -207,17 +207,20 @@ def _of_sure_size(
     problem: Problem, weight: Array, split: Split, current: Fit, found: Sequence[Found], *, given: bool = False
 ) -> tuple[list[Found], Fit]:
     """Without what may be nothing: names whose size is not sure, or whose law has acted before any recording shows it; with ``given`` also
-    what every joint may have, and optional parts of that. So little is known of the friction of a single joint that they make up for it."""
-    kept = list(found)
+    what every joint may have, and optional parts of that. So little is known of the friction of a single joint that they make up for it.
+
+    What every joint may have is told with intervals from all samples, so it need only be as sure as those that are fitted allow.
+    """
+    kept, least_size = list(found), SURE_OF_SIZE * (float(np.sqrt(split.fit.sum() / problem.valid.sum())) if given else 1.0)
     while kept:
         sizes = [in_deviations(problem, weight, split, current, i) for i in range(len(kept))]
         whole = [max(own.values(), default=np.inf) if given or not item.given else np.inf for item, own in zip(kept, sizes, strict=True)]
         shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
         least = shapeless[-1] if shapeless else int(np.argmin(whole))
         effects = list(current.effects)
-        if shapeless or whole[least] < SURE_OF_SIZE:
+        if shapeless or whole[least] < least_size:
             del kept[least], effects[least]
-        elif not given or not (parts := _unsure_parts(kept, sizes, current)):
+        elif not given or not (parts := _unsure_parts(kept, sizes, current, least_size)):
             return kept, current
         else:
             _, least, part = min(parts)
@@ -228,13 +231,15 @@ def _of_sure_size(
     return kept, current
 
 
-def _unsure_parts(kept: Sequence[Found], sizes: Sequence[Mapping[str, float]], current: Fit) -> list[tuple[float, int, str]]:
+def _unsure_parts(
+    kept: Sequence[Found], sizes: Sequence[Mapping[str, float]], current: Fit, least_size: float
+) -> list[tuple[float, int, str]]:
     """Optional parts of the terms of every joint whose size is not sure: that, which term and which part."""
     return [
         (size, i, name)
         for i, (item, own) in enumerate(zip(kept, sizes, strict=True))
         for name, size in own.items()
-        if item.given and size < SURE_OF_SIZE and current.effects[i][0].parameter(name).optional
+        if item.given and size < least_size and current.effects[i][0].parameter(name).optional
     ]
 
 
