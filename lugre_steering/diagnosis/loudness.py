@@ -18,10 +18,9 @@ OWN_ERROR = 0.05
 """Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
 SLOW_EXCESS, FAST_EXCESS = 0.25, 1.0
 """Energy left over, in noise variances, that is structure: slow and above the doubt about slow noise, or of any kind."""
-FORM_LEFT, FORM_TAKEN = 0.15, 0.005
-"""Shares of the energy that the freedoms of the friction law explain: what may be left beside them without being structure, since
-they too are of another form than nature, and what one name must take of that to be more than such a form (where nothing was hidden the
-best name took a thousandth at most)."""
+FORM_LEFT = 0.15
+"""Share of the energy that the freedoms of the friction law explain that may be left beside them without being structure, since they too
+are of another form than nature."""
 
 
 class Loudness(NamedTuple):

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lugre_steering.diagnosis.loudness import FORM_TAKEN, OWN_ERROR, beyond_calibration, form_energy
+from lugre_steering.diagnosis.loudness import FORM_LEFT, OWN_ERROR, beyond_calibration, excess, form_energy
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal
 from lugre_steering.effects.entry import Effect
@@ -30,7 +30,7 @@ SURE = 25.0
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
 NAME_TAKEN, TAKEN_OF_SLOW = 0.04, 0.06
-"""What FORM_TAKEN is of names, which have fewer freedoms of their own: the energy of an error of a fifth of their torque; and of those
+"""What another form of names than nature's may make, of what they take: the energy of an error of a fifth of their torque; and of those
 that settle with time, or follow the acceleration: how rubber, oil and sensors settle is known less well than how they act, and an
 acceleration only as smoothed as the angles ask for."""
 SHOWN = 20.0
@@ -113,10 +113,12 @@ def _volume(problem: Problem, gram: Array) -> float:
 def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) -> float:
     """Energy that a name must take to be believed, where ``result`` has it; ``stands``: ``may_differ`` of the names before it.
 
-    Of what freedoms and names do, some part is always of another form than nature.
+    Of what freedoms and names do, some part is always of another form than nature: as much as is left, as far as that may be of theirs.
     """
-    own = OWN_ERROR * float(np.count_nonzero(weight)) * (OWN_SHARE if problem.bends.shape[1] else 1.0)
-    return SURE * problem.doubt + FORM_TAKEN * form_energy(problem, result, weight) + stands + own
+    samples = float(np.count_nonzero(weight))
+    own = OWN_ERROR * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
+    form = min(max(excess(problem, result, weight) * samples, 0.0), FORM_LEFT * form_energy(problem, result, weight))
+    return SURE * problem.doubt + form + stands + own
 
 
 def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]) -> float:
