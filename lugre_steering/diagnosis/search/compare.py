@@ -27,6 +27,8 @@ from lugre_steering.recording import Array
 
 SURE = 25.0
 """Energy, in doubts, that a name must take: by chance one of some hundred candidates does so once in a thousand searches."""
+SURE_OF_LEFT = 2.0
+"""Standard deviations by which more may be left beyond noise than a fit shows."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
 NAME_TAKEN, TAKEN_OF_SLOW = 0.04, 0.06
@@ -113,11 +115,12 @@ def _volume(problem: Problem, gram: Array) -> float:
 def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) -> float:
     """Energy that a name must take to be believed, where ``result`` has it; ``stands``: ``may_differ`` of the names before it.
 
-    Of what freedoms and names do, some part is always of another form than nature: as much as is left, as far as that may be of theirs.
+    Of what freedoms and names do, some part is always of another form than nature: as much as may be left, as far as that may be of theirs.
     """
     samples = float(np.count_nonzero(weight))
     own = OWN_ERROR * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
-    form = min(max(excess(problem, result, weight) * samples, 0.0), FORM_LEFT * form_energy(problem, result, weight))
+    most_left = max(excess(problem, result, weight) * samples, 0.0) + SURE_OF_LEFT * float(np.sqrt(2.0 * samples * problem.doubt))
+    form = min(most_left, FORM_LEFT * form_energy(problem, result, weight))
     return SURE * problem.doubt + form + stands + own
 
 
