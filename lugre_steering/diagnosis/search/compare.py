@@ -120,8 +120,8 @@ def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) ->
     samples = float(np.count_nonzero(weight))
     own = OWN_ERROR * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
     most_left = max(excess(problem, result, weight) * samples, 0.0) + SURE_OF_LEFT * float(np.sqrt(2.0 * samples * problem.doubt))
-    form = min(most_left, FORM_LEFT * form_energy(problem, result, weight))
-    return SURE * problem.doubt + form + stands + own
+    of_form = min(most_left, FORM_LEFT * form_energy(problem, result, weight) + stands)
+    return SURE * problem.doubt + of_form + own
 
 
 def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]) -> float:
