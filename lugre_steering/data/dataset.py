@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from lugre_steering.data.sensing import SensorNoise, louder, sensed
 from lugre_steering.data.smoother import smooth_angle
@@ -26,6 +28,8 @@ BRIDGED_S = 0.05
 """Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
+REACH = 4.0
+"""Standard deviations over which an average reaches."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
 
@@ -65,6 +69,40 @@ class Run:
     """Whether stamps were late by chance: given on receipt, they do not know when the devices measured."""
     clock_s: float = CLOCK_S
     """Standard deviation [s] of what torque and angles may still be apart once their clocks are set."""
+    raw: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """Angles (sides, n) [rad] before smoothing."""
+    average_s: float = 0.0
+    """Standard deviation [s] of the Gaussian average through which ``measured`` is seen, as predictions must be; see ``in_parallel``."""
+    substeps: int = 1
+    """Steps of the chain per sample."""
+
+    @cached_property
+    def steps(self) -> tuple[Array, Array, Array, Array]:
+        """Time, angle, rate and acceleration (sides, 1 + (n - 1) substeps) for the chain; every substep-th is a sample.
+
+        Angles are cubic between samples. The rate on the way is that of the middle of a step, which the friction level follows to second
+        order; a sample has its own.
+        """
+        if self.substeps == 1:
+            return self.time, self.theta, self.omega, self.alpha
+        end = np.arange(1, self.substeps + 1) / self.substeps
+        middle = np.where(end < 1.0, end - 0.5 / self.substeps, 1.0)
+        span = np.diff(self.time)[:, None]
+
+        def between(row: Array, share: Array) -> Array:
+            return row[:-1, None] + np.diff(row)[:, None] * share
+
+        def angle(row: Array, rate: Array) -> Array:
+            bend = (1.0 - end) * span * rate[:-1, None] - end * span * rate[1:, None] + (2.0 * end - 1.0) * np.diff(row)[:, None]
+            return between(row, end) + end * (1.0 - end) * bend
+
+        def joined(first: Array, rows: list[Array]) -> Array:
+            return np.column_stack([first, np.array([row.ravel() for row in rows])])
+
+        theta = joined(self.theta[:, 0], [angle(*both) for both in zip(self.theta, self.omega, strict=True)])
+        omega = joined(self.omega[:, 0], [between(row, middle) for row in self.omega])
+        alpha = joined(self.alpha[:, 0], [between(row, end) for row in self.alpha])
+        return np.append(self.time[0], between(self.time, end)), theta, omega, alpha
 
     @property
     def torque_per_line(self) -> Array:
@@ -80,9 +118,47 @@ def motion(time: Array, theta: Array) -> tuple[Array, Array]:
     samples and flatten short transients (an inertia came out 3 % too large at 125 Hz).
     """
     step = float(time[1] - time[0])
-    omega = np.gradient(theta, step, axis=1)
-    alpha = np.pad(np.diff(theta, 2, axis=1) / step**2, ((0, 0), (1, 1)), mode="edge")
-    return omega, alpha
+    return np.gradient(theta, step, axis=1), acceleration(time, theta)
+
+
+def acceleration(time: Array, theta: Array) -> Array:
+    """Second difference (sides, n) of angles."""
+    step = float(time[1] - time[0])
+    return np.pad(np.diff(theta, 2, axis=1) / step**2, ((0, 0), (1, 1)), mode="edge")
+
+
+def averaged(run: Run, torque: Array) -> Array:
+    """A torque (n,) [N m] through the average of a run."""
+    if not run.average_s:
+        return torque
+    return np.asarray(gaussian_filter1d(torque, run.average_s / float(run.time[1] - run.time[0]), truncate=REACH))
+
+
+def impulse(size: int) -> Array:
+    """One in the middle of zeros (size,)."""
+    return np.asarray(np.arange(size) == size // 2, float)
+
+
+def in_parallel(run: Run, average_s: float) -> Run:
+    """The run with the plain second difference of its angles, whose noise is white before it, and its torque averaged; predictions are
+    averaged alike (parallel filtering, as M. Gautier, ICRA 1997, 2278, for robots).
+
+    Smoothed angles have an acceleration of steps, and errors in a regressor make its coefficient smaller. An average that acts on both
+    sides of an equation takes nothing from one that it leaves on the other.
+    """
+    averaging = replace(run, average_s=average_s)
+    response = averaged(averaging, impulse(run.time.size))
+    reach = 2 * int(np.ceil(REACH * average_s / float(run.time[1] - run.time[0]))) + 3
+    return replace(
+        averaging, alpha=acceleration(run.time, run.raw), measured=averaged(averaging, run.measured),
+        sigma=run.sigma * float(np.linalg.norm(response)),
+        valid=minimum_filter1d(run.valid.astype(np.uint8), reach, mode="constant") > 0,
+    )  # fmt: skip
+
+
+def as_recorded(run: Run) -> Run:
+    """The run with its torque as it was measured, one step of the chain per sample."""
+    return replace(run, measured=run.side_torque.sum(axis=0), average_s=0.0, substeps=1)
 
 
 def prepare(recording: Recording, vehicle: Vehicle) -> Run:
@@ -103,7 +179,8 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     seen = {name: _on_clock(time, signal, sensed(signal)) for name, signal in present.items()}
     worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
     angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else SensorNoise(vehicle.sensors.angle_sigma, 0.0)
-    theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), angle.sigma()) for side in vehicle.sides])
+    raw = np.array([_at(time, present[f"angle/{side}"]) for side in vehicle.sides])
+    theta = np.array([smooth_angle(row, angle.sigma()) for row in raw])
     omega, alpha = motion(time, theta)
     rounding = np.zeros(0)
     if vehicle.hydraulics is not None:
@@ -135,7 +212,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
         air=_air(recording.air_temperature, vehicle), first_air=_first_air(recording.air_temperature), angle=angle,
-        rounding=rounding, angle_unit=angle_unit(vehicle),
+        rounding=rounding, angle_unit=angle_unit(vehicle), raw=raw,
     )  # fmt: skip
 
 
