@@ -28,8 +28,8 @@ BRIDGED_S = 0.05
 """Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
-REACH = 4.0
-"""Standard deviations over which an average reaches."""
+REACH, LONG = 4.0, 0.9
+"""Standard deviations over which an average reaches; share of the time between two samples of the longer of two steps."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
 
@@ -73,36 +73,31 @@ class Run:
     """Angles (sides, n) [rad] before smoothing."""
     average_s: float = 0.0
     """Standard deviation [s] of the Gaussian average through which ``measured`` is seen, as predictions must be; see ``in_parallel``."""
-    substeps: int = 1
-    """Steps of the chain per sample."""
+    midway: bool = False
+    """Whether the friction level follows the rate midway between samples, to second order, and not that at their end."""
 
     @cached_property
     def steps(self) -> tuple[Array, Array, Array, Array]:
-        """Time, angle, rate and acceleration (sides, 1 + (n - 1) substeps) for the chain; every substep-th is a sample.
+        """Time, angle, rate and acceleration (sides, m) as the chain takes them, the first of which is a sample.
 
-        Angles are cubic between samples. The rate on the way is that of the middle of a step, which the friction level follows to second
-        order; a sample has its own.
+        Midway it takes two steps per sample: one nearly as long, at the rate of its middle, and a short one to the sample's own rate.
         """
-        if self.substeps == 1:
+        if not self.midway:
             return self.time, self.theta, self.omega, self.alpha
-        end = np.arange(1, self.substeps + 1) / self.substeps
-        middle = np.where(end < 1.0, end - 0.5 / self.substeps, 1.0)
-        span = np.diff(self.time)[:, None]
+        span = np.diff(self.time)
 
-        def between(row: Array, share: Array) -> Array:
-            return row[:-1, None] + np.diff(row)[:, None] * share
+        def joined(values: Array, between: Array) -> Array:
+            both = np.stack([between, values[..., 1:]], axis=-1)
+            return np.concatenate([values[..., :1], both.reshape(*values.shape[:-1], -1)], axis=-1)
 
-        def angle(row: Array, rate: Array) -> Array:
-            bend = (1.0 - end) * span * rate[:-1, None] - end * span * rate[1:, None] + (2.0 * end - 1.0) * np.diff(row)[:, None]
-            return between(row, end) + end * (1.0 - end) * bend
+        def at(share: float, values: Array) -> Array:
+            return (1.0 - share) * values[..., :-1] + share * values[..., 1:]
 
-        def joined(first: Array, rows: list[Array]) -> Array:
-            return np.column_stack([first, np.array([row.ravel() for row in rows])])
-
-        theta = joined(self.theta[:, 0], [angle(*both) for both in zip(self.theta, self.omega, strict=True)])
-        omega = joined(self.omega[:, 0], [between(row, middle) for row in self.omega])
-        alpha = joined(self.alpha[:, 0], [between(row, end) for row in self.alpha])
-        return np.append(self.time[0], between(self.time, end)), theta, omega, alpha
+        turned = np.diff(self.theta, axis=1)
+        bend = (1.0 - LONG) * (span * self.omega[:, :-1] - turned) - LONG * (span * self.omega[:, 1:] - turned)
+        theta = joined(self.theta, at(LONG, self.theta) + LONG * (1.0 - LONG) * bend)  # cubic between samples
+        omega = joined(self.omega, at(0.5 * LONG, self.omega))
+        return joined(self.time, at(LONG, self.time)), theta, omega, joined(self.alpha, at(LONG, self.alpha))
 
     @property
     def torque_per_line(self) -> Array:
@@ -157,8 +152,8 @@ def in_parallel(run: Run, average_s: float) -> Run:
 
 
 def as_recorded(run: Run) -> Run:
-    """The run with its torque as it was measured, one step of the chain per sample."""
-    return replace(run, measured=run.side_torque.sum(axis=0), average_s=0.0, substeps=1)
+    """The run with its torque as it was measured, and friction as the live node follows it."""
+    return replace(run, measured=run.side_torque.sum(axis=0), average_s=0.0, midway=False)
 
 
 def prepare(recording: Recording, vehicle: Vehicle) -> Run:

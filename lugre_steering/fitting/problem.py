@@ -409,7 +409,7 @@ class Problem:
                     for field, number in candidate.effect.fields(values).items():
                         acting[places[field]] = number
             phases.append((start, acting.view(record.dtype)))
-        return torque_in_phases(phases, self.model.rubber, *run.steps)[:: run.substeps]
+        return torque_in_phases(phases, self.model.rubber, *run.steps)[:: 1 + run.midway]
 
     def predict(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
