@@ -73,7 +73,7 @@ def drawn(seed: int) -> Joint:
     assert plain.torque_sensor is not None
     contact = replace(
         plain.contact, coulomb_torque_Nm=coulomb, static_torque_Nm=coulomb * rng.uniform(1.0, 1.4), stribeck_speed_deg_s=stribeck,
-        stiffness_Nm_per_deg=coulomb / between(0.05, 0.5),
+        stiffness_Nm_per_deg=coulomb / between(0.05, 0.5), presliding_damping_Nms=0.0,
     )  # fmt: skip
     known = plain.replace(
         sensors=replace(plain.sensors, angle_noise_deg=between(0.001, 0.02)),

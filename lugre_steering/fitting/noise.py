@@ -247,7 +247,8 @@ def noise_model(
 
     def changes(bag: int) -> Array:
         """Change of the prediction of one bag by each repetition (draws, n) [N m]."""
-        return np.array([problem.predict(bag, x, effects, run) for run in repeated[bag]]) - base[parts[bag][1]]
+        change = np.array([problem.predict(bag, x, effects, run) for run in repeated[bag]]) - base[parts[bag][1]]
+        return change * parts[bag][0].valid if parts[bag][0].average_s else change  # an average is none at the ends
 
     errors = in_threads(changes, range(len(parts)))
     # Only oil carries pump ripple; a torque sensor is as noisy in motion as at rest.
