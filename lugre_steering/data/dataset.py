@@ -28,7 +28,7 @@ BRIDGED_S = 0.05
 """Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
-REACH, LONG = 4.0, 0.9
+REACH, LONG = 3.0, 0.9
 """Standard deviations over which an average reaches; share of the time between two samples of the longer of two steps."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
