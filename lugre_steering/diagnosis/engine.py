@@ -128,9 +128,8 @@ def _searched(
         clocks = again
         done = investigate(clocks.problem, seed, progress)
     case.found(clocks.findings)
-    # As recorded: an average would make a burst wide and low.
-    problem, final = clocks.problem, done.found.final
-    left = problem.measured - problem.predict_all(final.x, final.effects)
+    problem = done.problem
+    left = problem.measured - done.found.final.prediction
     runs, disturbed = set_aside(problem.runs, np.split(left, problem.edges[1:-1]))
     if disturbed:
         # Physics is judged on what the motion makes; kicks from outside would hide what is small.

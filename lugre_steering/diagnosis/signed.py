@@ -17,7 +17,6 @@ from lugre_steering.diagnosis.finished import amplitude_of
 from lugre_steering.diagnosis.investigate import NULL_DRAWS, recalibrate
 from lugre_steering.fitting.fingerprint import candidates, signature
 from lugre_steering.fitting.noise import repeated_motion
-from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 
@@ -46,7 +45,6 @@ class Signed:
 
 def signed(problem: Problem, seed: int) -> list[Signed]:
     """Every effect of the catalogue that has the same variants in any recording."""
-    problem = as_joint(problem)
     noise, roles, baseline = recalibrate(problem, repeated_motion(problem, NULL_DRAWS, seed), seed)
     weight = np.where(roles.fit, 1.0 / noise.sigma, 0.0)
     basis = baseline.basis()

@@ -15,7 +15,6 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.clocks import earlier
 from lugre_steering.fitting.fit import fit
-from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import split
 from lugre_steering.recording import Array, Finding, Recording
@@ -60,7 +59,7 @@ def left_out(
 def _told(done: Finished, effects: Effects, recordings: Sequence[Recording], seed: int) -> str:
     """Held-out errors with and without the samples that were set aside, in words."""
     vehicle = done.problem.vehicle
-    whole = as_joint(Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], done.problem.calibrations))
+    whole = Problem(vehicle, [prepare(recording, vehicle) for recording in recordings], done.problem.calibrations)
     with_all, without = (_judged(done, problem, effects, seed) for problem in (whole, done.problem))
     errors = f"{done.torque(with_all.before)} instead of {done.torque(without.before)}"
     told = f"with all of it the recalibrated model errs on held-out data by {errors}"
