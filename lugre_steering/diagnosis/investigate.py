@@ -15,7 +15,6 @@ from lugre_steering.diagnosis.form import Bent, bent
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
-from lugre_steering.fitting.parallel import midway
 from lugre_steering.fitting.problem import Problem, is_rig
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
@@ -32,7 +31,6 @@ NOISE_ROUNDS, QUIETER = 2, 0.8
 
 def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = lambda _: None) -> Finished:
     """Recalibrate and search beside the friction law's own freedoms; a vehicle file can hold names, not the freedoms."""
-    problem = midway(problem)
     repeated = repeated_motion(problem, NULL_DRAWS, seed)
     noise, roles, baseline = recalibrate(problem, repeated, seed)
     done = _searched(problem, noise, roles, baseline, progress)

@@ -20,20 +20,15 @@ AVERAGES_S = tuple(0.01 * 2.0 ** (0.5 * k) for k in range(11))
 """Averages tried."""
 
 
-def midway(problem: Problem) -> Problem:
-    """The same with friction midway between samples; of a vehicle, as it is.
+def as_joint(problem: Problem) -> Problem:
+    """The same in parallel, with the shortest average that leaves the inertia next to no bias; of a vehicle, as it is.
 
-    At the rate of a sample's end it would lag, which passed for viscous friction (2 % to 5 % of it at 40 to 100 Hz).
+    Friction at the rate of a sample's end would lag, which passed for viscous friction (2 % to 5 % of it at 40 to 100 Hz).
     """
     if not is_rig(problem.vehicle):
         return problem
-    return problem.over([replace(run, midway=True) for run in problem.runs])
-
-
-def as_joint(problem: Problem) -> Problem:
-    """The same midway, and in parallel with the shortest average that leaves the inertia next to no bias; without inertia as recorded."""
-    plain = midway(problem)
-    if not is_rig(problem.vehicle) or not (inertia := _inertia(plain)):
+    plain = problem.over([replace(run, midway=True) for run in problem.runs])
+    if not (inertia := _inertia(plain)):
         return plain
     for average_s in AVERAGES_S:
         seen = plain.over([in_parallel(run, average_s) for run in plain.runs])

@@ -18,13 +18,13 @@ from lugre_steering.fitting.parallel import as_joint
 
 def in_parallel(done: Finished, final: Fit, seed: int) -> tuple[Finished, Fit, Fit] | None:
     """The search with all samples in parallel to compare in, what was found there fitted to all as recorded with the values that it has in
-    parallel, and fitted in parallel; None of what has no inertia.
+    parallel, and fitted in parallel; None of a vehicle.
 
     Names are sought as recorded: an average hides what is short. But smoothed motion is an error in a regressor, of which the residuals
     say nothing (an inertia came out 3 % to 13 % too small, and sure of it).
     """
     problem = as_joint(done.problem)
-    if not any(run.average_s for run in problem.runs):
+    if problem is done.problem:
         return None
     noise = noise_model(problem, final.x, final.effects, repeated_motion(problem, NULL_DRAWS, seed), seed=seed)
     weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
