@@ -30,6 +30,8 @@ AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
 REACH, LONG = 3.0, 0.9
 """Standard deviations over which an average reaches; share of the time between two samples of the longer of two steps."""
+BRIDGED = 1.5
+"""Times the usual time between messages from which one is missing."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
 
@@ -71,6 +73,8 @@ class Run:
     """Standard deviation [s] of what torque and angles may still be apart once their clocks are set."""
     raw: Array = field(default_factory=lambda: np.zeros((0, 0)))
     """Angles (sides, n) [rad] before smoothing."""
+    bridged: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    """Where a sample of a channel is missing (n,), so that a line is in its place."""
     average_s: float = 0.0
     """Standard deviation [s] of the Gaussian average through which ``measured`` is seen, as predictions must be; see ``in_parallel``."""
     midway: bool = False
@@ -147,7 +151,7 @@ def in_parallel(run: Run, average_s: float) -> Run:
     return replace(
         averaging, alpha=acceleration(run.time, run.raw), measured=averaged(averaging, run.measured),
         sigma=run.sigma * float(np.linalg.norm(response)),
-        valid=minimum_filter1d(run.valid.astype(np.uint8), reach, mode="constant") > 0,
+        valid=minimum_filter1d((run.valid & ~run.bridged).astype(np.uint8), reach, mode="constant") > 0,
     )  # fmt: skip
 
 
@@ -207,7 +211,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
         air=_air(recording.air_temperature, vehicle), first_air=_first_air(recording.air_temperature), angle=angle,
-        rounding=rounding, angle_unit=angle_unit(vehicle), raw=raw,
+        rounding=rounding, angle_unit=angle_unit(vehicle), raw=raw, bridged=_bridged(time, present),
     )  # fmt: skip
 
 
@@ -280,6 +284,16 @@ def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, Mask]:
         after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
         valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(BRIDGED_S, 3.0 * step)
     return time, valid
+
+
+def _bridged(time: Array, signals: dict[str, Signal]) -> Mask:
+    """Where the samples (n,) lie between messages of a channel that are farther apart than usual."""
+    bridged = np.zeros(time.size, bool)
+    for signal in signals.values():
+        spacing = np.diff(signal.time_s)
+        after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
+        bridged |= spacing[after - 1] > BRIDGED * float(np.median(spacing))
+    return bridged
 
 
 def _on_clock(time: Array, signal: Signal, sensor: SensorNoise) -> SensorNoise:

@@ -16,12 +16,15 @@ from lugre_steering.fitting.problem import Problem, is_rig
 
 BIAS = 0.2
 """Most that the noise of the acceleration may move an inertia, in its standard deviation by the noise of the torque."""
+LEFT = 0.3
+"""Share of the samples that an average must leave: it needs all samples in its reach."""
 AVERAGES_S = tuple(0.01 * 2.0 ** (0.5 * k) for k in range(11))
 """Averages tried."""
 
 
 def as_joint(problem: Problem) -> Problem:
-    """The same in parallel, with the shortest average that leaves the inertia next to no bias; of a vehicle, as it is.
+    """The same in parallel, with the shortest average that leaves the inertia next to no bias; of a vehicle, as it is; without
+    inertia, or where too many samples are missing, only midway.
 
     Friction at the rate of a sample's end would lag, which passed for viscous friction (2 % to 5 % of it at 40 to 100 Hz).
     """
@@ -32,6 +35,8 @@ def as_joint(problem: Problem) -> Problem:
         return plain
     for average_s in AVERAGES_S:
         seen = plain.over([in_parallel(run, average_s) for run in plain.runs])
+        if seen.valid.sum() < LEFT * plain.valid.sum():
+            return plain
         inertia = _inertia(seen)
         if _bias(seen.runs, plain.runs, inertia) < BIAS:
             break

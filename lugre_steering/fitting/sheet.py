@@ -286,7 +286,8 @@ def _every(run: Run, stride: int) -> Run:
     if run.average_s:
         alpha = acceleration(time, raw)
     return replace(
-        run, time=time, theta=theta, omega=omega, alpha=alpha, raw=raw, gains=run.gains[:, :, keep], pressure=run.pressure[:, keep],
+        run, time=time, theta=theta, omega=omega, alpha=alpha, raw=raw, bridged=run.bridged[keep],
+        gains=run.gains[:, :, keep], pressure=run.pressure[:, keep],
         side_torque=run.side_torque[:, keep], side_slope=run.side_slope[:, keep], measured=run.measured[keep],
         sigma=run.sigma[keep], valid=run.valid[keep],
     )  # fmt: skip

@@ -14,6 +14,10 @@ from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.parallel import as_joint
+from lugre_steering.fitting.rig import fitted
+
+ROUNDS = 2
+"""Of noise and fit: the noise is that of the acceleration times the inertia, which is not known before."""
 
 
 def in_parallel(done: Finished, final: Fit, seed: int) -> tuple[Finished, Fit, Fit] | None:
@@ -26,9 +30,12 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> tuple[Finished, Fit, F
     problem = as_joint(done.problem)
     if problem is done.problem:
         return None
-    noise = noise_model(problem, final.x, final.effects, repeated_motion(problem, NULL_DRAWS, seed), seed=seed)
-    weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
-    there = fit(problem, weight, final.effects, final.x, linearisations=20)
+    repeated, there = repeated_motion(problem, NULL_DRAWS, seed), final
+    for _ in range(ROUNDS):
+        noise = noise_model(problem, there.x, there.effects, repeated, seed=seed)
+        weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
+        there = fitted(problem, weight, there.effects, there)
+    there = fit(problem, weight, there.effects, there, linearisations=20)
     problem = in_doubt(problem, weight, there)
     seen = replace(done, problem=problem, noise=noise, found=replace(done.found, final=there), beside_form=None)
     held = [(replace(candidate, free=()), values) for candidate, values in there.effects]
