@@ -382,17 +382,14 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
 
 
 def test_intervals_of_what_joints_have_hold_the_truth() -> None:
-    """Five joints at random with four values each: fewer than 17 of 20 are held in 2 % of such draws if 95 % are; 63 % were once, when the
-    acceleration was that of the smoothed angle."""
+    """Five joints at random with four values each, of which one is told nothing; with 95 % held, fewer than 85 % of 16 are in a draw of 25.
+    63 % were, when the acceleration was that of the smoothed angle, and inertias were off by 2.5 %."""
     told = [each for seed in range(101, 106) for each in joints.judged(seed)[0] if each.value is not None]
-    assert len(told) >= 17
-    assert sum(each.held for each in told) >= 0.85 * len(told)
-    for each in told:
-        if each.term == "yaw_inertia":
-            assert each.high - each.low < 0.3 * each.true
+    assert len(told) >= 14
     rows = joints.table(told)
-    assert rows["all"]["told"] == len(told)
+    assert rows["all"]["held"] >= 0.85
     assert rows["yaw_inertia"]["error"] < 0.01
+    assert rows["yaw_inertia"]["half_width"] < 0.1
 
 
 def test_friction_midway_between_samples_is_that_of_far_finer_steps() -> None:
