@@ -16,15 +16,17 @@ import pytest
 import yaml
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from scipy.interpolate import CubicSpline
 from typer.testing import CliRunner
 
 from lugre_steering import replay
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
+from lugre_steering.bench import joints
 from lugre_steering.calibration.calibrate import calibrate_recordings
 from lugre_steering.cli import app
-from lugre_steering.data.dataset import prepare
+from lugre_steering.data.dataset import Run, as_recorded, averaged, ideal_run, in_parallel, prepare
 from lugre_steering.data.quality import inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
@@ -369,11 +371,60 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
     write_recorded(real, tmp_path / "bag", 40.0)
     found = {e.id: e.parameters for e in diagnose([tmp_path / "bag"], base).effects}
     assert set(found) == {"kingpin_jacking", "viscous_friction", "yaw_inertia"}
-    for name, parameter, value in (
-        ("kingpin_jacking", "amplitude", 350.0), ("viscous_friction", "sigma_2", 30.0), ("yaw_inertia", "inertia", 40.0),
+    for name, parameter, value, wide in (
+        ("kingpin_jacking", "amplitude", 350.0, 0.001), ("viscous_friction", "sigma_2", 30.0, 0.04), ("yaw_inertia", "inertia", 40.0, 0.02),
     ):  # fmt: skip
-        assert found[name][parameter].value == pytest.approx(value, rel=0.1)
-    assert found["kingpin_jacking"]["amplitude"].value == pytest.approx(350.0, rel=0.01)
+        low, high = found[name][parameter].ci95
+        assert low is not None
+        assert high is not None
+        assert low < value < high
+        assert high - low < 2.0 * wide * value
+
+
+def test_intervals_of_what_joints_have_hold_the_truth() -> None:
+    """Five joints at random with four values each, of which one is told nothing; with 95 % held, fewer than 85 % of 16 are in a draw of 25.
+    63 % were, when the acceleration was that of the smoothed angle, and inertias were off by 2.5 %."""
+    told = [each for seed in range(101, 106) for each in joints.judged(seed)[0] if each.value is not None]
+    assert len(told) >= 14
+    rows = joints.table(told)
+    assert rows["all"]["held"] >= 0.85
+    assert rows["yaw_inertia"]["error"] < 0.01
+    assert rows["yaw_inertia"]["half_width"] < 0.1
+
+
+def test_friction_midway_between_samples_is_that_of_far_finer_steps() -> None:
+    """Oracle: the chain at 2 kHz, whose own error is a hundredth of what one step per sample makes at 25 Hz."""
+    joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    coarse = motion_of(BUILT_IN["varied-rates"], joint)
+    spline = CubicSpline(coarse.time, coarse.theta, axis=1)
+    time = np.arange(0.0, coarse.time[-1], 5e-4)
+
+    def run_at(each: int) -> Run:
+        at = time[::each]
+        return ideal_run(joint, "a", at, spline(at), (spline(at, 1), spline(at, 2)), np.zeros(at.size), 1.0)
+
+    fine = Problem(joint, [run_at(1)]).predict_all(np.zeros(5))[::80]
+    plain, midway = (Problem(joint, [dataclasses.replace(run_at(80), midway=each)]).predict_all(np.zeros(5)) for each in (False, True))
+    assert np.std(midway - fine) < 0.2 * np.std(plain - fine)
+
+
+def test_an_average_takes_nothing_from_an_inertia_that_it_takes_from_the_torque() -> None:
+    """Least squares on torque = 40 acceleration + noise: smoothed angles make it too small, the average does not, whatever its width."""
+    joint = vehicle_file.load(CONFIG / "single_joint_example.yaml")
+    motion = motion_of(BUILT_IN["varied-rates"], joint)
+    rng, at = np.random.default_rng(3), np.arange(0.0, motion.time[-1], 0.01)
+    angle = np.interp(at, motion.time, motion.theta[0]) + np.radians(0.005) * rng.standard_normal(at.size)
+    torque = 40.0 * np.interp(at, motion.time, motion.acceleration[0]) + 0.3 * rng.standard_normal(at.size)
+    run = prepare(Recording("a", 0, {"left": Signal(at, angle)}, {}, measured_torque=Signal(at, torque)), joint)
+
+    def inertia(seen: Run) -> float:
+        alpha = averaged(seen, seen.alpha[0])[seen.valid]
+        return float(alpha @ seen.measured[seen.valid] / (alpha @ alpha))
+
+    assert inertia(run) < 39.0
+    for average_s in (0.1, 0.14, 0.2):
+        assert inertia(in_parallel(run, average_s)) == pytest.approx(40.0, rel=0.005)
+    assert as_recorded(in_parallel(run, 0.1)).measured == pytest.approx(run.measured)
 
 
 @pytest.mark.parametrize(("engage", "shift"), [(0.2, 0.3), (0.5, -0.3)])

@@ -7,7 +7,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-NAMES = ("kernel", "replay", "fleet", "live", "own_error", "fuzz", "untold", "faults", "soak", "watch", "closed_loop")
+NAMES = ("kernel", "replay", "fleet", "live", "own_error", "fuzz", "untold", "faults", "soak", "watch", "closed_loop", "joints")
 
 
 def main(arguments: list[str]) -> int:

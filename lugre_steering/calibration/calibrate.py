@@ -48,6 +48,7 @@ from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.keys import KEYS, Key
+from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import GAIN, KINGPIN, STATIC, Problem, SheetValue, calibrations_for
 from lugre_steering.fitting.sheet import wrong_sheet
 from lugre_steering.fitting.split import split
@@ -160,6 +161,7 @@ def calibrate_recordings(
     progress("comparing with the vehicle file")
     wrong = wrong_sheet(problem)
     progress("fitting")
+    problem = as_joint(problem)
     fitted = estimate(problem, terms_of(problem), priors=priors)
     problem = problem.doubted(fitted.doubt, problem.typical)
     found = [finding.in_bag(quality.recording.name) for quality in qualities for finding in quality.findings]

@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from lugre_steering.data.sensing import SensorNoise, louder, sensed
 from lugre_steering.data.smoother import smooth_angle
@@ -26,6 +28,10 @@ BRIDGED_S = 0.05
 """Longest step between samples over which the torque still counts as measured, unless the channel is slower than that."""
 AIR_S, AIR_STEP_K = 10.0, 0.25
 """Seconds over which the air is averaged (rubber takes minutes to follow), and the change that counts."""
+REACH, LONG = 3.0, 0.9
+"""Standard deviations over which an average reaches; share of the time between two samples of the longer of two steps."""
+BRIDGED = 1.5
+"""Times the usual time between messages from which one is missing."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
 
@@ -65,6 +71,37 @@ class Run:
     """Whether stamps were late by chance: given on receipt, they do not know when the devices measured."""
     clock_s: float = CLOCK_S
     """Standard deviation [s] of what torque and angles may still be apart once their clocks are set."""
+    raw: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """Angles (sides, n) [rad] before smoothing."""
+    bridged: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    """Where a sample of a channel is missing (n,), so that a line is in its place."""
+    average_s: float = 0.0
+    """Standard deviation [s] of the Gaussian average through which ``measured`` is seen, as predictions must be; see ``in_parallel``."""
+    midway: bool = False
+    """Whether the friction level follows the rate midway between samples, to second order, and not that at their end."""
+
+    @cached_property
+    def steps(self) -> tuple[Array, Array, Array, Array]:
+        """Time, angle, rate and acceleration (sides, m) as the chain takes them, the first of which is a sample.
+
+        Midway it takes two steps per sample: one nearly as long, at the rate of its middle, and a short one to the sample's own rate.
+        """
+        if not self.midway:
+            return self.time, self.theta, self.omega, self.alpha
+        span = np.diff(self.time)
+
+        def joined(values: Array, between: Array) -> Array:
+            both = np.stack([between, values[..., 1:]], axis=-1)
+            return np.concatenate([values[..., :1], both.reshape(*values.shape[:-1], -1)], axis=-1)
+
+        def at(share: float, values: Array) -> Array:
+            return (1.0 - share) * values[..., :-1] + share * values[..., 1:]
+
+        turned = np.diff(self.theta, axis=1)
+        bend = (1.0 - LONG) * (span * self.omega[:, :-1] - turned) - LONG * (span * self.omega[:, 1:] - turned)
+        theta = joined(self.theta, at(LONG, self.theta) + LONG * (1.0 - LONG) * bend)  # cubic between samples
+        omega = joined(self.omega, at(0.5 * LONG, self.omega))
+        return joined(self.time, at(LONG, self.time)), theta, omega, joined(self.alpha, at(LONG, self.alpha))
 
     @property
     def torque_per_line(self) -> Array:
@@ -80,9 +117,47 @@ def motion(time: Array, theta: Array) -> tuple[Array, Array]:
     samples and flatten short transients (an inertia came out 3 % too large at 125 Hz).
     """
     step = float(time[1] - time[0])
-    omega = np.gradient(theta, step, axis=1)
-    alpha = np.pad(np.diff(theta, 2, axis=1) / step**2, ((0, 0), (1, 1)), mode="edge")
-    return omega, alpha
+    return np.gradient(theta, step, axis=1), acceleration(time, theta)
+
+
+def acceleration(time: Array, theta: Array) -> Array:
+    """Second difference (sides, n) of angles."""
+    step = float(time[1] - time[0])
+    return np.pad(np.diff(theta, 2, axis=1) / step**2, ((0, 0), (1, 1)), mode="edge")
+
+
+def averaged(run: Run, torque: Array) -> Array:
+    """A torque (n,) [N m] through the average of a run."""
+    if not run.average_s:
+        return torque
+    return np.asarray(gaussian_filter1d(torque, run.average_s / float(run.time[1] - run.time[0]), truncate=REACH))
+
+
+def impulse(size: int) -> Array:
+    """One in the middle of zeros (size,)."""
+    return np.asarray(np.arange(size) == size // 2, float)
+
+
+def in_parallel(run: Run, average_s: float) -> Run:
+    """The run with the plain second difference of its angles, whose noise is white before it, and its torque averaged; predictions are
+    averaged alike (parallel filtering, as M. Gautier, ICRA 1997, 2278, for robots).
+
+    Smoothed angles have an acceleration of steps, and errors in a regressor make its coefficient smaller. An average that acts on both
+    sides of an equation takes nothing from one that it leaves on the other.
+    """
+    averaging = replace(run, average_s=average_s)
+    response = averaged(averaging, impulse(run.time.size))
+    reach = 2 * int(np.ceil(REACH * average_s / float(run.time[1] - run.time[0]))) + 3
+    return replace(
+        averaging, alpha=acceleration(run.time, run.raw), measured=averaged(averaging, run.measured),
+        sigma=run.sigma * float(np.linalg.norm(response)),
+        valid=minimum_filter1d((run.valid & ~run.bridged).astype(np.uint8), reach, mode="constant") > 0,
+    )  # fmt: skip
+
+
+def as_recorded(run: Run) -> Run:
+    """The run with its torque as it was measured, and friction as the live node follows it."""
+    return replace(run, measured=run.side_torque.sum(axis=0), average_s=0.0, midway=False)
 
 
 def prepare(recording: Recording, vehicle: Vehicle) -> Run:
@@ -103,7 +178,8 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     seen = {name: _on_clock(time, signal, sensed(signal)) for name, signal in present.items()}
     worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
     angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else SensorNoise(vehicle.sensors.angle_sigma, 0.0)
-    theta = np.array([smooth_angle(_at(time, present[f"angle/{side}"]), angle.sigma()) for side in vehicle.sides])
+    raw = np.array([_at(time, present[f"angle/{side}"]) for side in vehicle.sides])
+    theta = np.array([smooth_angle(row, angle.sigma()) for row in raw])
     omega, alpha = motion(time, theta)
     rounding = np.zeros(0)
     if vehicle.hydraulics is not None:
@@ -135,7 +211,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         name=recording.name, time=time, theta=theta, omega=omega, alpha=alpha, gains=gains, pressure=pressure,
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
         air=_air(recording.air_temperature, vehicle), first_air=_first_air(recording.air_temperature), angle=angle,
-        rounding=rounding, angle_unit=angle_unit(vehicle),
+        rounding=rounding, angle_unit=angle_unit(vehicle), raw=raw, bridged=_bridged(time, present),
     )  # fmt: skip
 
 
@@ -208,6 +284,16 @@ def _clock(name: str, signals: dict[str, Signal]) -> tuple[Array, Mask]:
         after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
         valid &= signal.time_s[after] - signal.time_s[after - 1] <= max(BRIDGED_S, 3.0 * step)
     return time, valid
+
+
+def _bridged(time: Array, signals: dict[str, Signal]) -> Mask:
+    """Where the samples (n,) lie between messages of a channel that are farther apart than usual."""
+    bridged = np.zeros(time.size, bool)
+    for signal in signals.values():
+        spacing = np.diff(signal.time_s)
+        after = np.clip(np.searchsorted(signal.time_s, time), 1, signal.time_s.size - 1)
+        bridged |= spacing[after - 1] > BRIDGED * float(np.median(spacing))
+    return bridged
 
 
 def _on_clock(time: Array, signal: Signal, sensor: SensorNoise) -> SensorNoise:

@@ -20,7 +20,7 @@ from scipy.optimize import nnls
 from scipy.signal import butter, sosfiltfilt
 
 from lugre_steering.chain.baseline import REST_RATE_RAD_S
-from lugre_steering.data.dataset import Run, motion
+from lugre_steering.data.dataset import Run, acceleration, averaged, impulse, motion
 from lugre_steering.data.smoother import smooth_angle
 from lugre_steering.fitting.problem import Candidate, Problem, Values, in_threads
 from lugre_steering.recording import Array
@@ -89,7 +89,7 @@ def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     size = min(round(CHUNK_S / dt), int(np.median([stretch.shape[1] for stretch in stretches]))) if stretches else 0
     chunks = [s[:, k : k + size] for s in stretches for k in range(0, s.shape[1] - size + 1, max(size, 1))]
     if size <= 2 * order or len(chunks) * size * dt < MIN_QUIET_S:
-        return QuietNoise(1.0, np.ones(1), assumed=True)
+        return QuietNoise(1.0, _white(runs[0]), assumed=True)
     torque, sigma = np.moveaxis(np.array(chunks), 1, 0)
     clean = _detrend(torque.T) / sigma.T
     seen = _autocovariance(clean, order)
@@ -104,6 +104,14 @@ def quiet_noise(runs: Sequence[Run]) -> QuietNoise:
     significance[1:] = np.where(np.abs(significance[1:]) > 3.0 / np.sqrt(clean.size), significance[1:], 0.0)
     significance *= 1.0 - np.arange(order + 1) / (order + 1)
     return QuietNoise(float(np.sqrt(covariance[0])), significance)
+
+
+def _white(run: Run) -> Array:
+    """Autocorrelation of white noise, by lag, through the average of a run."""
+    response = averaged(run, impulse(run.time.size))
+    response = response[response > 0.0]
+    correlation = np.convolve(response, response[::-1])[response.size - 1 :]
+    return np.asarray(correlation / correlation[0])
 
 
 def _detrend(columns: Array) -> Array:
@@ -201,6 +209,8 @@ def repeated_motion(problem: Problem, draws: int, seed: int) -> list[list[Run]]:
             noisy = _sensed_again(run, sigma, rng, sensors)
             theta = np.array([smooth_angle(row, sigma) for row in noisy])
             omega, alpha = motion(run.time, theta)
+            if run.average_s:
+                alpha = run.alpha + acceleration(run.time, noisy - run.theta)
             repeated.append(replace(run, theta=theta, omega=omega, alpha=alpha))
         return repeated
 
@@ -237,7 +247,8 @@ def noise_model(
 
     def changes(bag: int) -> Array:
         """Change of the prediction of one bag by each repetition (draws, n) [N m]."""
-        return np.array([problem.predict(bag, x, effects, run) for run in repeated[bag]]) - base[parts[bag][1]]
+        change = np.array([problem.predict(bag, x, effects, run) for run in repeated[bag]]) - base[parts[bag][1]]
+        return change * parts[bag][0].valid if parts[bag][0].average_s else change  # an average is none at the ends
 
     errors = in_threads(changes, range(len(parts)))
     # Only oil carries pump ripple; a torque sensor is as noisy in motion as at rest.

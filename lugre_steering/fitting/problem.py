@@ -17,7 +17,7 @@ import numpy as np
 from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.lag import lagged
 from lugre_steering.chain.step import torque_in_phases
-from lugre_steering.data.dataset import Run
+from lugre_steering.data.dataset import Run, averaged
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array, IntArray
@@ -409,7 +409,7 @@ class Problem:
                     for field, number in candidate.effect.fields(values).items():
                         acting[places[field]] = number
             phases.append((start, acting.view(record.dtype)))
-        return torque_in_phases(phases, self.model.rubber, run.time, run.theta, run.omega, run.alpha)
+        return torque_in_phases(phases, self.model.rubber, *run.steps)[:: 1 + run.midway]
 
     def predict(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
@@ -427,7 +427,7 @@ class Problem:
             if candidate.effect.hooks.keys() & SENSOR_HOOKS:
                 changed = self._through_sensor(run, candidate, values, torque, start)
                 torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
-        return torque / self.gain(x) + self._bending(x)[own]
+        return averaged(run, torque) / self.gain(x) + self._bending(x)[own]
 
     def _bending(self, x: Array) -> Array:
         """Torque (n,) of the bends; kept, as it is the same for all bags and while a fit moves anything else."""

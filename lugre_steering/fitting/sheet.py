@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lugre_steering.data.dataset import Run, motion, with_hydraulics
+from lugre_steering.data.dataset import Run, acceleration, motion, with_hydraulics
 from lugre_steering.fitting.entries import (
     CONSERVATIVE,
     LEVEL,
@@ -282,8 +282,12 @@ def _every(run: Run, stride: int) -> Run:
     keep = slice(None, None, stride)
     time, theta = run.time[keep].copy(), run.theta[:, keep].copy()
     omega, alpha = motion(time, theta)
+    raw = run.raw[:, keep]
+    if run.average_s:
+        alpha = acceleration(time, raw)
     return replace(
-        run, time=time, theta=theta, omega=omega, alpha=alpha, gains=run.gains[:, :, keep], pressure=run.pressure[:, keep],
+        run, time=time, theta=theta, omega=omega, alpha=alpha, raw=raw, bridged=run.bridged[keep],
+        gains=run.gains[:, :, keep], pressure=run.pressure[:, keep],
         side_torque=run.side_torque[:, keep], side_slope=run.side_slope[:, keep], measured=run.measured[keep],
         sigma=run.sigma[keep], valid=run.valid[keep],
     )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.chain.compiled import njit
 from lugre_steering.chain.rates import MOTION, follow
-from lugre_steering.data.dataset import Run, _at
+from lugre_steering.data.dataset import Run, _at, as_recorded
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.vehicle import Vehicle
@@ -37,7 +37,7 @@ def causal_rmse(vehicle: Vehicle, recordings: Sequence[Recording], runs: Sequenc
 def _seen_live(vehicle: Vehicle, recording: Recording, run: Run) -> Run:
     """The run with the motion that a causal filter makes of the recorded angles, and rates where they were recorded."""
     motion = np.array([_causal(vehicle, recording, side, run.time) for side in vehicle.sides])
-    return replace(run, theta=motion[:, 0], omega=motion[:, 1], alpha=motion[:, 2])
+    return replace(as_recorded(run), theta=motion[:, 0], omega=motion[:, 1], alpha=motion[:, 2])
 
 
 def _causal(vehicle: Vehicle, recording: Recording, side: str, time: Array) -> Array:

@@ -15,6 +15,7 @@ from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
+from lugre_steering.diagnosis.conclude.joint import in_parallel
 from lugre_steering.diagnosis.conclude.late import fitted_to_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws
 from lugre_steering.diagnosis.conclude.stands import CONTRADICTED, Stands, standing, without_laws
@@ -46,10 +47,10 @@ def conclude(
 ) -> Diagnosis:
     """The result of a search; ``findings``: what the check of the data found in the recordings, ``material``: see ``diagnose``."""
     done, stands = standing(done, seed, progress)
-    model, effects, vehicle, causal = _with_file(done, stands, recordings, material)
+    model, effects, vehicle, causal = _with_file(done, stands, recordings, material, seed)
     if stands.lawful is not None:
         bare = without_laws(done, stands, seed)
-        other = _with_file(done, bare, recordings, material)
+        other = _with_file(done, bare, recordings, material, seed)
         if causal > (1.0 + CONTRADICTED) * other.causal:  # explained when all is known, and a harm live
             stands, (model, effects, vehicle, causal) = bare, other
     form = _form(done, stands, vehicle, causal, recordings)
@@ -84,14 +85,14 @@ class _WithFile(NamedTuple):
     causal: float
 
 
-def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float) -> _WithFile:
-    model = _modelled(done, stands)
+def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float, seed: int) -> _WithFile:
+    model = _modelled(done, stands, seed)
     effects = named_effects(model.done, model.whole, model.bent, material) if stands.named else []
     vehicle = _written(model, stands, effects)
     return _WithFile(model, effects, vehicle, causal_rmse(vehicle, recordings, done.problem.runs))
 
 
-def _modelled(done: Finished, stands: Stands) -> _Modelled:
+def _modelled(done: Finished, stands: Stands, seed: int) -> _Modelled:
     final = done.found.final if stands.named or stands.clock else done.found.baseline
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
@@ -99,6 +100,8 @@ def _modelled(done: Finished, stands: Stands) -> _Modelled:
     if (lawful := stands.lawful) is None and stands.named and (form := stands.form) is not None:
         return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, [], "", stands.left)
     if lawful is None:
+        if stands.named and (joint := in_parallel(done, final, seed)) is not None:
+            done, whole, bent = joint
         return _Modelled(done, final, whole, bent, [], "", stands.left)
     beside, laws = replace(done, problem=lawful.problem), described(lawful, stands.nearest)
     law = sentence(laws, done.torque)

@@ -41,7 +41,7 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.sensors import with_sensors
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine
+from lugre_steering.fitting.trial import PARTIAL, SURE_SIGMA, TRIAL_TOLERANCE, Round, Trial, ranked, refine
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -220,7 +220,7 @@ def _of_sure_size(
         effects = list(current.effects)
         if shapeless or whole[least] < least_size:
             del kept[least], effects[least]
-        elif not given or not (parts := _unsure_parts(kept, sizes, current, least_size)):
+        elif not given or not (parts := _unsure_parts(kept, sizes, current)):
             return kept, current
         else:
             _, least, part = min(parts)
@@ -231,15 +231,14 @@ def _of_sure_size(
     return kept, current
 
 
-def _unsure_parts(
-    kept: Sequence[Found], sizes: Sequence[Mapping[str, float]], current: Fit, least_size: float
-) -> list[tuple[float, int, str]]:
-    """Optional parts of the terms of every joint whose size is not sure: that, which term and which part."""
+def _unsure_parts(kept: Sequence[Found], sizes: Sequence[Mapping[str, float]], current: Fit) -> list[tuple[float, int, str]]:
+    """Optional parts of the terms of every joint whose size is not sure: that, which term and which part. What is kept by chance takes as
+    much from the term itself."""
     return [
         (size, i, name)
         for i, (item, own) in enumerate(zip(kept, sizes, strict=True))
         for name, size in own.items()
-        if item.given and size < least_size and current.effects[i][0].parameter(name).optional
+        if item.given and size < SURE_SIGMA and current.effects[i][0].parameter(name).optional
     ]
 
 
