@@ -15,6 +15,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from lugre_steering.diagnosis.engine import diagnose_recordings
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Array, Kind, Recording
 from lugre_steering.resources import config_folder
 from lugre_steering.serialise import as_json
@@ -22,7 +23,8 @@ from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.vehicle import EffectEntry, Vehicle, load
 
-TERMS = (("kingpin_jacking", "amplitude"), ("slope_bias", "torque"), ("viscous_friction", "sigma_2"), ("yaw_inertia", "inertia"))
+TERMS = tuple((effect.id, effect.amplitudes[0]) for effect in CATALOGUE.values() if effect.of_every_joint)
+"""What every joint may have, and the value by which it is counted."""
 STEP_S = 5e-4
 """Of the simulation: its own error passes for 0.5 % of viscous friction at the 2 ms of recordings to look at."""
 SMOOTHED = 3
@@ -64,10 +66,11 @@ def drawn(seed: int) -> Joint:
     coulomb, stribeck = between(5.0, 100.0), between(0.5, 5.0)
     motion = _sweeps(rng, between(8.0, 60.0)) if seed % 2 else _sines(rng, between(8.0, 60.0))
     rate, acceleration = float(np.abs(motion.rate).max()), float(np.abs(motion.acceleration).max())
-    truth = {
-        "kingpin_jacking": coulomb * between(0.5, 10.0), "slope_bias": coulomb * between(0.1, 1.0) * float(rng.choice([-1.0, 1.0])),
-        "viscous_friction": coulomb * between(0.2, 2.0) / rate, "yaw_inertia": coulomb * between(0.2, 3.0) / acceleration,
+    values = {
+        "amplitude": coulomb * between(0.5, 10.0), "torque": coulomb * between(0.1, 1.0) * float(rng.choice([-1.0, 1.0])),
+        "sigma_2": coulomb * between(0.2, 2.0) / rate, "inertia": coulomb * between(0.2, 3.0) / acceleration,
     }  # fmt: skip
+    truth = {name: values[parameter] for name, parameter in TERMS}
     plain = load(config_folder() / "single_joint_example.yaml").replace(gravity=None)
     assert plain.contact is not None
     assert plain.torque_sensor is not None

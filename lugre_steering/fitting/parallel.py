@@ -48,8 +48,8 @@ def _inertia(problem: Problem) -> float:
     known = [candidate.effect.id for candidate, _ in problem.standing]
     terms = [c for c in candidates(problem, known) if c.effect.of_every_joint]
     fitted = fit(problem, problem.sensor_weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms])
-    values = {candidate.effect.id: own for candidate, own in (*problem.standing, *fitted.effects)}
-    return values["yaw_inertia"]["inertia"]
+    every = [effect for effect in (*problem.standing, *fitted.effects) if effect[0].effect.of_every_joint]
+    return next(own[c.effect.amplitudes[0]] for c, own in every if c.effect.coordinate == "steering acceleration")
 
 
 def _bias(seen: Sequence[Run], plain: Sequence[Run], inertia: float) -> float:
