@@ -115,13 +115,13 @@ def _volume(problem: Problem, gram: Array) -> float:
 def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) -> float:
     """Energy that a name must take to be believed, where ``result`` has it; ``stands``: ``may_differ`` of the names before it.
 
-    Of what freedoms and names do, some part is always of another form than nature: as much as may be left, as far as that may be of theirs.
+    Of what freedoms and names do, some part is always of another form than nature; of the freedoms as much as may be left at most.
     """
     samples = float(np.count_nonzero(weight))
     own = OWN_ERROR * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
     most_left = max(excess(problem, result, weight) * samples, 0.0) + SURE_OF_LEFT * float(np.sqrt(2.0 * samples * problem.doubt))
-    of_form = min(most_left, FORM_LEFT * form_energy(problem, result, weight) + stands)
-    return SURE * problem.doubt + of_form + own
+    form = min(most_left, FORM_LEFT * form_energy(problem, result, weight))
+    return SURE * problem.doubt + form + stands + own
 
 
 def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]) -> float:
