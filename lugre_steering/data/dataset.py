@@ -235,10 +235,18 @@ def with_hydraulics(run: Run, vehicle: Vehicle) -> Run:
     return replace(run, gains=gains, side_torque=side_torque, side_slope=side_slope, measured=side_torque.sum(axis=0))
 
 
+def measured_with(run: Run, vehicle: Vehicle) -> Array:
+    """The measured torque (n,) alone of such a run."""
+    return np.asarray(_sides_torque(line_gains(vehicle, run.theta), run.pressure).sum(axis=0))
+
+
 def _of_sides(gains: Array, turned: Array, pressure: Array) -> tuple[Array, Array]:
     """Torque of each side (sides, n) [N m] by its gains (sides, lines, n), and its slope [N m/rad] by those of angles turned a little."""
-    slopes = (turned - gains) / TURNED_RAD
-    return np.einsum("slt,lt->st", gains, pressure), np.einsum("slt,lt->st", slopes, pressure)
+    return _sides_torque(gains, pressure), _sides_torque((turned - gains) / TURNED_RAD, pressure)
+
+
+def _sides_torque(gains: Array, pressure: Array) -> Array:
+    return np.asarray(np.einsum("slt,lt->st", gains, pressure))
 
 
 def _first_air(recorded: Signal | None) -> float | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg.blas import dger
@@ -54,18 +55,27 @@ class Fit:
 
     def basis(self, without: slice | None = None) -> Array:
         """Orthonormal columns (n, k) that span what the fitted values can change, but for those ``without``; weighted too."""
-        columns = self.jacobian if without is None else np.delete(self.jacobian, without, axis=1)
-        return np.asarray(np.linalg.qr(normalised(columns))[0])
+        return self._basis if without is None else _orthonormal(np.delete(self.jacobian, without, axis=1))
+
+    @cached_property
+    def _basis(self) -> Array:
+        """The whole basis, which many hypotheses about one fit ask for."""
+        return _orthonormal(self.jacobian)
 
     def tangent(self) -> Array:
         """Orthonormal columns (n + q, k): what the fitted values can change, and below it what that costs by their priors."""
-        return np.asarray(np.linalg.qr(normalised(np.vstack([self.jacobian, np.diag(self.pull)])))[0])
+        return _orthonormal(np.vstack([self.jacobian, np.diag(self.pull)]))
 
 
 def normalised(columns: Array) -> Array:
     """Columns (n, k) of unit length; those that do nothing are left out."""
     norms = np.linalg.norm(columns, axis=0)
     return np.asarray(columns[:, norms > 0.0] / norms[norms > 0.0])
+
+
+def _orthonormal(columns: Array) -> Array:
+    """Orthonormal columns (n, j) that span columns (n, k)."""
+    return np.asarray(np.linalg.qr(normalised(columns))[0])
 
 
 def fit(

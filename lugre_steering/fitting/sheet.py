@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lugre_steering.data.dataset import Run, acceleration, motion, with_hydraulics
+from lugre_steering.data.dataset import Run, acceleration, measured_with, motion, with_hydraulics
 from lugre_steering.fitting.entries import (
     CONSERVATIVE,
     LEVEL,
@@ -341,7 +341,8 @@ def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator
     promising = sorted((key for key in shares if shares[key][2] >= least), key=lambda key: -shares[key][2])
     for key in promising[:MOST_SIZES]:
         change, factor, _ = shares[key]
-        factor, _ = _better(problem, *_refitted(problem, baseline, change(factor)), change, factor)
+        trial, result = _refitted(problem, baseline, change(factor))
+        factor, _ = _better(problem, trial.measured, result, change, factor)
         yield _tried(problem, *_refitted(problem, baseline, change(factor)), key, factor)
     if not least:  # levers of half or twice the length are too far off for a linearisation
         arms = [(resized(hydraulics.cylinders, knuckle, factor), factor) for factor in ARMS]
@@ -358,16 +359,17 @@ def _best(problem: Problem, baseline: Fit, change: Resized) -> tuple[float, floa
     noise that it would explain: by steps, since arms and areas are no lines."""
     weight, basis, factor = problem.sensor_weight, baseline.basis(), 1.0
 
-    def left(trial: Problem) -> float:
-        error = (trial.measured - baseline.prediction) * weight
+    def left(measured: Array) -> float:
+        error = (measured - baseline.prediction) * weight
         own = error - basis @ (basis.T @ error)
-        return float(own @ own) * _seen(problem) / _seen(trial)
+        return float(own @ own) * _seen(problem) / _energy(problem, measured)
 
-    before = least = left(problem)
+    before = least = left(problem.measured)
+    measured = _measured(problem, change(factor))
     for _ in range(STEPS):
-        trial = _changed(problem, change(factor))
-        further, _ = _better(problem, trial, baseline, change, factor)
-        reached = left(_changed(problem, change(further)))
+        further, _ = _better(problem, measured, baseline, change, factor)
+        measured = _measured(problem, change(further))
+        reached = left(measured)
         if not reached < least:
             break
         factor, least = further, reached
@@ -380,16 +382,14 @@ def _refitted(problem: Problem, baseline: Fit, cylinders: Mapping[str, Cylinder]
     return trial, _fitted(trial, start=baseline.x)
 
 
-def _better(
-    problem: Problem, trial: Problem, result: Fit, change: Resized, factor: float
-) -> tuple[float, float]:
-    """The factor on one entry that explains most of what is left, by how it changes the measured torque, and which share of what is
-    left beyond noise it would explain."""
-    weight = trial.sensor_weight
-    turned = (_changed(problem, change(factor * 1.02)).measured - trial.measured) * weight / 0.02
+def _better(problem: Problem, measured: Array, result: Fit, change: Resized, factor: float) -> tuple[float, float]:
+    """The factor on one entry that explains most of what is left, by how it changes the ``measured`` torque (n,) that it makes, and which
+    share of what is left beyond noise it would explain."""
+    weight = problem.sensor_weight
+    turned = (_measured(problem, change(factor * 1.02)) - measured) * weight / 0.02
     basis = result.basis()
     own = turned - basis @ (basis.T @ turned)
-    left = (trial.measured - result.prediction) * weight
+    left = (measured - result.prediction) * weight
     power, along = float(own @ own), float(own @ left)
     if not power > 0.0:
         return factor, 0.0
@@ -407,17 +407,30 @@ def _could_be_better(problem: Problem, trial: Problem, baseline: Fit) -> bool:
 
 def _seen(problem: Problem) -> float:
     """Sum of squares of the measured torque."""
-    return float(np.sum(problem.measured[problem.valid] ** 2))
+    return _energy(problem, problem.measured)
+
+
+def _energy(problem: Problem, torque: Array) -> float:
+    """Sum of squares of a torque (n,) where samples are valid."""
+    return float(np.sum(torque[problem.valid] ** 2))
 
 
 def _changed(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Problem:
     """The problem of a vehicle with other cylinders."""
+    vehicle = _with_cylinders(problem, cylinders)
+    return problem.of_sheet(vehicle, runs=[with_hydraulics(run, vehicle) for run in problem.runs])
+
+
+def _measured(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Array:
+    """The measured torque (n,) of that alone, which is far quicker."""
+    vehicle = _with_cylinders(problem, cylinders)
+    return np.concatenate([measured_with(run, vehicle) for run in problem.runs])
+
+
+def _with_cylinders(problem: Problem, cylinders: Mapping[str, Cylinder]) -> Vehicle:
     hydraulics = problem.vehicle.hydraulics
     assert hydraulics is not None
-    vehicle: Vehicle = problem.vehicle.replace(
-        hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, **cylinders})
-    )
-    return problem.of_sheet(vehicle, runs=[with_hydraulics(run, vehicle) for run in problem.runs])
+    return problem.vehicle.replace(hydraulics=replace(hydraulics, cylinders={**hydraulics.cylinders, **cylinders}))
 
 
 def _tried(problem: Problem, trial: Problem, result: Fit, key: str, factor: float | None, freed: Sequence[str] = ()) -> _Tried:
