@@ -19,8 +19,9 @@ settings.register_profile("shared", deadline=None, suppress_health_check=[Health
 settings.load_profile("shared")
 
 LONGEST = (
-    "test_engine_names.py", "test_rigs.py", "test_engine.py", "test_own_physics.py", "test_laws_found.py", "test_replay.py", "test_docs.py",
-    "test_fleet.py", "test_scoreboard.py", "test_library.py", "test_reality.py", "test_form.py",
+    "test_engine_names.py", "test_reality.py", "test_rigs.py", "test_engine.py", "test_fleet.py", "test_replay.py", "test_library.py",
+    "test_own_physics.py", "test_laws_found.py", "test_search_parts.py", "test_scoreboard.py", "test_emps.py", "test_simulator.py",
+    "test_readme.py", "test_form.py", "test_docs.py",
 )  # fmt: skip
 """Files that take twenty seconds and more: begun last, one would keep its process busy when all others have finished."""
 LIVE = "node"

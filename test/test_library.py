@@ -167,8 +167,14 @@ def diagnosis(slow: Path) -> ls.Diagnosis:
 
 
 @pytest.fixture(scope="module")
-def calibration() -> ls.Calibration:
-    return ls.calibrate([DOUBLE_CYCLE], str(VEHICLE))
+def slow_cycle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """DOUBLE_CYCLE at 20 Hz, which is quicker to calibrate."""
+    return thinned_bag(DOUBLE_CYCLE, tmp_path_factory.mktemp("slow_cycle"))
+
+
+@pytest.fixture(scope="module")
+def calibration(slow_cycle: Path) -> ls.Calibration:
+    return ls.calibrate([slow_cycle], str(VEHICLE))
 
 
 @pytest.fixture(scope="module")
@@ -192,8 +198,8 @@ def test_a_diagnosis_is_that_of_the_command(diagnosis: ls.Diagnosis, slow: Path,
         assert len(differing) <= 1  # the date
 
 
-def test_a_calibration_is_that_of_the_command(calibration: ls.Calibration, tmp_path: Path) -> None:
-    said = run("calibrate", DOUBLE_CYCLE, "--vehicle", VEHICLE, "--out", tmp_path)
+def test_a_calibration_is_that_of_the_command(calibration: ls.Calibration, slow_cycle: Path, tmp_path: Path) -> None:
+    said = run("calibrate", slow_cycle, "--vehicle", VEHICLE, "--out", tmp_path)
     own = json.loads(calibration.to_json())
     assert list(own) == list(said)
     assert {key for key in said if own[key] != said[key]} <= {"date", "bags", "vehicle", "picture", "picture_note", "provenance"}
