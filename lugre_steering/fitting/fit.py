@@ -198,14 +198,21 @@ class _Vector:
         moved = p.copy()
         moved[j] += step
         x, effects = self.values(moved)
-        if len(problem.calibrations) <= j < self.nuisances:
-            bag = (j - len(problem.calibrations)) % len(problem.runs)
-            column = np.zeros_like(base)
+        column = np.zeros_like(base)
+        for bag in self._acts_in(j):
             part = slice(problem.edges[bag], problem.edges[bag + 1])
             column[part] = (problem.predict(bag, x, effects) - base[part]) / step
-            return column
-        moved_prediction = np.concatenate([problem.predict(i, x, effects) for i in range(len(problem.runs))])
-        return np.asarray((moved_prediction - base) / step)
+        return column
+
+    def _acts_in(self, j: int) -> Sequence[int]:
+        """Bags whose prediction a value changes: its own of a bristle or weather, those in which its effect acts."""
+        first, bags = len(self.problem.calibrations), range(len(self.problem.runs))
+        if j < first:
+            return bags
+        if j < self.nuisances:
+            return [(j - first) % len(bags)]
+        candidate = self.effects[self.free[j - self.nuisances][0]][0]
+        return [bag for bag in bags if candidate.active_in(bag)]
 
 
 class _Descent:
