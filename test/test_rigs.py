@@ -31,9 +31,10 @@ from lugre_steering.data.quality import inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
 from lugre_steering.diagnosis.report.page import write_report
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE, leaving_out
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.estimator import Estimator
+from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Recording, Signal
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
@@ -390,6 +391,16 @@ def test_intervals_of_what_joints_have_hold_the_truth() -> None:
     assert rows["all"]["held"] >= 0.75
     assert rows["yaw_inertia"]["error"] < 0.01
     assert rows["yaw_inertia"]["half_width"] < 0.1
+
+
+def test_what_is_not_considered_needs_no_average() -> None:
+    joint = joints.drawn(103)
+    problem = Problem(joint.sheet, [prepare(joint.recording, joint.sheet)])
+    assert as_joint(problem).runs[0].average_s > 0.0
+    with leaving_out(["yaw_inertia"]):
+        (run,) = as_joint(Problem(joint.sheet, problem.runs)).runs
+    assert run.midway
+    assert run.average_s == 0.0
 
 
 def test_friction_midway_between_samples_is_that_of_far_finer_steps() -> None:

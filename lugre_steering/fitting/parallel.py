@@ -44,12 +44,12 @@ def as_joint(problem: Problem) -> Problem:
 
 
 def _inertia(problem: Problem) -> float:
-    """Of a fit with all that every joint may have [kg m2]."""
+    """Of a fit with all that every joint may have [kg m2]; zero where an inertia is not considered."""
     known = [candidate.effect.id for candidate, _ in problem.standing]
     terms = [c for c in candidates(problem, known) if c.effect.of_every_joint]
     fitted = fit(problem, problem.sensor_weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms])
     every = [effect for effect in (*problem.standing, *fitted.effects) if effect[0].effect.of_every_joint]
-    return next(own[c.effect.amplitudes[0]] for c, own in every if c.effect.coordinate == "steering acceleration")
+    return next((own[c.effect.amplitudes[0]] for c, own in every if c.effect.coordinate == "steering acceleration"), 0.0)
 
 
 def _bias(seen: Sequence[Run], plain: Sequence[Run], inertia: float) -> float:

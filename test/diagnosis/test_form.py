@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.form import bent
 from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
+from lugre_steering.diagnosis.search import compare
 from lugre_steering.fitting.apply import apply_calibration
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
@@ -99,6 +100,22 @@ def test_no_name_is_given_to_friction_of_another_form() -> None:
     per_sample = [form_energy(there.problem, baseline, used) / np.count_nonzero(used) for used in (there.fitted, there.held)]
     assert per_sample[1] == pytest.approx(per_sample[0])
     assert per_sample[0] > 1.0
+
+
+def test_what_a_name_must_take_is_what_is_left_until_all_of_it_may_be_the_form() -> None:
+    """However much the freedoms do: where they leave nothing, a name need not take a share of that; noise of known energy adds itself."""
+    done = rubbed()
+    assert done.beside_form is not None
+    there, used = done.beside_form, done.beside_form.fitted
+    baseline, sigma = there.found.baseline, np.divide(1.0, used, out=np.zeros(used.size), where=used > 0.0)
+    signs = np.random.default_rng(5).choice([-1.0, 1.0], used.size)
+    worse = {size: replace(baseline, prediction=baseline.prediction + size * signs * sigma) for size in (0.0, 1.0, 10.0, 20.0)}
+    asked = {size: compare.needed(there.problem, result, used) for size, result in worse.items()}
+    whole = form_energy(there.problem, baseline, used)
+    assert asked[0.0] < 0.002 * whole
+    left = float(np.sum(((there.problem.measured - worse[1.0].prediction) * used) ** 2)) - np.count_nonzero(used)
+    assert asked[1.0] - asked[0.0] == pytest.approx(left)  # the errors of the baseline itself are within noise
+    assert asked[10.0] == asked[20.0] == pytest.approx(FORM_LEFT * whole, rel=0.01)
 
 
 def error_elsewhere(vehicle: Vehicle) -> float:

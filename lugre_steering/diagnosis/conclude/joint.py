@@ -10,6 +10,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import NULL_DRAWS
+from lugre_steering.diagnosis.search.surely import least_sure_part, without_part
 from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
@@ -37,6 +38,9 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> tuple[Finished, Fit, F
         there = fitted(problem, weight, there.effects, there)
     there = fit(problem, weight, there.effects, there, linearisations=20)
     problem = in_doubt(problem, weight, there)
+    terms = [i for i, (candidate, _) in enumerate(there.effects) if candidate.effect.of_every_joint]
+    while (part := least_sure_part(problem, weight, done.roles, there, terms)) is not None:
+        there = fit(problem, weight, without_part(there.effects, *part), there.x, linearisations=20)
     seen = replace(done, problem=problem, noise=noise, found=replace(done.found, final=there), beside_form=None)
     held = [(replace(candidate, free=()), values) for candidate, values in there.effects]
     whole = fit(done.problem, done.weight, held, there.x, linearisations=20)

@@ -8,7 +8,7 @@ neither makes up for their form nor is made up for by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ from lugre_steering.diagnosis.search.compare import (
 )
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal, closer, in_its_place, proposed
-from lugre_steering.diagnosis.search.surely import idle, in_deviations
+from lugre_steering.diagnosis.search.surely import idle, in_deviations, least_sure_part, without_part
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
@@ -41,7 +41,7 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.sensors import with_sensors
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import PARTIAL, SURE_SIGMA, TRIAL_TOLERANCE, Round, Trial, ranked, refine
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -217,29 +217,16 @@ def _of_sure_size(
         whole = [max(own.values(), default=np.inf) if given or not item.given else np.inf for item, own in zip(kept, sizes, strict=True)]
         shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
         least = shapeless[-1] if shapeless else int(np.argmin(whole))
-        effects = list(current.effects)
+        terms = [i for i, item in enumerate(kept) if given and item.given]
         if shapeless or whole[least] < least_size:
-            del kept[least], effects[least]
-        elif not given or not (parts := _unsure_parts(kept, sizes, current)):
+            del kept[least]
+            effects: Effects = [effect for i, effect in enumerate(current.effects) if i != least]
+        elif (part := least_sure_part(problem, weight, split, current, terms)) is None:
             return kept, current
         else:
-            _, least, part = min(parts)
-            candidate, values = effects[least]
-            free = tuple(name for name in candidate.free if name != part)
-            effects[least] = replace(candidate, free=free), {name: value for name, value in values.items() if name != part}
+            effects = without_part(current.effects, *part)
         current = fit(problem, weight, effects, current.x)
     return kept, current
-
-
-def _unsure_parts(kept: Sequence[Found], sizes: Sequence[Mapping[str, float]], current: Fit) -> list[tuple[float, int, str]]:
-    """Optional parts of the terms of every joint whose size is not sure: that, which term and which part. What is kept by chance takes as
-    much from the term itself."""
-    return [
-        (size, i, name)
-        for i, (item, own) in enumerate(zip(kept, sizes, strict=True))
-        for name, size in own.items()
-        if item.given and size < SURE_SIGMA and current.effects[i][0].parameter(name).optional
-    ]
 
 
 def _of_sensors(problem: Problem, weight: Array, current: Fit, found: Sequence[Found]) -> int | None:

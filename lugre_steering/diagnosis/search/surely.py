@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 
 from lugre_steering.diagnosis.search.compare import END, NAME_TAKEN
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.verify import NORMAL
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import BLOCK_S, CLUSTER_S, Split
+from lugre_steering.fitting.trial import SURE_SIGMA
 from lugre_steering.recording import Array
 
 ALONG = 0.5
@@ -52,6 +56,26 @@ def in_deviations(problem: Problem, weight: Array, roles: Split, fitted: Fit, in
     candidate, values = fitted.effects[index]
     own = zip(candidate.free, deviations(problem, weight, roles, fitted)[_columns(problem, fitted, index)], strict=True)
     return {key: abs(values[key]) / max(float(known), 1e-300) for key, known in own if key in candidate.effect.amplitudes}
+
+
+def least_sure_part(problem: Problem, weight: Array, roles: Split, fitted: Fit, terms: Iterable[int]) -> tuple[int, str] | None:
+    """Which of these ``terms`` of a fit has which optional part that may as well be nothing: the least sure. What is kept by chance takes
+    as much from the term itself."""
+    unsure = [
+        (size, i, name)
+        for i in terms
+        for name, size in in_deviations(problem, weight, roles, fitted, i).items()
+        if size < SURE_SIGMA and fitted.effects[i][0].parameter(name).optional
+    ]
+    return min(unsure)[1:] if unsure else None
+
+
+def without_part(effects: Effects, index: int, part: str) -> Effects:
+    """The effects, one of which lacks an optional part."""
+    candidate, values = effects[index]
+    free = tuple(name for name in candidate.free if name != part)
+    leaner = replace(candidate, free=free), {name: value for name, value in values.items() if name != part}
+    return [*effects[:index], leaner, *effects[index + 1 :]]
 
 
 def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> bool:
