@@ -84,6 +84,16 @@ class Finished:
         final = self.found.final
         return replace(self, around=False).in_file(self.fitted, final.effects, final.x) if self.around else final
 
+    @cached_property
+    def of_every_joint(self) -> Finished:
+        """The same with what every joint or axis has alone, fitted anew; itself where nothing else was found, or nothing of that."""
+        given = tuple(item for item in self.found.found if item.given)
+        if not given or len(given) == len(self.found.found):
+            return self
+        final = fit(self.problem, self.fitted, self.found.final.effects[: len(given)], self.found.final.x, linearisations=20)
+        beside = None if self.beside_form is None else self.beside_form.of_every_joint
+        return replace(self, found=replace(self.found, found=given, final=final), beside_form=beside)
+
     def refitted(self, phase: int) -> Fit:
         """What was found, fitted to all but one third of the samples (see ``split``)."""
         there, final = self.compared, self.found.final

@@ -4,26 +4,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import NULL_DRAWS
-from lugre_steering.diagnosis.search.surely import least_sure_part, without_part
+from lugre_steering.diagnosis.laws.find import FoundLaws
+from lugre_steering.diagnosis.search.search import Found
+from lugre_steering.diagnosis.search.surely import least_sure_name, least_sure_part, without_part
+from lugre_steering.diagnosis.verify import verify
+from lugre_steering.fitting import rig
 from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.parallel import as_joint
-from lugre_steering.fitting.rig import fitted
+from lugre_steering.fitting.problem import Effects, Problem, is_rig
+from lugre_steering.fitting.split import Split
+from lugre_steering.recording import Array
 
 ROUNDS = 2
 """Of noise and fit: the noise is that of the acceleration times the inertia, which is not known before."""
 
 
-def in_parallel(done: Finished, final: Fit, seed: int) -> tuple[Finished, Fit, Fit] | None:
-    """The search with all samples in parallel to compare in, what was found there fitted to all as recorded with the values that it has in
-    parallel, and fitted in parallel; None of a vehicle.
+class Parallel(NamedTuple):
+    """The search with all samples in parallel to compare in, what was found there fitted to all as recorded with the values that names have
+    in parallel, the same with these ``held``, and what was fitted in parallel."""
+
+    done: Finished
+    whole: Fit
+    held: Fit
+    bent: Fit
+
+
+def in_parallel(done: Finished, final: Fit, seed: int) -> Parallel | None:
+    """What was found and ``final`` has, then laws, in parallel; None of a vehicle.
 
     Names are sought as recorded: an average hides what is short. But smoothed motion is an error in a regressor, of which the residuals
     say nothing (an inertia came out 3 % to 13 % too small, and sure of it).
@@ -35,13 +52,44 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> tuple[Finished, Fit, F
     for _ in range(ROUNDS):
         noise = noise_model(problem, there.x, there.effects, repeated, seed=seed)
         weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
-        there = fitted(problem, weight, there.effects, there)
+        there = rig.fitted(problem, weight, there.effects, there)
     there = fit(problem, weight, there.effects, there, linearisations=20)
     problem = in_doubt(problem, weight, there)
-    terms = [i for i, (candidate, _) in enumerate(there.effects) if candidate.effect.of_every_joint]
-    while (part := least_sure_part(problem, weight, done.roles, there, terms)) is not None:
-        there = fit(problem, weight, without_part(there.effects, *part), there.x, linearisations=20)
+    kept, there = _surely(problem, weight, done.roles, there, done.found.found)
+    done = replace(done, found=replace(done.found, found=kept))
     seen = replace(done, problem=problem, noise=noise, found=replace(done.found, final=there), beside_form=None)
-    held = [(replace(candidate, free=()), values) for candidate, values in there.effects]
-    whole = fit(done.problem, done.weight, held, there.x, linearisations=20)
-    return replace(done, beside_form=seen), replace(whole, effects=there.effects), there
+    names, laws = there.effects[: len(kept)], there.effects[len(kept) :]
+    known = [(replace(candidate, free=()), values) for candidate, values in names]
+    held = fit(done.problem, done.weight, [*known, *laws], there.x, linearisations=20)
+    whole = replace(held, effects=(*names, *held.effects[len(kept) :]))
+    return Parallel(replace(done, beside_form=seen), whole, held, there)
+
+
+def beside_laws(done: Finished, lawful: FoundLaws, seed: int) -> tuple[Finished, FoundLaws]:
+    """Without what may be nothing now that laws stand beside it; of a vehicle, as it is."""
+    if not is_rig(done.problem.vehicle) or not lawful.names:
+        return done, lawful
+    kept, whole = _surely(lawful.problem, done.weight, done.roles, lawful.fit, done.found.found)
+    if whole is lawful.fit:
+        return done, lawful
+    fitted = fit(lawful.problem, done.fitted, whole.effects, lawful.fitted.x, linearisations=12)
+    judged = verify(lawful.problem, done.weight, done.found.baseline, fitted, done.roles, seed)
+    final = fit(done.problem, done.fitted, whole.effects[: len(kept)], done.found.final.x, linearisations=20)
+    done = replace(done, found=replace(done.found, found=kept, final=final), beside_form=None)
+    return done, replace(lawful, fitted=fitted, fit=whole, judged=judged)
+
+
+def _surely(problem: Problem, weight: Array, roles: Split, fitted: Fit, found: Sequence[Found]) -> tuple[tuple[Found, ...], Fit]:
+    """What was found, and its fit, without names and optional parts of terms of every joint that may be nothing; laws come after names."""
+    kept = list(found)
+    while True:
+        terms = [i for i in range(len(kept)) if fitted.effects[i][0].effect.of_every_joint]
+        effects: Effects
+        if (part := least_sure_part(problem, weight, roles, fitted, terms)) is not None:
+            effects = without_part(fitted.effects, *part)
+        elif (nothing := least_sure_name(problem, weight, roles, fitted, len(kept))) is not None:
+            del kept[nothing]
+            effects = [effect for i, effect in enumerate(fitted.effects) if i != nothing]
+        else:
+            return tuple(kept), fitted
+        fitted = fit(problem, weight, effects, fitted.x, linearisations=20)

@@ -12,6 +12,7 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.formed import Formed, formed, formed_beside
+from lugre_steering.diagnosis.conclude.joint import beside_laws
 from lugre_steering.diagnosis.conclude.late import begun_late, timed_by_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
@@ -91,9 +92,13 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
     tested = _tested(done, seed)
     if not tested.named and done.found.found and (late := begun_late(done)) is not done:
         done, tested = late, _tested(late, seed)
-    stands = _beside_laws(done, tested, seed, progress)
+    if not tested.named and done.of_every_joint is not done:
+        done, tested = done.of_every_joint, _tested(done.of_every_joint, seed)
+    done, stands = _beside_laws(done, tested, seed, progress)
     if stands.lawful is not None:
-        both = formed_beside(done, stands.lawful, seed)
+        done, lawful = beside_laws(done, stands.lawful, seed)
+        stands = replace(stands, lawful=lawful, judged=lawful.judged if lawful is not stands.lawful else stands.judged)
+        both = formed_beside(done, lawful, seed)
         return done, stands if both is None else replace(stands, lawful=both[0], judged=both[0].judged, form=both[1])
     form = (tested.form if stands.named else None) or formed(timed_by_all(done) if stands.named else done, stands.named, seed)
     return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
@@ -147,30 +152,32 @@ def _of_one_vehicle(names: Sequence[Candidate], bags: int) -> bool:
     return all(one & other for i, one in enumerate(acting) for other in acting[:i])
 
 
-def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> Stands:
+def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[[str], None]) -> tuple[Finished, Stands]:
     """What remains of the names beside laws for what they leave over; where that is not loud, of laws beside the freedoms alone what is
-    as evident as a name."""
-    found, (named, clock, judged, _) = done.found, tested
+    as evident as a name. In place of what every joint has no law is sought: with the search as it stands."""
+    found, bare, (named, clock, judged, _) = done.found, done.of_every_joint, tested
     left = _left(done, named or clock is not None)
-    rivals = not named or room_for_laws(done)
+    rivals = not named or (not all(item.given for item in found.found) and room_for_laws(done))
     if not left.structured and (clock is not None or not rivals):
-        return Stands(named, clock, None, judged, left)
-    alone = find(done, found.baseline, seed, progress, freely=not named and not left.structured) if rivals else None
+        return done, Stands(named, clock, None, judged, left)
+    without = found.baseline if bare is done else bare.found.final
+    alone = find(done, without, seed, progress, freely=not named and not left.structured) if rivals else None
     if not named:
         if alone is not None and not left.structured and not evident(done, alone):
             alone = None
-        return Stands(False, clock, alone, judged if alone is None else alone.judged, left)
+        return done, Stands(False, clock, alone, judged if alone is None else alone.judged, left)
     found_beside = find(done, done.freely, seed, progress) if left.structured else None
     beside = found_beside if found_beside is not None and leaves_names(done, found_beside) else None
     if alone is not None and in_place(done, alone, beside):
         swapped = in_place_of_one(done, alone, seed)
         beside = swapped or found_beside or find(done, done.freely, seed, progress)
         if beside is None or not (swapped or keeps_names(done, beside, alone)):
-            nearest = tuple(candidate.effect.id for candidate, _ in found.final.effects)
-            return Stands(False, clock, alone, alone.judged, _left(done, False), nearest)
+            nearest = tuple(item.score.candidate.effect.id for item in found.found if bare is done or not item.given)
+            judged = verify.verify(alone.problem, done.weight, found.baseline, alone.fitted, done.roles, seed)
+            return bare, Stands(bare is not done, clock, alone, judged, _left(bare, bare is not done), nearest)
     if beside is not None:
         judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)
-    return Stands(True, clock, beside, judged, left)
+    return done, Stands(True, clock, beside, judged, left)
 
 
 def _left(done: Finished, named: bool) -> LeftOver:

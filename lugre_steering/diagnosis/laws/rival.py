@@ -80,7 +80,8 @@ def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
     if _stuck(beside.problem, beside.fitted) and not _stuck(alone.problem, alone.fitted):
         return False
     parts, rest, other = beside.names + len(beside.gains), beside.beyond(done.held), alone.beyond(done.held)
-    better = rest < TRUER * other or (rest <= other and parts <= len(alone.gains))
+    rivals = alone.names + len(alone.gains)
+    better = rest < TRUER * other or (rest <= other and parts <= rivals)
     return better and leaves_names(done, beside)
 
 
@@ -98,7 +99,7 @@ def in_place_of_one(done: Finished, alone: FoundLaws, seed: int) -> FoundLaws | 
 
 def _swapped(done: Finished, alone: FoundLaws, index: int, seed: int) -> FoundLaws:
     """Laws without one of them, beside the names."""
-    names, rest = done.freely, [effect for i, effect in enumerate(alone.fitted.effects) if i != index]
+    names, rest = done.freely, [effect for i, effect in enumerate(alone.fitted.effects[alone.names :]) if i != index]
     problem = Problem(done.problem.vehicle, done.problem.runs, done.problem.calibrations, more_laws=MOST_LAWS, beside_names=True)
     effects, x = [*names.effects, *rest], alone.fitted.x[: problem.nuisances]
     fitted, whole = (fit(problem, weight, effects, x, linearisations=12) for weight in (done.fitted, done.weight))

@@ -31,7 +31,7 @@ from lugre_steering.diagnosis.search.compare import (
 )
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal, closer, in_its_place, proposed
-from lugre_steering.diagnosis.search.surely import idle, in_deviations, least_sure_part, without_part
+from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviations, least_sure_part, without_part
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
@@ -50,8 +50,6 @@ HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 REST = 0.05
 """Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
-SURE_OF_SIZE = 2.0
-"""Standard deviations by which a name on a single joint must be more than nothing."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -217,14 +215,16 @@ def _of_sure_size(
         whole = [max(own.values(), default=np.inf) if given or not item.given else np.inf for item, own in zip(kept, sizes, strict=True)]
         shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
         least = shapeless[-1] if shapeless else int(np.argmin(whole))
-        terms = [i for i, item in enumerate(kept) if given and item.given]
-        if shapeless or whole[least] < least_size:
+        goes = bool(shapeless) or whole[least] < least_size
+        terms = [least] * (not shapeless) if goes else [i for i, item in enumerate(kept) if given and item.given]
+        part = least_sure_part(problem, weight, split, current, terms)
+        if part is not None:  # of two parts that do the same neither is sure, but what is left is
+            effects: Effects = without_part(current.effects, *part)
+        elif goes:
             del kept[least]
-            effects: Effects = [effect for i, effect in enumerate(current.effects) if i != least]
-        elif (part := least_sure_part(problem, weight, split, current, terms)) is None:
-            return kept, current
+            effects = [effect for i, effect in enumerate(current.effects) if i != least]
         else:
-            effects = without_part(current.effects, *part)
+            return kept, current
         current = fit(problem, weight, effects, current.x)
     return kept, current
 

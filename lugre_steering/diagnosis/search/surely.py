@@ -18,6 +18,8 @@ from lugre_steering.fitting.split import BLOCK_S, CLUSTER_S, Split
 from lugre_steering.fitting.trial import SURE_SIGMA
 from lugre_steering.recording import Array
 
+SURE_OF_SIZE = 2.0
+"""Standard deviations by which a name on a single joint must be more than nothing."""
 ALONG = 0.5
 """Share of the energy of a law's other form that lies along the law itself, and so in its values."""
 
@@ -68,6 +70,13 @@ def least_sure_part(problem: Problem, weight: Array, roles: Split, fitted: Fit, 
         if size < SURE_SIGMA and fitted.effects[i][0].parameter(name).optional
     ]
     return min(unsure)[1:] if unsure else None
+
+
+def least_sure_name(problem: Problem, weight: Array, roles: Split, fitted: Fit, names: int) -> int | None:
+    """Which of the first ``names`` of a fit, unless it is the only one, may as well be nothing: the least sure."""
+    sizes = [max(in_deviations(problem, weight, roles, fitted, i).values(), default=np.inf) for i in range(names)]
+    least = int(np.argmin(sizes)) if names > 1 else 0
+    return least if names > 1 and sizes[least] < SURE_OF_SIZE else None
 
 
 def without_part(effects: Effects, index: int, part: str) -> Effects:
