@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -84,15 +85,18 @@ class Finished:
         final = self.found.final
         return replace(self, around=False).in_file(self.fitted, final.effects, final.x) if self.around else final
 
+    def only(self, kept: Sequence[int]) -> Finished:
+        """The same with some of its names alone, fitted anew."""
+        names, effects = tuple(self.found.found[i] for i in kept), [self.found.final.effects[i] for i in kept]
+        final = fit(self.problem, self.fitted, effects, self.found.final.x, linearisations=20)
+        beside = None if self.beside_form is None else self.beside_form.only(kept)
+        return replace(self, found=replace(self.found, found=names, final=final), beside_form=beside)
+
     @cached_property
     def of_every_joint(self) -> Finished:
-        """The same with what every joint or axis has alone, fitted anew; itself where nothing else was found, or nothing of that."""
-        given = tuple(item for item in self.found.found if item.given)
-        if not given or len(given) == len(self.found.found):
-            return self
-        final = fit(self.problem, self.fitted, self.found.final.effects[: len(given)], self.found.final.x, linearisations=20)
-        beside = None if self.beside_form is None else self.beside_form.of_every_joint
-        return replace(self, found=replace(self.found, found=given, final=final), beside_form=beside)
+        """The same with what every joint or axis has alone; itself where nothing else was found, or nothing of that."""
+        given = [i for i, item in enumerate(self.found.found) if item.given]
+        return self.only(given) if 0 < len(given) < len(self.found.found) else self
 
     def refitted(self, phase: int) -> Fit:
         """What was found, fitted to all but one third of the samples (see ``split``)."""

@@ -21,7 +21,6 @@ from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws
 from lugre_steering.diagnosis.conclude.stands import CONTRADICTED, Stands, standing, without_laws
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.laws.find import FoundLaws
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import (
     AUGMENTED,
@@ -75,8 +74,6 @@ class _Modelled:
     laws: list[dict[str, Any]]
     law: str
     left: LeftOver
-    lawful: FoundLaws | None = None
-    """The laws as they are written."""
 
 
 class _WithFile(NamedTuple):
@@ -100,25 +97,24 @@ def _modelled(done: Finished, stands: Stands, seed: int) -> _Modelled:
     whole, bent = _whole(done, final)
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
-    if (sought := stands.lawful) is None and stands.named and (form := stands.form) is not None:
+    if (lawful := stands.lawful) is None and stands.named and (form := stands.form) is not None:
         return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, [], "", stands.left)
-    if sought is None:
+    if lawful is None:
         if stands.named and (joint := in_parallel(done, final, seed)) is not None:
             done, whole, bent = joint.done, joint.whole, joint.bent
         return _Modelled(done, final, whole, bent, [], "", stands.left)
-    beside, whole, lawful = replace(done, problem=sought.problem), sought.fit, sought
-    if stands.named and (joint := in_parallel(beside, whole, seed)) is not None:
-        beside, whole, bent, lawful = joint.done, joint.whole, joint.bent, replace(sought, fit=joint.held)
-    laws = described(lawful, stands.nearest)
+    beside, whole, laws = replace(done, problem=lawful.problem), lawful.fit, described(lawful, stands.nearest)
     law = sentence(laws, done.torque)
-    left = beside_laws(beside, stands.left, sought.fitted, sought.names, law, formula(laws, done.problem.vehicle))
-    return _Modelled(beside, sought.fitted, whole, bent, laws, law, left, lawful)
+    left = beside_laws(beside, stands.left, lawful.fitted, lawful.names, law, formula(laws, done.problem.vehicle))
+    if (joint := stands.parallel) is not None:
+        beside, whole, bent = joint.done, joint.whole, joint.bent
+    return _Modelled(beside, lawful.fitted, whole, bent, laws, law, left)
 
 
 def _written(model: _Modelled, stands: Stands, effects: Sequence[NamedEffect]) -> Vehicle:
     """The vehicle file with what stands."""
     vehicle = augmented_vehicle(model.done, model.whole, effects, stands.after)
-    found = entries(model.lawful) if model.lawful is not None else ()
+    found = entries(stands.lawful) if stands.lawful is not None else ()
     form = stands.form.laws if stands.better and stands.form is not None else ()
     return vehicle.replace(laws=(*vehicle.laws, *found, *form))
 

@@ -13,15 +13,16 @@ import numpy as np
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import NULL_DRAWS
 from lugre_steering.diagnosis.laws.find import FoundLaws
+from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.diagnosis.search.search import Found
 from lugre_steering.diagnosis.search.surely import least_sure_name, least_sure_part, without_part
-from lugre_steering.diagnosis.verify import verify
+from lugre_steering.diagnosis.verify import Judged, verify
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.parallel import as_joint
-from lugre_steering.fitting.problem import Effects, Problem, is_rig
+from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array
 
@@ -62,21 +63,30 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> Parallel | None:
     known = [(replace(candidate, free=()), values) for candidate, values in names]
     held = fit(done.problem, done.weight, [*known, *laws], there.x, linearisations=20)
     whole = replace(held, effects=(*names, *held.effects[len(kept) :]))
-    return Parallel(replace(done, beside_form=seen), whole, held, there)
+    return Parallel(replace(done, beside_form=seen, around=False), whole, held, there)
 
 
-def beside_laws(done: Finished, lawful: FoundLaws, seed: int) -> tuple[Finished, FoundLaws]:
-    """Without what may be nothing now that laws stand beside it; of a vehicle, as it is."""
-    if not is_rig(done.problem.vehicle) or not lawful.names:
-        return done, lawful
-    kept, whole = _surely(lawful.problem, done.weight, done.roles, lawful.fit, done.found.found)
-    if whole is lawful.fit:
-        return done, lawful
-    fitted = fit(lawful.problem, done.fitted, whole.effects, lawful.fitted.x, linearisations=12)
+class BesideLaws(NamedTuple):
+    """A joint or axis with laws beside its names, without names that may be nothing there: in ``parallel``, and as it is judged."""
+
+    done: Finished
+    lawful: FoundLaws
+    judged: Judged
+    parallel: Parallel
+
+
+def beside_laws(done: Finished, lawful: FoundLaws, parallel: Parallel, seed: int) -> BesideLaws | None:
+    """Names and laws as they are in ``parallel``; None where the laws are nothing there: they stood for what smoothed motion does not
+    know."""
+    there, kept, bent = parallel.done.compared, parallel.done.found.found, parallel.bent
+    names = bent.effects[: len(kept)]
+    if fit(there.problem, there.weight, names, bent.x, linearisations=20).cost - bent.cost < SURE * there.problem.doubt:
+        return None
+    fitted = fit(lawful.problem, done.fitted, parallel.whole.effects, lawful.fitted.x, linearisations=12)
     judged = verify(lawful.problem, done.weight, done.found.baseline, fitted, done.roles, seed)
-    final = fit(done.problem, done.fitted, whole.effects[: len(kept)], done.found.final.x, linearisations=20)
-    done = replace(done, found=replace(done.found, found=kept, final=final), beside_form=None)
-    return done, replace(lawful, fitted=fitted, fit=whole, judged=judged)
+    if len(kept) < len(done.found.found):
+        done = done.only([i for i, item in enumerate(done.found.found) if any(item is own for own in kept)])
+    return BesideLaws(done, replace(lawful, fitted=fitted, fit=parallel.held), judged, parallel)
 
 
 def _surely(problem: Problem, weight: Array, roles: Split, fitted: Fit, found: Sequence[Found]) -> tuple[tuple[Found, ...], Fit]:

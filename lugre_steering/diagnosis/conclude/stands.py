@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.formed import Formed, formed, formed_beside
-from lugre_steering.diagnosis.conclude.joint import beside_laws
+from lugre_steering.diagnosis.conclude.joint import Parallel, beside_laws, in_parallel
 from lugre_steering.diagnosis.conclude.late import begun_late, timed_by_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
@@ -70,6 +70,8 @@ class Stands:
     nearest: tuple[str, ...] = ()
     """Names in whose place laws stand."""
     form: Formed | None = None
+    parallel: Parallel | None = None
+    """Names and laws of a joint or axis in parallel."""
 
     @property
     def better(self) -> bool:
@@ -94,11 +96,9 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
         done, tested = late, _tested(late, seed)
     if not tested.named and done.of_every_joint is not done:
         done, tested = done.of_every_joint, _tested(done.of_every_joint, seed)
-    done, stands = _beside_laws(done, tested, seed, progress)
+    done, stands = _in_parallel(*_beside_laws(done, tested, seed, progress), seed)
     if stands.lawful is not None:
-        done, lawful = beside_laws(done, stands.lawful, seed)
-        stands = replace(stands, lawful=lawful, judged=lawful.judged if lawful is not stands.lawful else stands.judged)
-        both = formed_beside(done, lawful, seed)
+        both = formed_beside(done, stands.lawful, seed)
         return done, stands if both is None else replace(stands, lawful=both[0], judged=both[0].judged, form=both[1])
     form = (tested.form if stands.named else None) or formed(timed_by_all(done) if stands.named else done, stands.named, seed)
     return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
@@ -108,7 +108,18 @@ def without_laws(done: Finished, stands: Stands, seed: int) -> Stands:
     """The same without its laws: names as they are without them, or nothing in the place of what laws explained."""
     found = done.found
     judged = verify.verify(done.problem, done.weight, found.baseline, found.final, done.roles, seed, done.refitted)
-    return replace(stands, lawful=None, judged=judged, form=None, nearest=())
+    return replace(stands, lawful=None, judged=judged, form=None, nearest=(), parallel=None)
+
+
+def _in_parallel(done: Finished, stands: Stands, seed: int) -> tuple[Finished, Stands]:
+    """Laws beside the names of a joint or axis as they are in parallel; none where they are nothing there."""
+    if (lawful := stands.lawful) is None or not stands.named:
+        return done, stands
+    if (parallel := in_parallel(replace(done, problem=lawful.problem), lawful.fit, seed)) is None:
+        return done, stands
+    if (beside := beside_laws(done, lawful, parallel, seed)) is None:
+        return done, without_laws(done, stands, seed)
+    return beside.done, replace(stands, lawful=beside.lawful, judged=beside.judged, parallel=parallel)
 
 
 def _tested(done: Finished, seed: int) -> _Tested:
