@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 
 from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.recording import Array, Kind, Recording
+from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.resources import config_folder
 from lugre_steering.serialise import as_json
 from lugre_steering.simulate.manoeuvres import Motion
@@ -56,8 +56,9 @@ class Told:
         return self.low <= self.true <= self.high
 
 
-def drawn(seed: int) -> Joint:
-    """Torques are drawn against the Coulomb friction, so that all of them can be seen; sensors and motion over what is usual."""
+def drawn(seed: int, *, ripple: bool = False) -> Joint:
+    """Torques are drawn against the Coulomb friction, so that all of them can be seen; sensors and motion over what is usual. ``ripple``:
+    also a torque periodic in the angle, as of a motor's magnets, which no entry of the catalogue is."""
     rng = np.random.default_rng([seed, 16])
 
     def between(low: float, high: float) -> float:
@@ -91,7 +92,11 @@ def drawn(seed: int) -> Joint:
     hertz = between(25.0, 200.0)
     run = simulate(real, motion, replace(sensing_of(real), angle_rate_Hz=hertz, pressure_rate_Hz=hertz, seed=seed))
     signals = {channel.kind: signal for channel, signal in run.signals.items()}
-    recording = Recording(f"joint_{seed}", 0, {"left": signals[Kind.ANGLE]}, {}, measured_torque=signals[Kind.TORQUE])
+    torque = signals[Kind.TORQUE]
+    if ripple:
+        periods = np.interp(torque.time_s, run.truth.motion.time, run.truth.motion.theta[0]) / np.radians(between(3.0, 12.0))
+        torque = Signal(torque.time_s, torque.value + coulomb * between(0.1, 0.5) * np.sin(2.0 * np.pi * periods))
+    recording = Recording(f"joint_{seed}", 0, {"left": signals[Kind.ANGLE]}, {}, measured_torque=torque)
     return Joint(real, known.replace(contact=guess), recording, truth)
 
 
@@ -125,9 +130,9 @@ def _rounded(rng: np.random.Generator, time: Array, angle_deg: Array) -> Motion:
     return Motion(grid, theta[None])
 
 
-def judged(seed: int) -> tuple[list[Told], list[str]]:
+def judged(seed: int, *, ripple: bool = False) -> tuple[list[Told], list[str]]:
     """What diagnosis says of each of TERMS of a drawn joint, and the names that the joint does not have."""
-    joint = drawn(seed)
+    joint = drawn(seed, ripple=ripple)
     found = {effect.id: effect.parameters for effect in diagnose_recordings([joint.recording], joint.sheet).effects}
     told = []
     for name, parameter in TERMS:
@@ -159,12 +164,13 @@ def run(argv: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m lugre_steering.bench joints", description=__doc__)
     parser.add_argument("--joints", type=int, default=24, help="joints drawn, one recording each [24]")
     parser.add_argument("--seed", type=int, default=1, help="of the first joint [1]")
+    parser.add_argument("--ripple", action="store_true", help="beside a torque periodic in the angle, which no entry of the catalogue is")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     options = parser.parse_args(argv)
     told: list[Told] = []
     foreign: list[str] = []
     for seed in range(options.seed, options.seed + options.joints):
-        of_joint, more = judged(seed)
+        of_joint, more = judged(seed, ripple=options.ripple)
         told, foreign = told + of_joint, foreign + more
     rows = table(told)
     if options.json:

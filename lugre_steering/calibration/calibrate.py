@@ -45,6 +45,7 @@ from lugre_steering.data.quality import inspect
 from lugre_steering.data.seen import seen_range
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.causal import filtered
 from lugre_steering.fitting.clocks import synchronised
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.keys import KEYS, Key
@@ -169,11 +170,12 @@ def calibrate_recordings(
     found += [finding.in_bag(bag) for bag, finding in further] + ([wrong.finding()] if wrong else [])
     first = f"The vehicle file seems wrong: {wrong.statement}. " if wrong else ""
     names = tuple(recording.name for recording in recordings)
-    return Calibrated(problem, fitted, _summed_up(names, problem, fitted, found, first, priors, progress))
+    return Calibrated(problem, fitted, _summed_up(names, pieces, problem, fitted, found, first, priors, progress))
 
 
 def _summed_up(
     bags: tuple[str, ...],
+    pieces: Sequence[Recording],
     problem: Problem,
     fitted: Estimate,
     found: Sequence[BagFinding],
@@ -187,7 +189,7 @@ def _summed_up(
     progress("what the data cannot tell")
     weak, assumed = identifiability(problem, fitted)
     changed = apply_calibration(problem.vehicle, problem, fitted.x).replace(initial=initial_of(problem, fitted.fit))
-    calibrated = with_terms(_rounded(changed), fitted)
+    calibrated, _ = filtered(with_terms(_rounded(changed), fitted), pieces, problem.runs)
     rows = [*parameter_rows(problem, fitted, calibrated, priors), *term_rows(problem, fitted)]
     rmse = _fitted_errors(problem, fitted)
     names = [calibration.name for calibration in problem.calibrations]

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from lugre_steering.chain.rates import RATE_TIME_CONSTANT_S
 from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.recording import Channel, Kind
 from lugre_steering.result import html
@@ -246,6 +247,9 @@ class Sensors:
     """Resolution: one step of the angle sensors."""
     angle_noise_deg: float = quantity(0.0, 10.0, default=0.01)
     """Noise of the angle sensors, one standard deviation."""
+    rate_filter_s: float | None = quantity(1e-5, RATE_TIME_CONSTANT_S, default=None)
+    """Time constant of the causal filter of rate and acceleration [s], where the angle has noise; left out: by that noise. `diagnose` and
+    `calibrate` write what suits the inertia of a joint or axis."""
     pressure_reference: str = "gauge"
     """`gauge` or `absolute`."""
     pressure_range_Pa: float = quantity(1.0, 1e9, default=40.0e6)

@@ -8,6 +8,7 @@ import math
 import re
 from dataclasses import dataclass
 
+from lugre_steering.chain.rates import USUAL_ACCELERATION_RAD_S2
 from lugre_steering.vehicle.sections import Vehicle
 
 FRICTION_NM, STRIBECK_RAD_S, TRAVEL_RAD = 25e3, 0.026, 0.8
@@ -52,7 +53,11 @@ def decade(value: float, reference: float) -> float:
 
 
 def acceleration_unit(vehicle: Vehicle) -> float:
-    """Size of the accelerations, likewise; an axis is driven by a screw or a belt, and faster for its size than tracks are turned."""
+    """Size of the accelerations, likewise, or what the filter of its motion was chosen for; an axis is driven by a screw or a belt, and
+    faster for its size than tracks are turned."""
+    sigma, filter_s = vehicle.sensors.angle_sigma, vehicle.sensors.rate_filter_s
+    if filter_s is not None and sigma > 0.0:
+        return sigma / (USUAL_ACCELERATION_RAD_S2 * filter_s**2)
     return 1.0 if vehicle.coordinate.unit == "rad" else AXIS_ACCELERATION * angle_unit(vehicle)
 
 

@@ -11,7 +11,7 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from lugre_steering.diagnosis.conclude import effects, experiment, limits
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import recalibrate
-from lugre_steering.diagnosis.search import compare, propose, search
+from lugre_steering.diagnosis.search import compare, propose, search, surely
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.effects.relief_saturation import CEILINGS
 from lugre_steering.fitting import fingerprint, noise, onset, split, trial
@@ -256,6 +256,20 @@ def test_an_optional_part_that_may_be_nothing_goes_alone(problem: Problem) -> No
     ((candidate, values),) = current.effects
     assert candidate.free == ("amplitude",)
     assert values["amplitude"] == pytest.approx(2e3, rel=0.1)
+
+
+def test_of_two_parts_that_do_the_same_one_goes_and_what_they_are_parts_of_stays(problem: Problem) -> None:
+    """Within a few degrees a torque of the sine of the angle and one of its double are one, so that neither is sure."""
+    narrow = problem.over([replace(run, theta=0.2 * run.theta) for run in problem.runs])
+    hidden = with_torque(narrow, narrow.predict_all(narrow.start(), [effect("kingpin_jacking", amplitude=1e4)]))
+    both = fit(hidden, weight(hidden), [effect("kingpin_jacking", amplitude=1e3, second_harmonic=4.5e3)])
+    hidden = hidden.doubted(doubt(hidden, both, weight(hidden)), hidden.typical)
+    sizes = surely.in_deviations(hidden, weight(hidden), split.split(hidden), both, 0)
+    assert max(sizes.values()) < surely.SURE_OF_SIZE
+    found = [search.Found(Score(both.effects[0][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1.0, given=True)]
+    kept, current = search._of_sure_size(hidden, weight(hidden), split.split(hidden), both, found, given=True)
+    assert len(kept) == 1
+    assert current.effects[0][1]["amplitude"] == pytest.approx(1e4, rel=0.1)
 
 
 @pytest.mark.parametrize("slip_scale", [0.05, 1.0])

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude import limits
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
-from lugre_steering.diagnosis.conclude.causal import causal_rmse
 from lugre_steering.diagnosis.conclude.effects import named_effects
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
@@ -35,6 +34,7 @@ from lugre_steering.diagnosis.result import (
     NamedEffect,
 )
 from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.fitting.causal import causal_rmse, filtered
 from lugre_steering.fitting.clocks import clock_finding
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding, Recording
@@ -88,8 +88,8 @@ class _WithFile(NamedTuple):
 def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float, seed: int) -> _WithFile:
     model = _modelled(done, stands, seed)
     effects = named_effects(model.done, model.whole, model.bent, material) if stands.named else []
-    vehicle = _written(model, stands, effects)
-    return _WithFile(model, effects, vehicle, causal_rmse(vehicle, recordings, done.problem.runs))
+    vehicle, causal = filtered(_written(model, stands, effects), recordings, done.problem.runs)
+    return _WithFile(model, effects, vehicle, causal)
 
 
 def _modelled(done: Finished, stands: Stands, seed: int) -> _Modelled:
