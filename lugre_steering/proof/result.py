@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from lugre_steering.provenance import Source
+from lugre_steering.provenance import Provenance, Source
 from lugre_steering.result import Result
 from lugre_steering.serialise import ADDED, in_order, key
 
@@ -54,7 +54,7 @@ class AtMasked(Share):
 
 
 @dataclass(frozen=True)
-class Made:
+class HowMade:
     """How the cases came about. ``source``: hash of the code, ``versions`` of what it ran with."""
 
     synthetic: bool
@@ -157,7 +157,7 @@ class Removed:
 
 
 @dataclass(frozen=True)
-class Together:
+class SeveralEffects:
     """Several effects at once."""
 
     all: Share
@@ -212,7 +212,7 @@ class Sheets:
 
 
 @dataclass(frozen=True)
-class Beside:
+class BesideForm:
     """Effects beside a friction law of another form."""
 
     named: Share
@@ -241,7 +241,7 @@ class Peer:
 
 
 @dataclass(frozen=True)
-class Judged:
+class TargetReached:
     """A target that has cases: its score is to be at least ``target``, or at ``most``."""
 
     id: str
@@ -253,7 +253,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Part:
+class OfSimulator:
     """All scores of one simulator."""
 
     cases: Counts
@@ -267,17 +267,17 @@ class Part:
     parameters: Parameters
     measurable: Measurable
     removed: Removed
-    pairs: Together
-    triples: Together
+    pairs: SeveralEffects
+    triples: SeveralEffects
     unlisted: Unlisted
     laws: Laws
     dirty: Dirty
     sheets: Sheets
-    beside: Beside
+    beside: BesideForm
     without: Without
     seconds_per_case: Median
     peers: Mapping[str, Peer]
-    targets: tuple[Judged, ...] = ()
+    targets: tuple[TargetReached, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,9 @@ class Scoreboard(Result):
     """What became of a campaign's cases, by simulator: they are never pooled."""
 
     schema: Literal["lugre_steering/scoreboard/2"]
-    made: Made
+    made: HowMade
     cases: Counts
     failed: tuple[Failure, ...]
-    simulators: Mapping[str, Part]
+    simulators: Mapping[str, OfSimulator]
+    provenance: Provenance | None = field(default=None, metadata=ADDED)
+    """As of all results; ``made`` says more of it."""

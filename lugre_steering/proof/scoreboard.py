@@ -14,25 +14,25 @@ from lugre_steering.proof.result import (
     SCHEMA,
     AtMasked,
     AtRatio,
-    Beside,
+    BesideForm,
     Dirty,
     Failure,
+    HowMade,
     Laws,
     Location,
-    Made,
     Measurable,
     Naming,
     Nulls,
     OfEffect,
+    OfSimulator,
     Parameters,
-    Part,
     Peer,
     Power,
     Removed,
     Scoreboard,
+    SeveralEffects,
     Share,
     Sheets,
-    Together,
     Unlisted,
     Without,
 )
@@ -71,7 +71,7 @@ T = TypeVar("T")
 TOGETHER = ("pair", "triple")
 
 
-def board(rows: Sequence[Row], made: Made) -> Scoreboard:
+def board(rows: Sequence[Row], made: HowMade) -> Scoreboard:
     """Simulators are never pooled: each has its own part and its own targets."""
     numbers = sorted({row.get("simulator", 2) for row in rows})
     return Scoreboard(
@@ -81,11 +81,11 @@ def board(rows: Sequence[Row], made: Made) -> Scoreboard:
     )  # fmt: skip
 
 
-def part(rows: Sequence[Row]) -> Part:
+def part(rows: Sequence[Row]) -> OfSimulator:
     """The scores of one simulator."""
     singles, unlisted = [row for row in rows if row["kind"] in ("single", "beside")], _of(rows, "unlisted")
     clear = [row for row in singles if row["ratio"] >= CLEAR_RATIO]
-    result = Part(
+    result = OfSimulator(
         cases=dict(Counter(row["kind"] for row in rows)),
         nulls=_nulls(rows), naming=_naming(clear, [row for row in unlisted if row["ratio"] >= CLEAR_RATIO]),
         power=tuple(_power(ratio, [row for row in singles if ratio_of(row) == ratio]) for ratio in RATIOS),
@@ -177,10 +177,10 @@ def _measurable(clear: Sequence[Row]) -> Measurable:
     )
 
 
-def _together(rows: Sequence[Row]) -> Together:
+def _together(rows: Sequence[Row]) -> SeveralEffects:
     """Several effects at once."""
     clear = [row for row in rows if row["ratio_beside"] and min(row["ratio_beside"].values()) >= CLEAR_RATIO]
-    return Together(
+    return SeveralEffects(
         all=proportion(all_answered(row) for row in rows), one_or_more=proportion(answered(row) > 0 for row in rows),
         all_from_0_3=proportion(all_answered(row) for row in clear),
         extra_names=proportion(has_wrong_extra(row) for row in rows if all_answered(row)),
@@ -242,10 +242,10 @@ def _sheets(rows: Sequence[Row]) -> Sheets:
     )  # fmt: skip
 
 
-def _beside(rows: Sequence[Row]) -> Beside:
+def _beside(rows: Sequence[Row]) -> BesideForm:
     """Effects beside a friction law of another form."""
     clear = [row for row in rows if row["ratio"] >= CLEAR_RATIO]
-    return Beside(
+    return BesideForm(
         named=proportion(answered(row) == 1 for row in clear), extra_names=proportion(has_wrong_extra(row) for row in clear),
         outcomes=dict(Counter(outcome(row) for row in clear)),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from lugre_steering.proof.campaign import RATIOS
-from lugre_steering.proof.result import Judged, Part, Score, Share, Status
+from lugre_steering.proof.result import OfSimulator, Score, Share, Status, TargetReached
 from lugre_steering.proof.scores import interval
 
 FEWEST_FOR_A_MEDIAN = 6
@@ -78,7 +78,7 @@ def status(target: Target, score: Score) -> Status | None:
     return "met" if (score.median <= target.value if target.most else score.median >= target.value) else "not met"
 
 
-def scores_of(part: Part) -> dict[str, Score]:
+def scores_of(part: OfSimulator) -> dict[str, Score]:
     """The score behind each target."""
     weakest = next(power for power in part.power if power.ratio == RATIOS[0])
     return {
@@ -95,9 +95,9 @@ def scores_of(part: Part) -> dict[str, Score]:
     }  # fmt: skip
 
 
-def judged(part: Part) -> tuple[Judged, ...]:
+def judged(part: OfSimulator) -> tuple[TargetReached, ...]:
     """Every target of one simulator that has cases, with its score and whether it is met."""
     return tuple(
-        Judged(name, TARGETS[name].what, TARGETS[name].value, TARGETS[name].most, score, status(TARGETS[name], score))
+        TargetReached(name, TARGETS[name].what, TARGETS[name].value, TARGETS[name].most, score, status(TARGETS[name], score))
         for name, score in scores_of(part).items() if score.of
     )  # fmt: skip

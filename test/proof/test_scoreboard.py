@@ -22,9 +22,9 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError
-from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, simulator, sizing
+from lugre_steering.proof import blind, campaign, command, journal, manoeuvres, scoreboard, scores, simulator, sizing
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
-from lugre_steering.proof.result import Made, Scoreboard
+from lugre_steering.proof.result import HowMade, Scoreboard
 from lugre_steering.schemas import schema_of
 from lugre_steering.serialise import plain
 
@@ -71,7 +71,7 @@ def row(
 
 
 FOUND = "missing_physics"
-MADE = Made(True, "lugre-steering prove", 3, "2026-01-01", 11, "ab12", {"lugre_steering": "0"})
+MADE = HowMade(True, "lugre-steering prove", 3, "2026-01-01", 11, "ab12", {"lugre_steering": "0"})
 RUBBER = {2: "rubber_dma_10hz.csv", 3: "rubber.csv"}
 
 
@@ -342,6 +342,20 @@ def test_kinds_and_simulator_of_the_command(tmp_path: Path) -> None:
         campaign.of_kinds(campaign.campaign(7, (2,)), "dirty")
 
 
+def test_the_command_says_how_its_board_came_about(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = [row([], "consistent", kind="null"), row(["slope_bias"], FOUND, effect("slope_bias"))]
+    monkeypatch.setattr(command, "run_all", lambda *_, **__: cases)
+    told = CliRunner().invoke(app, ["prove", "--out", str(tmp_path), "--seed", "7", "--cases", "null/*", "--json"])
+    assert told.exit_code == 0, told.stderr
+    board = json.loads(told.stdout)
+    assert board == json.loads((tmp_path / "scoreboard.json").read_text(encoding="utf-8"))
+    assert refusals(board) == []
+    made, origin = board["made"], board["provenance"]
+    assert (made["seed"], made["vehicle"]["path"], origin["command"]) == (7, "test_vehicle.yaml", "prove")
+    assert origin["options"] == {"command": made["command"], "seed": 7, "source": made["source"]}
+    assert origin["vehicle"] == made["vehicle"]
+
+
 def test_campaign_repeats_with_its_seed_only() -> None:
     assert campaign.campaign(7) == campaign.campaign(7)
     assert not {case.seed for case in campaign.campaign(7)} & {case.seed for case in campaign.campaign(8)}
@@ -451,7 +465,7 @@ def test_the_kept_scoreboard_keeps_to_the_schema_and_is_told_whole() -> None:
     now = scoreboard.board([row([], "consistent", kind="null")], MADE).json
     (part,) = now["simulators"].values()
     for theirs, ours in ((kept, now), *((each, part) for each in kept["simulators"].values())):
-        assert list(theirs) == list(ours)
+        assert [*theirs, *(["provenance"] if ours is now and "provenance" not in theirs else [])] == list(ours)
     for each in kept["simulators"].values():
         assert {name: list(each[name]) for name in FIXED} == {name: list(part[name]) for name in FIXED}
         for name in ("masked", "power"):
