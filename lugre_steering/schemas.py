@@ -17,15 +17,19 @@ from lugre_steering.calibration.result import Calibration
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.fleet.result import Fleet
+from lugre_steering.proof.result import Scoreboard
 from lugre_steering.replay.result import Replay
 from lugre_steering.result import folder_for
-from lugre_steering.serialise import as_json, written
+from lugre_steering.serialise import as_json, key_of, written
+from lugre_steering.simulate.paper.result import PublishedExperiment, PublishedExperiments
 from lugre_steering.simulate.result import Simulation
 
 FILES: Mapping[str, type] = {
-    "diagnosis": Diagnosis, "calibration": Calibration, "summary": Replay, "fleet": Fleet, "simulation": Simulation,
+    "diagnosis": Diagnosis, "calibration": Calibration, "summary": Replay, "fleet": Fleet, "scoreboard": Scoreboard,
+    "simulation": Simulation, "experiment": PublishedExperiment, "experiments": PublishedExperiments,
 }  # fmt: skip
-"""Results by the stem of their file's name; a simulation has none, it is what ``simulate --json`` writes."""
+"""Results by the stem of their file's name; the last three by what ``simulate`` made: a recording is told by ``--json`` alone, a published
+experiment in a file of its own name, several by ``--json`` and in the file of all together."""
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _SIMPLE: dict[Any, dict[str, Any]] = {
     float: {"type": "number"}, int: {"type": "integer"}, bool: {"type": "boolean"}, str: {"type": "string"},
@@ -42,9 +46,8 @@ def schema_of(result: type) -> dict[str, Any]:
 
 def _object(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
     hints = typing.get_type_hints(cls, include_extras=True)
-    names = [item.name for item in written(cls)]
-    required = [item.name for item in written(cls) if item.metadata.get("required", True)]
-    properties = {name: _of(hints[name], definitions) for name in names}
+    required = [key_of(item) for item in written(cls) if item.metadata.get("required", True)]
+    properties = {key_of(item): _of(hints[item.name], definitions) for item in written(cls)}
     text = " ".join((cls.__doc__ or "").split())
     return {"type": "object", "description": text, "required": required, "properties": properties}
 

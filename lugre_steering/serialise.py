@@ -20,6 +20,16 @@ ADDED = {"required": False}
 """Metadata of a dataclass field that results of earlier versions lack."""
 
 
+def key(name: str) -> dict[str, Any]:
+    """Metadata of a dataclass field whose key in the file is no name of Python."""
+    return {"key": name}
+
+
+def key_of(item: Field[Any]) -> str:
+    """The key of a dataclass field in the file."""
+    return str(item.metadata.get("key", item.name))
+
+
 def in_order(*names: str) -> dict[str, Any]:
     """Metadata of a dataclass field that holds dataclasses whose keys the file has in this order."""
     return {"order": names}
@@ -33,7 +43,7 @@ def written(result: Any) -> list[Field[Any]]:
 def plain(tree: Any) -> Any:
     """The tree as JSON holds it: dicts, lists, text, finite numbers, true, false and null."""
     if is_dataclass(tree):
-        return {item.name: _ordered(plain(getattr(tree, item.name)), item) for item in written(tree)}
+        return {key_of(item): _ordered(plain(getattr(tree, item.name)), item) for item in written(tree)}
     if isinstance(tree, Mapping):
         return {str(key): plain(item) for key, item in tree.items()}
     if isinstance(tree, (list, tuple)):

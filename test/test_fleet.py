@@ -51,6 +51,7 @@ from lugre_steering.resources import config_folder
 from lugre_steering.schemas import schema_of
 from lugre_steering.serialise import as_json
 from lugre_steering.vehicle import load
+from lugre_steering.vehicle.identity import identity
 
 VEHICLE = config_folder() / "test_vehicle.yaml"
 BAGS = Path(__file__).parents[1] / "bags"
@@ -101,7 +102,11 @@ def test_bad_bags_are_in_quarantine_and_stop_nobody(done: Path) -> None:
 
 
 def test_the_record_keeps_to_its_schema(done: Path) -> None:
-    jsonschema.validate(json.loads((done / "fleet.json").read_text()), schema_of(Fleet))
+    result = json.loads((done / "fleet.json").read_text())
+    jsonschema.validate(result, schema_of(Fleet))
+    (vehicle,) = result["vehicles"]
+    assert vehicle["identity"] == vehicle["sha256"] == identity(load(VEHICLE))
+    assert vehicle["identity"] not in result["provenance"]["vehicle"]["sha256"].values()  # which is that of the file
 
 
 def test_tables_are_what_they_say(done: Path, runs: Path) -> None:

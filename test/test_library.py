@@ -204,6 +204,8 @@ def test_a_calibration_is_that_of_the_command(calibration: ls.Calibration, slow_
     assert list(own) == list(said)
     assert {key for key in said if own[key] != said[key]} <= {"date", "bags", "vehicle", "picture", "picture_note", "provenance"}
     assert undated(own)["provenance"] == undated(said)["provenance"]
+    assert own["vehicle_name"] == said["vehicle_name"] == own["vehicle"] == ls.load_vehicle(VEHICLE).name
+    assert own["vehicle_file"] == said["vehicle_file"] == said["vehicle"] == str(VEHICLE)
 
 
 def test_a_replay_in_memory_is_that_of_the_command(replay: ls.Replay, tmp_path: Path) -> None:
@@ -217,6 +219,17 @@ def test_a_replay_in_memory_is_that_of_the_command(replay: ls.Replay, tmp_path: 
     assert series.torque.size == said["bags"][0]["estimates"]
     error = np.sqrt(np.mean(series.residual**2))
     assert error == pytest.approx(said["overall"]["rmse_Nm"], rel=1e-9)
+
+
+def test_a_replay_says_which_vehicle_and_which_file(replay: ls.Replay) -> None:
+    """Wherever the vehicle came from; the key ``vehicle`` of earlier results means what it meant, the file or else the name."""
+    vehicle = ls.load_vehicle(VEHICLE)
+    assert (replay.vehicle_name, replay.vehicle_file, replay.vehicle) == (vehicle.name, str(VEHICLE), str(VEHICLE))
+    other = vehicle.replace(name="other")
+    kept = ls.replay(short(), other)
+    assert (kept.vehicle_name, kept.vehicle_file, kept.vehicle) == ("other", None, "other")
+    assert "Replay with other" in kept._repr_html_()
+    assert list(kept.json)[-2:] == ["vehicle_name", "vehicle_file"]
 
 
 def test_a_recording_in_memory_replays_as_its_bag(replay: ls.Replay) -> None:
@@ -502,6 +515,13 @@ def short() -> ls.Recording:
         angle={"left": 2e-4 * noise[0], "right": 2e-4 * noise[1]},
         pressure={line: 2e6 + 1.5e4 * row for line, row in zip(lines, noise[2:], strict=True)},
     )
+
+
+@pytest.mark.parametrize("name", sorted(set(FILES) - {"simulation"}))  # whose bag tells it
+def test_how_it_came_about_has_the_same_key_in_all_results(name: str) -> None:
+    schema = schema_of(FILES[name])
+    assert schema["properties"]["provenance"] == {"anyOf": [{"$ref": "#/$defs/Provenance"}, {"type": "null"}]}
+    assert "provenance" not in schema["required"]  # earlier results lack it
 
 
 def test_the_schemas_are_written_on_request(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-NAMES = ("kernel", "replay", "fleet", "live", "own_error", "fuzz", "untold", "faults", "soak", "watch", "closed_loop", "joints")
+NAMES = ("kernel", "replay", "fleet", "live", "own_error", "fuzz", "untold", "faults", "soak", "watch", "closed_loop", "joints", "same")
 
 
 def main(arguments: list[str]) -> int:

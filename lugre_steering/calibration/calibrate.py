@@ -8,6 +8,7 @@
 key                 content
 ==================  ===============================================================================================
 bags, vehicle       what was used; ``tool_version``, ``date`` (UTC), ``duration_s``, ``priors`` (true or false)
+vehicle_name        the name in the vehicle file, and ``vehicle_file`` as it was given (``vehicle`` is the one or the other)
 parameters          list: ``name``, ``key`` in the vehicle file, ``unit``, ``sheet``, ``value``, ``ci95`` (of a joint or
                     axis also what it has beside friction, which become ``effects`` of the file), relative
                     standard deviations ``relative_sd`` and (sheet) ``prior_relative_sd``, ``at_bound`` (null, low,
@@ -213,6 +214,7 @@ def _summed_up(
         calibrated=calibrated,
         seen=seen_range(problem.vehicle, problem.runs),
         per_bag=tuple(_per_bag(problem, fitted)),
+        vehicle_name=problem.vehicle.name,
     )
 
 

@@ -55,6 +55,7 @@ def calibrate(
             done.calibration,
             bags=tuple(str(bag) for bag in used),
             vehicle=str(vehicle_file),
+            vehicle_file=str(vehicle_file),
             data_quality=(*(one.finding() for one in (*skipped, *others)), *done.calibration.data_quality),
             provenance=made("calibrate", options, vehicle_file, used),
         )

@@ -40,4 +40,5 @@ def calibrate(
         found = calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
     options = {"free": free, "fix": fix, "prior": prior or {}, "priors": priors}
-    return replace(found, provenance=made("calibrate", options, sheet, files(items)))
+    file = None if sheet is None else str(vehicle)
+    return replace(found, provenance=made("calibrate", options, sheet, files(items)), vehicle_file=file)

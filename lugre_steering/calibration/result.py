@@ -133,6 +133,10 @@ class Calibration(Result):
     per_bag: tuple[BagErrors, ...] = field(default=(), metadata=ADDED)
     provenance: Provenance | None = field(default=None, metadata=ADDED)
     """Options, and hashes of the files."""
+    vehicle_name: str = field(default="", metadata=ADDED)
+    """The name in the vehicle file; ``vehicle`` of earlier results is the file or the name, as the fit was asked for."""
+    vehicle_file: str | None = field(default=None, metadata=ADDED)
+    """That file as it was named, None where the vehicle was in memory."""
 
     def with_provenance(self) -> Vehicle:
         """The calibrated vehicle with a note of how its values came about."""

@@ -118,6 +118,13 @@ def wind_up(p, torque):
     return angle, slope
 
 
+def newton(error, slope, tangent):
+    """The step of Newton's method; on flanks that are without slope nothing waits for the tangent."""
+    if slope == 0.0:
+        return error
+    return error / (1.0 + slope * tangent)
+
+
 def wound_increment(p, s, theta, stiffness, length):
     """Angle [rad] by which the contact turns when the corrected steering angle reaches ``theta``.
 
@@ -128,7 +135,7 @@ def wound_increment(p, s, theta, stiffness, length):
     tangent = stiffness * max(0.05, 1.0 - math.copysign(s.z, s.z * away) / length)
     # Newton kept inside a bracket: the left side grows with the step, at least as fast as the step itself.
     low, high = min(0.0, away), max(0.0, away)
-    d_theta = away / (1.0 + wind_up(p, s.load)[1] * tangent)
+    d_theta = newton(away, wind_up(p, s.load)[1], tangent)
     for _ in range(WIND_UP_ITERATIONS):
         lost, slope = wind_up(p, s.load + tangent * d_theta)
         error = s.contact_angle + d_theta + lost - theta
@@ -136,7 +143,7 @@ def wound_increment(p, s, theta, stiffness, length):
             high = d_theta
         else:
             low = d_theta
-        d_theta -= error / (1.0 + slope * tangent)
+        d_theta -= newton(error, slope, tangent)
         if not low <= d_theta <= high:
             d_theta = 0.5 * (low + high)
         if abs(error) < 1e-10:

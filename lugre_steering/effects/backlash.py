@@ -12,12 +12,20 @@ from lugre_steering.effects.entry import Effect, Parameter
 FLANK_TORQUE_NM = 100.0
 """Torque over which a gap changes flanks, on machines of the size of a vehicle; ``softness`` adds to it."""
 
+SATURATED = 20.0
+"""From here on tanh is one in double precision."""
+
 
 @law
 def wind_up(torque, width, softness, torque_unit):
     """Angle lost [rad] = width / 2 tanh(M / flank torque), and its slope [rad/(N m)]: the flank changes where M changes sign."""
     flank = FLANK_TORQUE_NM * torque_unit + softness
-    side = math.tanh(torque / flank)
+    ratio = torque / flank
+    if ratio > SATURATED:  # as tanh says, to the last bit; branches are foretold, so that no step waits for its torque
+        return 0.5 * width, 0.0
+    if ratio < -SATURATED:
+        return -0.5 * width, 0.0
+    side = math.tanh(ratio)
     return 0.5 * width * side, 0.5 * width / flank * (1.0 - side * side)
 
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from lugre_steering.chain.bristle import bristle, bristle_work
+import math
+
 from lugre_steering.chain.compiled import exp, law
 from lugre_steering.effects.entry import Effect, Parameter
 
@@ -27,16 +28,22 @@ def contact(z, drawn, stiffness, g, spread, elements, shares):
             total += shares[i]
         for i in range(ELEMENTS):
             shares[i] /= total
-    torque, dissipated = 0.0, 0.0
-    share = g / ELEMENTS
+    way = abs(drawn) * ELEMENTS * stiffness / g
+    softest = math.copysign(g / ELEMENTS / stiffness, drawn)
+    before, stored = 0.0, 0.0
     for i in range(ELEMENTS):
-        k = stiffness * shares[i]
-        before = elements[i]
-        after = bristle(before, drawn, k, share)
-        elements[i] = after
-        dissipated += bristle_work(before, after, drawn, share) - 0.5 * k * (after * after - before * before)
-        torque += k * after
-    return torque, torque / stiffness, dissipated
+        before += elements[i]
+        stored -= shares[i] * elements[i] * elements[i]
+    for i in range(ELEMENTS):
+        steady = softest * (1.0 / shares[i])
+        elements[i] = steady + (elements[i] - steady) * exp(-way * shares[i])
+    after, mean = 0.0, 0.0
+    for i in range(ELEMENTS):
+        after += elements[i]
+        mean += shares[i] * elements[i]
+        stored += shares[i] * elements[i] * elements[i]
+    work = g * (abs(drawn) + math.copysign(1.0 / ELEMENTS, drawn) * (before - after))
+    return stiffness * mean, mean, work - 0.5 * stiffness * stored
 
 
 EFFECT = Effect(

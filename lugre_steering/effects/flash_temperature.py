@@ -22,7 +22,8 @@ def heat_out(temperature, energy, dt, time_constant, saturation_power, power):
     if dt > 0.0:
         decay = exp(-dt / time_constant)
         now = energy * (1.0 / dt)  # no division waits for another: the energy is known last
-        now /= math.sqrt(1.0 + now * (1.0 / saturation_power))
+        growth = 1.0 + now * (1.0 / saturation_power)
+        now *= math.sqrt(growth) * (1.0 / growth)
         power = now + (power - now) * decay
     return temperature, power
 

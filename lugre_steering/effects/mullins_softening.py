@@ -13,7 +13,7 @@ from lugre_steering.effects.entry import Effect, Parameter
 @law
 def tangent(z, z_max, amplitude, width):
     """a erfc((z_max - |z|) / width): stiffer where it was never sheared as far (Ogden and Roxburgh 1999)."""
-    return amplitude * math.erfc((z_max - abs(z)) / width)
+    return amplitude * math.erfc((z_max - abs(z)) * (1.0 / width))
 
 
 EFFECT = Effect(

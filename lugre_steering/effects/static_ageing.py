@@ -9,17 +9,24 @@ import math
 from lugre_steering.chain.compiled import exp, law
 from lugre_steering.effects.entry import Effect, Parameter
 
+SMALL = 0.03
+"""Slip below which a series is as good as (1 - exp(-slip)) / slip: that of nearly all steps, which wait for neither of both then."""
+
 
 @law
-def ageing(d_theta, dt, z, length, rate, dwell, slip_scale, age):
+def ageing(d_theta, dt, z, stiffness, coulomb_torque, friction_ratio, rate, dwell, slip_scale, age):
     """Extra level as a share of Coulomb friction: rate ln(1 + age / t_c), d age/dt = 1 - age |dtheta/dt| / D.
 
     Ageing law of resting and sliding contacts (Dieterich 1972; Rice and Ruina 1983), exact for a constant rate in a step.
     Only sliding renews a contact, the share |z| / length of the motion; bristles that merely bend keep theirs.
     """
-    slip = abs(d_theta) * (1.0 / slip_scale) * min(1.0, abs(z) / length)
-    if slip < 1e-9:
-        age += dt
+    slip = abs(d_theta) * (1.0 / slip_scale) * min(1.0, abs(z) * (stiffness / (coulomb_torque * friction_ratio)))
+    if slip < SMALL:
+        square = slip * slip
+        renewed = (1.0 - slip * 0.5) + square * (
+            (1.0 / 6.0 - slip * (1.0 / 24.0)) + square * ((1.0 / 120.0 - slip * (1.0 / 720.0)) + square * (1.0 / 5040.0))
+        )
+        age += renewed * (dt - slip * age)
     else:
         sliding = dt / slip
         age = sliding + (age - sliding) * exp(-slip)

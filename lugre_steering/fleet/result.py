@@ -27,7 +27,8 @@ RECORD, PAGE = "fleet.json", "report.html"
 class VehicleSummary:
     """One vehicle: sound recordings and those in quarantine, hours [h], first and last date, median RMSE of the replay [N m], verdicts.
 
-    ``sha256``: of what its file and tables say, not of how they are written.
+    ``identity``: a hash of what its file and tables say, not of how they are written (in ``provenance`` stand those of ``sha256sum``);
+    ``sha256``: the same, for readers of earlier results.
     """
 
     name: str
@@ -41,6 +42,7 @@ class VehicleSummary:
     median_rmse_Nm: float | None
     verdicts: Mapping[str, int]
     vehicle: Vehicle = field(repr=False, metadata=IN_MEMORY)
+    identity: str = field(default="", metadata=ADDED)
 
 
 @dataclass(frozen=True)

@@ -210,4 +210,5 @@ def _vehicle(member: Member, records: Sequence[Record]) -> VehicleSummary:
         median_rmse_Nm=float(np.median(errors)) if errors else None,
         verdicts=dict(Counter(record["verdict"] for record in own if record["verdict"] is not None)),
         vehicle=member.vehicle,
+        identity=member.sha256,
     )

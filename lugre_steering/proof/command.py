@@ -17,15 +17,16 @@ import numpy
 import scipy
 
 from lugre_steering.counted import counted
+from lugre_steering.effects import registry
 from lugre_steering.errors import DataError, LugreSteeringError
 from lugre_steering.files import output_folder, refuse_foreign, write_record
 from lugre_steering.proof import campaign
 from lugre_steering.proof.blind import source_version
 from lugre_steering.proof.journal import run_all
+from lugre_steering.proof.result import HowMade
 from lugre_steering.proof.scoreboard import board
 from lugre_steering.provenance import source
 from lugre_steering.resources import config_folder
-from lugre_steering.serialise import plain
 from lugre_steering.version import __version__
 
 SIMULATORS = {"2": (2,), "3": (3,), "all": (2, 3)}
@@ -66,11 +67,13 @@ def run(
             chosen, sheet, out / "cases.jsonl",
             peers=peers, budget_s=QUICK_BUDGET_S if quick else None, progress=progress,
         )  # fmt: skip
-        result = board(rows, {
-            "synthetic": True, "command": command, "seed": seed, "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
-            "planned_cases": len(chosen), "source": source_version(), "versions": _versions(),
-            "vehicle": plain(replace(source(sheet), path=sheet.name)),
-        })  # fmt: skip
+        shipped, code = replace(source(sheet), path=sheet.name), source_version()
+        made = HowMade(
+            synthetic=True, command=command, seed=seed, date=datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+            planned_cases=len(chosen), source=code, versions=_versions(), vehicle=shipped,
+        )  # fmt: skip
+        origin = registry.made("prove", {"command": command, "seed": seed, "source": code}, shipped)
+        result = replace(board(rows, made), provenance=origin).json
         write_record(result, out / "scoreboard.json")
         try:
             from lugre_steering.proof.figures import draw_all

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from lugre_steering.proof.campaign import RATIOS
+from lugre_steering.proof.result import Median, Share
 
 Row = dict[str, Any]
 Span = Sequence[float]
@@ -98,11 +99,11 @@ def interval(successes: int, trials: int, level: float = 0.95) -> tuple[float, f
     return float(found.low), float(found.high)
 
 
-def proportion(flags: Iterable[bool]) -> Row:
+def proportion(flags: Iterable[bool]) -> Share:
     """Share of true flags with its count and 95 % Wilson interval; the share is None without any."""
     values = list(flags)
     hits = sum(values)
-    return {"share": hits / len(values) if values else None, "hits": hits, "of": len(values), "ci95": list(interval(hits, len(values)))}
+    return Share(hits / len(values) if values else None, hits, len(values), interval(hits, len(values)))
 
 
 def answers(effect: Mapping[str, Any]) -> set[str]:
@@ -320,10 +321,10 @@ def ratio_of(row: Row) -> float | None:
     return RATIOS[int(np.argmin(off))] if off.min() < 0.5 else None
 
 
-def summary(values: Iterable[float | None]) -> Row:
+def summary(values: Iterable[float | None]) -> Median:
     """Median and quartiles of what is there."""
     present = np.array([value for value in values if value is not None])
     if present.size == 0:
-        return {"median": None, "quartiles": [None, None], "of": 0}
+        return Median(None, (None, None), 0)
     low, median, high = np.percentile(present, [25, 50, 75])
-    return {"median": float(median), "quartiles": [float(low), float(high)], "of": int(present.size)}
+    return Median(float(median), (float(low), float(high)), int(present.size))

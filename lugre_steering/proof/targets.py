@@ -4,13 +4,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
 from lugre_steering.proof.campaign import RATIOS
+from lugre_steering.proof.result import OfSimulator, Score, Share, Status, TargetReached
 from lugre_steering.proof.scores import interval
-
-Row = dict[str, Any]
-Status = Literal["met", "not met", "too few cases"]
 
 FEWEST_FOR_A_MEDIAN = 6
 """The 95 % sign interval of a median does not exist below."""
@@ -68,39 +66,38 @@ def share_status(hits: int, of: int, target: float, lower: float = 0.0) -> Statu
     return "not met" if enough or high < target else "too few cases"
 
 
-def status(target: Target, score: Row) -> Status | None:
+def status(target: Target, score: Score) -> Status | None:
     """Of a share or a median; None where nothing was measured."""
-    if score["of"] == 0:
+    if isinstance(score, Share):
+        hits = score.of - score.hits if target.most else score.hits
+        return share_status(hits, score.of, 1.0 - target.value if target.most else target.value, target.lower) if score.of else None
+    if score.median is None:
         return None
-    if "share" in score:
-        hits = score["of"] - score["hits"] if target.most else score["hits"]
-        return share_status(hits, score["of"], 1.0 - target.value if target.most else target.value, target.lower)
-    if score["of"] < FEWEST_FOR_A_MEDIAN:
+    if score.of < FEWEST_FOR_A_MEDIAN:
         return "too few cases"
-    return "met" if (score["median"] <= target.value if target.most else score["median"] >= target.value) else "not met"
+    return "met" if (score.median <= target.value if target.most else score.median >= target.value) else "not met"
 
 
-def scores_of(part: Row) -> dict[str, Row]:
+def scores_of(part: OfSimulator) -> dict[str, Score]:
     """The score behind each target."""
-    weakest = next(power for power in part["power"] if power["ratio"] == RATIOS[0])
+    weakest = next(power for power in part.power if power.ratio == RATIOS[0])
     return {
-        "nulls_silent": part["nulls"]["silent"], "named_from_0.3": part["naming"]["from_0.3"], "named_at_0.1": weakest["right"],
-        "extra_names": part["naming"]["extra_names"], "both_of_two": part["pairs"]["all"], "all_of_three": part["triples"]["all"],
-        **{kind: part["disguises"][kind] for kind in ("late", "one-bag", "barely")},
-        "unlisted": part["unlisted"]["called_unlisted"], "laws": part["laws"]["called_unlisted"],
-        "laws_foretold": part["laws"]["foretold"], "laws_harmed": part["laws"]["harmed"], "location_iou": part["location"]["listed"],
-        "parameter_error": part["parameters"]["all"], "measured_error": part["measurable"]["all"],
-        "coverage": part["parameters"]["interval_covers"], "measured_coverage": part["measurable"]["interval_covers"],
-        "removed": part["removed"]["from_0.3"], "dirty_silent": part["dirty"]["silent"], "sheets_told": part["sheets"]["told"],
-        "beside_named": part["beside"]["named"], "beside_extra": part["beside"]["extra_names"],
-        "without": part["without"]["removed"], "seconds": part["seconds_per_case"],
+        "nulls_silent": part.nulls.silent, "named_from_0.3": part.naming.from_0_3, "named_at_0.1": weakest.right,
+        "extra_names": part.naming.extra_names, "both_of_two": part.pairs.all, "all_of_three": part.triples.all,
+        **{kind: part.disguises[kind] for kind in ("late", "one-bag", "barely")},
+        "unlisted": part.unlisted.called_unlisted, "laws": part.laws.called_unlisted,
+        "laws_foretold": part.laws.foretold, "laws_harmed": part.laws.harmed, "location_iou": part.location.listed,
+        "parameter_error": part.parameters.all, "measured_error": part.measurable.all,
+        "coverage": part.parameters.interval_covers, "measured_coverage": part.measurable.interval_covers,
+        "removed": part.removed.from_0_3, "dirty_silent": part.dirty.silent, "sheets_told": part.sheets.told,
+        "beside_named": part.beside.named, "beside_extra": part.beside.extra_names,
+        "without": part.without.removed, "seconds": part.seconds_per_case,
     }  # fmt: skip
 
 
-def judged(part: Row) -> list[Row]:
+def judged(part: OfSimulator) -> tuple[TargetReached, ...]:
     """Every target of one simulator that has cases, with its score and whether it is met."""
-    return [
-        {"id": key, "what": TARGETS[key].what, "target": TARGETS[key].value, "most": TARGETS[key].most, "score": score,
-         "status": status(TARGETS[key], score)}
-        for key, score in scores_of(part).items() if score["of"]
-    ]  # fmt: skip
+    return tuple(
+        TargetReached(name, TARGETS[name].what, TARGETS[name].value, TARGETS[name].most, score, status(TARGETS[name], score))
+        for name, score in scores_of(part).items() if score.of
+    )  # fmt: skip

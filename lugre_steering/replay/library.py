@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from lugre_steering.bag.given import Given, each, files, with_both_tracks
@@ -15,7 +15,7 @@ from lugre_steering.estimator import Options
 from lugre_steering.online import Comparison
 from lugre_steering.recording import Recording, unused_name
 from lugre_steering.replay.passage import Passage
-from lugre_steering.replay.result import SCHEMA, Replay, ReplayedBag
+from lugre_steering.replay.result import Replay, ReplayedBag
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
@@ -36,7 +36,7 @@ def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, opti
             must_exist(path)
             bags.append(passage.remember())
         overall.merge(passage.fit)
-    source = model.name if isinstance(vehicle, Vehicle) else str(vehicle)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
     origin = made("replay", {**asdict(timing), "initial_temperature": None}, sheet, files(items))
-    return Replay(SCHEMA, source, model.coordinate.force_unit, timing, tuple(bags), overall.result(), origin)
+    result = Replay.begun(model, None if isinstance(vehicle, Vehicle) else vehicle, timing, origin, ())
+    return replace(result, bags=tuple(bags), overall=overall.result())

@@ -21,6 +21,7 @@ from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Finding
 from lugre_steering.result import Result, angle_column, folder_for, frame, html, of_bag, torque_column
 from lugre_steering.serialise import ADDED, IN_MEMORY
+from lugre_steering.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,9 +124,9 @@ class ReplayedBag:
 class Replay(Result):
     """Torques that the estimator gives for recordings; ``overall``: agreement with the measured torque over all of them.
 
-    ``vehicle``: the file as it was named, or of a vehicle that was in memory its name; ``torque_unit``: N m, or the force
-    unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was
-    named and gave no torque, with the reason.
+    ``vehicle_name``: the name in the vehicle file; ``vehicle_file``: that file as it was named, None where the vehicle was in memory;
+    ``vehicle``: the file, or where there is none the name (kept for readers of earlier results); ``torque_unit``: N m, or the force
+    unit of a linear axis; ``options``: the timing rules that were used; ``skipped``: what was named and gave no torque, with the reason.
     """
 
     schema: Literal["lugre_steering/replay/1"]
@@ -136,6 +137,17 @@ class Replay(Result):
     overall: Agreement | None
     provenance: Provenance | None = field(default=None, metadata=ADDED)
     skipped: tuple[Skipped, ...] = field(default=(), metadata=ADDED)
+    vehicle_name: str = field(default="", metadata=ADDED)
+    vehicle_file: str | None = field(default=None, metadata=ADDED)
+
+    @classmethod
+    def begun(cls, vehicle: Vehicle, file: str | Path | None, options: Options, origin: Provenance, skipped: Sequence[Skipped]) -> Replay:
+        """Of no recording yet."""
+        said = None if file is None else str(file)
+        return cls(
+            SCHEMA, said or vehicle.name, vehicle.coordinate.force_unit, options, (), None, origin, tuple(skipped),
+            vehicle_name=vehicle.name, vehicle_file=said,
+        )  # fmt: skip
 
     def save(self, out: str | Path) -> None:
         """Write summary.json into a folder; replaces only an earlier one there."""
@@ -171,4 +183,4 @@ class Replay(Result):
             | ({f"RMSE ({self.torque_unit})": bag.fit.rmse_Nm, "R2": bag.fit.r2} if bag.fit else {"note": bag.fit_note})
             for bag in self.bags
         ]
-        return html("Replay", f"Vehicle: {self.vehicle}", rows)
+        return html(f"Replay with {self.vehicle_name or self.vehicle}", f"Vehicle file: {self.vehicle_file or 'none, in memory'}", rows)

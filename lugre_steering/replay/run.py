@@ -21,7 +21,7 @@ from lugre_steering.pool import Progress, WorkerDiedError, in_processes
 from lugre_steering.provenance import Provenance
 from lugre_steering.replay.earlier import names_for
 from lugre_steering.replay.passage import AIR, Passage, degrees
-from lugre_steering.replay.result import RECORD, SCHEMA, Replay, ReplayedBag
+from lugre_steering.replay.result import RECORD, Replay, ReplayedBag
 from lugre_steering.vehicle import Vehicle, load
 
 
@@ -54,7 +54,7 @@ def replay(
     ]
     done: dict[int, ReplayedBag | Skipped] = {}
     overall = Comparison()
-    summary = Replay(SCHEMA, str(vehicle_file), vehicle.coordinate.force_unit, options, (), None, origin, tuple(skipped))
+    summary = Replay.begun(vehicle, vehicle_file, options, origin, skipped)
     try:
         with output_folder(out):
             for number, (result, fit) in _results(tasks, vehicle, jobs, progress):

@@ -26,12 +26,12 @@ from lugre_steering.report import words
 from lugre_steering.report.available import no_pictures
 from lugre_steering.resources import config_folder
 from lugre_steering.schema import suggestion
-from lugre_steering.serialise import plain
 from lugre_steering.simulate import manoeuvres, plant
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Motion
 from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench
 from lugre_steering.simulate.paper.figure import checks_table, draw_outcome, outcome_table, write_table
 from lugre_steering.simulate.paper.outcome import Outcome
+from lugre_steering.simulate.paper.result import PublishedExperiments
 from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.sensors import Sensing
@@ -39,7 +39,6 @@ from lugre_steering.simulate.write import STORAGES, write_bag
 from lugre_steering.terminal import Prose, point
 from lugre_steering.vehicle import Vehicle
 
-SCHEMA = "lugre_steering/experiment/1"
 SHIPPED = "test_vehicle.yaml"
 
 
@@ -148,21 +147,19 @@ def run_experiments(what: str, vehicle: Vehicle) -> list[Outcome]:
 def write_outcomes(what: str, outcomes: list[Outcome], out: Path, made: Provenance | None = None) -> dict[str, Any]:
     """Table (CSV), result (JSON) and figure (PNG) of each experiment into ``out``; with several also a JSON of all. ``made``: how they
     come about."""
-    results, note = [], no_pictures()
+    note = no_pictures()
+    result = PublishedExperiments.of(outcomes, made, note)
     names = [*(outcome.name for outcome in outcomes), *([ALL] if what == ALL else [])]
     with output_folder(out):
         refuse_foreign(out / f"{name}{kind}" for name in names for kind in (".json", ".png", ".csv"))
-        for outcome in outcomes:
-            results.append({"schema": SCHEMA, **outcome.to_json(), "provenance": plain(made)})
+        for outcome, each in zip(outcomes, result.experiments, strict=True):
             write_table(outcome, out / f"{outcome.name}.csv", made)
             if note is None:
                 draw_outcome(outcome, out / f"{outcome.name}.png", made)
-            write_record(results[-1], out / f"{outcome.name}.json")
-        passed = all(outcome.passed for outcome in outcomes)
-        result = {"schema": SCHEMA, "passed": passed, "picture_note": note, "experiments": results, "provenance": plain(made)}
+            write_record(each.json, out / f"{outcome.name}.json")
         if what == ALL:
-            write_record(result, out / f"{ALL}.json")
-    return result
+            write_record(result.json, out / f"{ALL}.json")
+    return result.json
 
 
 def show_catalogue(console: Console) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from bag_making import slowly_sampled
@@ -21,8 +22,11 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.errors import DataError
-from lugre_steering.proof import blind, campaign, journal, manoeuvres, scoreboard, scores, simulator, sizing
+from lugre_steering.proof import blind, campaign, command, journal, manoeuvres, scoreboard, scores, simulator, sizing
 from lugre_steering.proof.conceal import EFFECT_IDS, UNLISTED_IDS
+from lugre_steering.proof.result import HowMade, Scoreboard
+from lugre_steering.schemas import schema_of
+from lugre_steering.serialise import plain
 
 Row = dict[str, Any]
 
@@ -67,6 +71,7 @@ def row(
 
 
 FOUND = "missing_physics"
+MADE = HowMade(True, "lugre-steering prove", 3, "2026-01-01", 11, "ab12", {"lugre_steering": "0"})
 RUBBER = {2: "rubber_dma_10hz.csv", 3: "rubber.csv"}
 
 
@@ -162,8 +167,9 @@ def test_board_counts_and_serialises() -> None:
         row(["end_stop", "slope_bias"], FOUND, effect("end_stop"), kind="pair") | {"ratio_beside": {"end_stop": 1.0, "slope_bias": 0.02}},
         row(["body_mode"], "unlisted_physics", kind="unlisted"), row(["body_mode"], FOUND, effect("backlash"), kind="unlisted"),
     ]  # fmt: skip
-    whole = scoreboard.board(rows, {"seed": 3})
-    assert json.loads(json.dumps(whole, allow_nan=False)) == whole
+    result = scoreboard.board(rows, MADE)
+    whole = json.loads(result.to_json())
+    assert whole == result.json
     board = whole["simulators"]["2"]
     assert board["nulls"]["silent"]["share"] == 0.75
     assert board["nulls"]["named"] == {"backlash": 1}
@@ -182,9 +188,34 @@ def test_board_counts_and_serialises() -> None:
     assert "dirty_silent" not in status
 
 
+def refusals(board: Row) -> list[str]:
+    """What the schema of scoreboard.json has against it."""
+    schema = schema_of(Scoreboard)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return [error.json_path for error in jsonschema.Draft202012Validator(schema).iter_errors(board)]
+
+
+def test_the_record_keeps_to_its_schema() -> None:
+    peer = {"before": 136.0, "after": 86.0, "alarm": True, "names": ["slope_bias"], "seconds": 1.0}
+    rows = [
+        row([], "consistent", kind="null"), {**row(["slope_bias"], FOUND, effect("slope_bias")), "peers": {"SINDy ensemble": peer}},
+        {**row(["backlash"], FOUND), "diagnosis": None, "error": "crash"}, row(["body_mode"], "unlisted_physics", kind="unlisted"),
+    ]  # fmt: skip
+    for board in (scoreboard.board(rows, MADE).json, scoreboard.board([], MADE).json):
+        assert refusals(board) == []
+    board = scoreboard.board(rows, MADE).json
+    part = board["simulators"]["2"]
+    for key in part:
+        less = {name: value for name, value in part.items() if name != key}
+        assert refusals({**board, "simulators": {"2": less}}) == ["$.simulators['2']"], key
+    naming = {**part["naming"], "from_0.3": {"share": "most", "hits": 1, "of": 1, "ci95": [0.0, 1.0]}}
+    assert refusals({**board, "simulators": {"2": {**part, "naming": naming}}}) == ["$.simulators['2'].naming['from_0.3'].share"]
+    assert refusals({**board, "schema": "lugre_steering/scoreboard/1"}) == ["$.schema"]
+
+
 def test_simulators_are_never_pooled() -> None:
     rows = [row([], "consistent", kind="null"), row([], FOUND, effect("backlash"), kind="null") | {"simulator": 3}]
-    board = scoreboard.board(rows, {"seed": 3})
+    board = scoreboard.board(rows, MADE).json
     assert board["simulators"]["2"]["nulls"]["silent"]["share"] == 1.0
     assert board["simulators"]["3"]["nulls"]["silent"]["share"] == 0.0
     assert "nulls" not in board
@@ -212,7 +243,7 @@ def test_generated_laws_and_dirt_have_scores_of_their_own() -> None:
     cases[0]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 68.0, "floor_Nm": 60.0}
     cases[1]["unseen"] = {"baseline_Nm": 100.0, "augmented_Nm": 112.0, "floor_Nm": 60.0}
     dirty = [row([], "insufficient_data", kind="dirty"), row([], FOUND, effect("relief_saturation"), kind="dirty")]
-    part = scoreboard.part([*cases, *dirty])
+    part = plain(scoreboard.part([*cases, *dirty]))
     assert part["laws"]["called_unlisted"]["hits"] == 1
     assert part["laws"]["inside_grammar"]["of"] == 2
     assert part["laws"]["outside_grammar"]["of"] == 0
@@ -229,8 +260,8 @@ def test_what_stands_in_place_of_an_entry_is_scored_against_it() -> None:
         case = row(["end_stop"], FOUND, effect(named), kind="without", rmse=(20.0, 10.0))
         rows.append(case | {"without": row(["end_stop"], verdict, kind="without", rmse=(20.0, after))["diagnosis"]})
     assert [scores.removed_without(case) for case in rows] == [pytest.approx(256.0 / 300.0), 0.0, None]
-    shown = scoreboard.part(rows)["without"]
-    assert (shown["enough"]["hits"], shown["enough"]["of"], shown["removed"]["of"]) == (0, 2, 2)
+    shown = scoreboard.part(rows).without
+    assert (shown.enough.hits, shown.enough.of, shown.removed.of) == (0, 2, 2)
 
 
 def test_measured_quantities_are_scored_beside_coefficients() -> None:
@@ -239,12 +270,12 @@ def test_measured_quantities_are_scored_beside_coefficients() -> None:
     }
     assert scores.measured_errors(case) == {"end_stop": (pytest.approx(0.04), False)}
     part = scoreboard.part([case])
-    assert part["measurable"]["interval_covers"]["share"] == 0.0
-    assert part["measurable"]["half_width"]["median"] == pytest.approx(0.02)
+    assert part.measurable.interval_covers.share == 0.0
+    assert part.measurable.half_width.median == pytest.approx(0.02)
 
 
 def test_empty_board_meets_and_misses_nothing() -> None:
-    assert scoreboard.part([])["targets"] == []
+    assert scoreboard.part([]).targets == ()
 
 
 def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
@@ -254,7 +285,7 @@ def test_peers_are_judged_by_the_same_noise(tmp_path: Path) -> None:
         {**row([], "consistent", kind="null"), "peers": {"SINDy ensemble": entry}},
     ]
     how = {"seed": 1, "date": "2026-01-01", "vehicle": {"path": "test_vehicle.yaml", "sha256": {"test_vehicle.yaml": "ab12"}}}
-    board = scoreboard.board(rows, how)
+    board = scoreboard.board(rows, MADE).json | {"made": how}
     part = board["simulators"]["2"]
     peer = part["peers"]["SINDy ensemble"]
     assert peer["removed"]["median"] == pytest.approx(0.5)
@@ -309,6 +340,20 @@ def test_kinds_and_simulator_of_the_command(tmp_path: Path) -> None:
         assert expected in result.stderr
     with pytest.raises(DataError, match="no such cases"):
         campaign.of_kinds(campaign.campaign(7, (2,)), "dirty")
+
+
+def test_the_command_says_how_its_board_came_about(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = [row([], "consistent", kind="null"), row(["slope_bias"], FOUND, effect("slope_bias"))]
+    monkeypatch.setattr(command, "run_all", lambda *_, **__: cases)
+    told = CliRunner().invoke(app, ["prove", "--out", str(tmp_path), "--seed", "7", "--cases", "null/*", "--json"])
+    assert told.exit_code == 0, told.stderr
+    board = json.loads(told.stdout)
+    assert board == json.loads((tmp_path / "scoreboard.json").read_text(encoding="utf-8"))
+    assert refusals(board) == []
+    made, origin = board["made"], board["provenance"]
+    assert (made["seed"], made["vehicle"]["path"], origin["command"]) == (7, "test_vehicle.yaml", "prove")
+    assert origin["options"] == {"command": made["command"], "seed": 7, "source": made["source"]}
+    assert origin["vehicle"] == made["vehicle"]
 
 
 def test_campaign_repeats_with_its_seed_only() -> None:
@@ -410,6 +455,29 @@ def test_blind_end_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
     found = blind.run(blind.Job(stop, SHEET_FILE, "v", peers=False))
     assert found["error"] is None
     assert scores.outcome(found) in scores.RIGHT
+
+
+@pytest.mark.skipif(not KEPT_BOARD.exists(), reason="no full run has been kept yet")
+def test_the_kept_scoreboard_keeps_to_the_schema_and_is_told_whole() -> None:
+    """As it was written before results of this command had types: nothing of it is lacking, and nothing more."""
+    kept = json.loads(KEPT_BOARD.read_text(encoding="utf-8"))
+    assert refusals(kept) == []
+    now = scoreboard.board([row([], "consistent", kind="null")], MADE).json
+    (part,) = now["simulators"].values()
+    for theirs, ours in ((kept, now), *((each, part) for each in kept["simulators"].values())):
+        assert [*theirs, *(["provenance"] if ours is now and "provenance" not in theirs else [])] == list(ours)
+    for each in kept["simulators"].values():
+        assert {name: list(each[name]) for name in FIXED} == {name: list(part[name]) for name in FIXED}
+        for name in ("masked", "power"):
+            assert list(each[name][0]) == list(part[name][0])
+        assert list(each["unlisted"]["by_ratio"][0]) == list(part["unlisted"]["by_ratio"][0])
+
+
+FIXED = (
+    "nulls", "naming", "location", "parameters", "measurable", "removed", "pairs", "triples", "unlisted", "laws", "dirty", "sheets",
+    "beside", "without", "seconds_per_case",
+)  # fmt: skip
+"""Scores whose keys are always the same."""
 
 
 @pytest.mark.skipif(not KEPT_BOARD.exists(), reason="no full run has been kept yet")

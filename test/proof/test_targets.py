@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from lugre_steering.proof.result import Median, Share
 from lugre_steering.proof.targets import TARGETS, Target, floor, share_status, status
 
 
@@ -27,9 +30,9 @@ def test_share(hits: int, of: int, target: float, expected: str) -> None:
 
 
 def test_nulls_need_the_lower_end_too() -> None:
-    score = {"share": 100 / 102, "hits": 100, "of": 102, "ci95": [0.93, 1.0]}
+    score = Share(100 / 102, hits=100, of=102, ci95=(0.93, 1.0))
     assert status(TARGETS["nulls_silent"], score) == "too few cases"
-    assert status(TARGETS["nulls_silent"], {**score, "hits": 297, "of": 300}) == "met"
+    assert status(TARGETS["nulls_silent"], replace(score, hits=297, of=300)) == "met"
 
 
 def test_floor_of_the_nulls_is_what_is_asked() -> None:
@@ -37,15 +40,15 @@ def test_floor_of_the_nulls_is_what_is_asked() -> None:
 
 
 def test_at_most_counts_the_misses() -> None:
-    extra = {"share": 0.0, "hits": 0, "of": 200, "ci95": [0.0, 0.02]}
+    extra = Share(0.0, hits=0, of=200, ci95=(0.0, 0.02))
     assert status(TARGETS["extra_names"], extra) == "met"
-    assert status(TARGETS["extra_names"], {**extra, "hits": 30, "share": 0.15}) == "not met"
-    assert status(TARGETS["extra_names"], {**extra, "of": 6}) == "too few cases"
+    assert status(TARGETS["extra_names"], replace(extra, hits=30, share=0.15)) == "not met"
+    assert status(TARGETS["extra_names"], replace(extra, of=6)) == "too few cases"
 
 
 def test_median_needs_six() -> None:
     target = Target("error", 0.1, most=True)
-    assert status(target, {"median": 0.05, "quartiles": [0.01, 0.2], "of": 5}) == "too few cases"
-    assert status(target, {"median": 0.05, "quartiles": [0.01, 0.2], "of": 6}) == "met"
-    assert status(target, {"median": 0.2, "quartiles": [0.01, 0.2], "of": 6}) == "not met"
-    assert status(target, {"median": None, "quartiles": [None, None], "of": 0}) is None
+    assert status(target, Median(0.05, (0.01, 0.2), 5)) == "too few cases"
+    assert status(target, Median(0.05, (0.01, 0.2), 6)) == "met"
+    assert status(target, Median(0.2, (0.01, 0.2), 6)) == "not met"
+    assert status(target, Median(None, (None, None), 0)) is None

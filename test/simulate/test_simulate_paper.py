@@ -9,6 +9,7 @@ import dataclasses
 import json
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -17,8 +18,10 @@ from lugre_steering import vehicle as vehicle_file
 from lugre_steering.errors import DataError
 from lugre_steering.provenance import provenance
 from lugre_steering.resources import config_folder
+from lugre_steering.schemas import schema_of
 from lugre_steering.simulate.command import write_outcomes
-from lugre_steering.simulate.paper import EXPERIMENTS, bench, conditions, double_cycle, stiffness
+from lugre_steering.simulate.paper import ALL, EXPERIMENTS, bench, conditions, double_cycle, stiffness
+from lugre_steering.simulate.paper.result import PublishedExperiment, PublishedExperiments
 from lugre_steering.vehicle import pavements
 
 VEHICLE = vehicle_file.load(config_folder() / "test_vehicle.yaml")
@@ -100,6 +103,11 @@ def test_results_are_written(prepared: bench.Bench, tmp_path: Path) -> None:
     made = provenance("simulate", {"paper": True}, config_folder() / "test_vehicle.yaml")
     write_outcomes("paper-stiffness", [outcome], tmp_path, made)
     result = json.loads((tmp_path / "paper-stiffness.json").read_text(encoding="utf-8"))
+    jsonschema.validate(result, schema_of(PublishedExperiment))
+    keys = ("schema", "experiment", "title", "synthetic", "passed", "calibrated", "checks", "table", "notes", "caption", "provenance")
+    assert tuple(result) == keys
+    assert list(result["table"][0]) == list(outcome.columns)
+    assert list(result["checks"][0]) == ["claim", "published", "ours", "passed"]
     assert result["synthetic"] is True
     assert result["passed"] is True
     assert result["calibrated"]["heat capacity factor"] == prepared.calibrated["heat capacity factor"]
@@ -113,6 +121,23 @@ def test_results_are_written(prepared: bench.Bench, tmp_path: Path) -> None:
     header, *rows = csv.reader(lines[len(told) :])
     assert tuple(header) == outcome.columns
     assert [[float(cell) for cell in row] for row in rows] == [pytest.approx(row, rel=1e-5) for row in outcome.rows]
+
+
+def test_several_are_told_together_and_keep_to_their_schema(prepared: bench.Bench, tmp_path: Path) -> None:
+    outcome = stiffness.stiffness(prepared)
+    failed = dataclasses.replace(outcome, name="failed", checks=(dataclasses.replace(outcome.checks[0], passed=False),), rows=())
+    made = provenance("simulate", {"paper": True}, config_folder() / "test_vehicle.yaml")
+    told = write_outcomes(ALL, [outcome, failed], tmp_path, made)
+    files = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*.json")}
+    assert files == {ALL: told, **{one["experiment"]: one for one in told["experiments"]}}
+    assert list(told) == ["schema", "passed", "picture_note", "experiments", "provenance"]
+    assert [one["passed"] for one in (told, *told["experiments"])] == [False, True, False]
+    schema = jsonschema.Draft202012Validator(schema_of(PublishedExperiments))
+    assert schema.is_valid(told)
+    one = told["experiments"][0]
+    for wrong in (one | {"passed": "yes"}, one | {"calibrated": [1.0]}, one | {"table": [{"torque": None}, {"torque": []}]}):
+        assert not schema.is_valid(told | {"experiments": [wrong]})
+    assert not schema.is_valid(one)  # which is of one alone
 
 
 def test_a_table_of_others_stays_and_ours_is_replaced(prepared: bench.Bench, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 from lugre_steering.recording import Array
 
@@ -75,17 +75,3 @@ class Outcome:
             for c in self.checks
         ]
         return "\n".join(lines + [f"Note: {note}" for note in self.notes])
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data of everything but the curves."""
-        return {
-            "experiment": self.name,
-            "title": self.title,
-            "synthetic": True,
-            "passed": self.passed,
-            "calibrated": dict(self.calibrated),
-            "checks": [vars(check) for check in self.checks],
-            "table": [dict(zip(self.columns, row, strict=True)) for row in self.rows],
-            "notes": list(self.notes),
-            "caption": self.caption,
-        }
