@@ -35,23 +35,38 @@ MOST_SETS, PATIENCE, ROUNDING = 5, 3, 1e-12
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of a joint fit: nuisance x, effects with their values, prediction (n,) [N m], weighted cost, covariance (q, q).
+    """Result of a joint fit: nuisance x, effects with their values, prediction (n,) [N m], weighted cost.
 
-    ``jacobian`` (n, q): change of the prediction per unit of each fitted value, times the weight of each sample. ``pull`` (q,): the same
-    of its prior's error; ``pulled`` (q,): that error at the fit. ``weight`` (n,) of the samples; ``settled``: no further
-    fall is to be had.
+    ``slope`` (n, q): change of the prediction per scaled unit of each fitted value, times the weight of each sample; ``natural`` (q,): what
+    such a unit is; ``prior`` (q,): weight per unit of it. ``pull`` (q,): the same per unit of the value; ``pulled`` (q,): the prior's error
+    at the fit. ``weight`` (n,) of the samples; ``settled``: no further fall is to be had.
     """
 
     x: Array
     effects: tuple[tuple[Candidate, dict[str, float]], ...]
     prediction: Array
     cost: float
-    jacobian: Array
-    covariance: Array
-    pull: Array
+    slope: Array
+    natural: Array
+    prior: Array
     pulled: Array
     weight: Array
     settled: bool
+
+    @property
+    def pull(self) -> Array:
+        return np.asarray(self.prior / self.natural)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Change of the prediction (n, q) per unit of each fitted value, times the weight of each sample."""
+        return np.asarray(self.slope / self.natural)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the fitted values (q, q); few of many fits are asked for it."""
+        spread = np.linalg.pinv(self.slope.T @ self.slope + np.diag(self.prior**2), rcond=1e-12)
+        return np.asarray(spread * np.outer(self.natural, self.natural), float)
 
     def basis(self, without: slice | None = None) -> Array:
         """Orthonormal columns (n, k) that span what the fitted values can change, but for those ``without``; weighted too."""
@@ -107,15 +122,10 @@ def fit(
         if descent.settled or descent.left - (linearisations - 1 - done) * (before - descent.left) > worth:
             break
         descent.linearise(whole=before - descent.left < FAR * descent.left)
-    p, slope, natural = descent.p, descent.slope, vector.natural(descent.p)
-    x, fitted = vector.values(p)
-    spread = np.linalg.pinv(slope.T @ slope + np.diag(vector.prior**2), rcond=1e-12)
-    covariance = np.asarray(spread * np.outer(natural, natural), float)
-    error = (descent.base - problem.measured) * weight
-    pull, pulled = vector.prior / natural, p * vector.prior
-    return Fit(
-        x, tuple(fitted), descent.base, _cost(error, pulled, False), slope / natural, covariance, pull, pulled, weight, descent.settled,
-    )  # fmt: skip
+    x, fitted = vector.values(descent.p)
+    error, pulled = (descent.base - problem.measured) * weight, descent.p * vector.prior
+    cost, natural = _cost(error, pulled, False), vector.natural(descent.p)
+    return Fit(x, tuple(fitted), descent.base, cost, descent.slope, natural, vector.prior, pulled, weight, descent.settled)
 
 
 @dataclass(frozen=True)
@@ -257,7 +267,7 @@ class _Descent:
             if self.robust:
                 influence = 1.0 / np.sqrt(1.0 + (error / ROBUST) ** 2)
                 gram, error = self.slope.T @ (self.slope * influence[:, None]), error * influence
-            normal, gradient = gram + np.diag(prior**2), self.slope.T @ error + prior**2 * self.p
+            normal, gradient = _stiffened(gram, prior**2), self.slope.T @ error + prior**2 * self.p
             trial, moved, fall = self._step(normal, gradient, exact=age == 0)
             if not fall > 0.0:
                 self.settled = self._whole and before - self.left < enough
@@ -300,7 +310,14 @@ def _bounded_step(normal: Array, gradient: Array, damping: float, low: Array, hi
     diagonal = np.diag(normal)
     # A column that does nothing has no scale of its own.
     least = 1e-9 * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1e-30))
-    return bounded_minimum(normal + np.diag(damping * diagonal + least), gradient, low, high)
+    return bounded_minimum(_stiffened(normal, damping * diagonal + least), gradient, low, high)
+
+
+def _stiffened(matrix: Array, more: Array) -> Array:
+    """A matrix (q, q) with more (q,) on its diagonal."""
+    stiffer = matrix.copy()
+    stiffer.flat[:: len(more) + 1] += more
+    return stiffer
 
 
 def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> Array:
@@ -311,16 +328,20 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
     cost is independent of the number of samples. After MOST_SETS sets of bounds the last one is returned.
     """
     step = _solved(normal, -gradient)
+    if np.all((low <= step) & (step <= high)):
+        return step
     at_low, at_high = np.zeros(step.size, bool), np.zeros(step.size, bool)
     fewest, patience = step.size + 1, PATIENCE
     sizes, least = np.abs(normal), np.abs(gradient)
     for _ in range(MOST_SETS * step.size):
-        slope = normal @ step + gradient
-        certain = ROUNDING * (sizes @ np.abs(step) + least)
-        free = ~(at_low | at_high)
-        below, above = free & (step < low), free & (step > high)
-        leaving = (at_low & (slope < -certain)) | (at_high & (slope > certain))
-        wrong = np.flatnonzero(below | above | leaving)
+        held = at_low | at_high
+        below, above = ~held & (step < low), ~held & (step > high)
+        exchanged = below | above
+        if held.any():
+            slope = normal @ step + gradient
+            certain = ROUNDING * (sizes @ np.abs(step) + least)
+            exchanged |= (at_low & (slope < -certain)) | (at_high & (slope > certain))
+        wrong = np.flatnonzero(exchanged)
         if wrong.size == 0:
             break
         patience = PATIENCE if wrong.size < fewest else patience - 1

@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import torque_in_phases
+from lugre_steering.chain.step import records_of, torque_in_phases
 from lugre_steering.data.dataset import Run, averaged
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
@@ -344,13 +344,14 @@ class Problem:
     def fields(self, x: Array) -> dict[str, float]:
         """Baseline parameter-record values for the calibration part of x."""
         sheet, values = self._sheet, dict[str, float]()
-        for calibration, change in zip(self.calibrations, x[: len(self.calibrations)].tolist(), strict=True):
+        changes = x[: len(self.calibrations)]
+        for calibration, change, factor in zip(self.calibrations, changes.tolist(), np.exp(changes).tolist(), strict=True):
             for field in calibration.fields:
                 old = values[field] if field in values else sheet[field]
                 if calibration.additive:
                     values[field] = old + change * values.get("coulomb_torque", sheet["coulomb_torque"])
                 else:
-                    values[field] = old * float(np.exp(change))
+                    values[field] = old * factor
         if "static_torque" in values:
             coulomb = values.get("coulomb_torque", sheet["coulomb_torque"])
             values["static_torque"] = max(values["static_torque"], 0.3 * coulomb)
@@ -388,8 +389,8 @@ class Problem:
     ) -> Array:
         """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion."""
         run = run or self.runs[bag]
-        record, places = self.model.parameters[0], self._at
-        numbers = record.view(np.float64).copy()
+        kind, places = self.model.parameters[0].dtype, self._at
+        numbers = self.model.parameters[0].view(np.float64).copy()
         for field, value in self.fields(x).items():
             numbers[places[field]] = value
         numbers[places["initial_bristle"]] = x[len(self.calibrations) + bag] * self.presliding
@@ -398,7 +399,9 @@ class Problem:
             numbers[places["rubber_temperature"]], numbers[places["air_temperature"]] = self.temperatures(bag, x)
             warmer = float(x[len(self.calibrations) + 2 * len(self.runs) + bag])
         phases = []
-        starts = sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)})
+        starts = [-np.inf]
+        if run.air or any(candidate.since for candidate, _ in effects):
+            starts = sorted({-np.inf, *(candidate.start(bag) for candidate, _ in effects), *(since for since, _ in run.air)})
         for start in starts:
             acting = numbers.copy() if len(starts) > 1 else numbers
             for since, air in run.air:
@@ -408,7 +411,7 @@ class Problem:
                 if candidate.start(bag) <= start and not candidate.effect.per_line:
                     for field, number in candidate.effect.fields(values).items():
                         acting[places[field]] = number
-            phases.append((start, acting.view(record.dtype)))
+            phases.append((start, records_of(acting, kind)))
         return torque_in_phases(phases, self.model.rubber, *run.steps)[:: 1 + run.midway]
 
     def predict(
@@ -427,7 +430,10 @@ class Problem:
             if candidate.effect.hooks.keys() & SENSOR_HOOKS:
                 changed = self._through_sensor(run, candidate, values, torque, start)
                 torque = np.where(run.time >= start, changed, torque) if candidate.since else changed
-        return averaged(run, torque) / self.gain(x) + self._bending(x)[own]
+        torque = averaged(run, torque)
+        if self._gains:
+            torque = torque / self.gain(x)
+        return torque + self._bending(x)[own] if self.bends.shape[1] else np.ascontiguousarray(torque)
 
     def _bending(self, x: Array) -> Array:
         """Torque (n,) of the bends; kept, as it is the same for all bags and while a fit moves anything else."""

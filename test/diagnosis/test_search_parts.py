@@ -183,7 +183,7 @@ def test_the_energy_compared_is_the_evidence(slower: Problem) -> None:
         _, size = np.linalg.slogdet(np.eye(400) + slope[keep] @ slope[keep].T)
         exact.append(float(target[keep] @ np.linalg.solve(np.eye(400) + slope[keep] @ slope[keep].T, target[keep])) + size)
         part = compare._expected(here, np.where(np.arange(few) < 400, weight(bent), 0.0), replace(
-            result, jacobian=np.where(np.arange(few)[:, None] < 400, result.jacobian, 0.0)
+            result, slope=np.where(np.arange(few)[:, None] < 400, result.slope, 0.0)
         ))  # fmt: skip
         assert part == pytest.approx(exact[-1], rel=1e-9)
     assert energies[0] != pytest.approx(energies[1], rel=1e-6)
