@@ -32,7 +32,7 @@ from lugre_steering.vehicle import load
 
 @pytest.mark.parametrize("noise", ["white", "coloured", "ripple"])
 def test_silent_when_nothing_is_hidden(tmp_path: Path, noise: str) -> None:
-    _, bags = made(tmp_path, seed=21, noise=noise)
+    _, bags = made(tmp_path, seed=21, noise=noise, stride=SLOWEST)
     result = diagnose_recordings(read(bags), load(VEHICLE))
     assert result.json["verdict"] == "consistent"
     assert result.json["effects"] == []
@@ -41,7 +41,7 @@ def test_silent_when_nothing_is_hidden(tmp_path: Path, noise: str) -> None:
 
 
 def test_without_the_right_entry_a_law_of_the_angle_takes_its_place(tmp_path: Path) -> None:
-    _, bags = made(tmp_path, Concealed("end_stop"), seconds=70.0, stride=SLOWEST)
+    _, bags = made(tmp_path, Concealed("end_stop"), seconds=50.0, stride=SLOWEST)
     result = ls.diagnose(bags, VEHICLE, without="end_stop")
     assert "end_stop" not in result.json["detection_limits"]
     assert registry.sought(registry.effect("end_stop"))  # by the next diagnosis again
@@ -63,7 +63,7 @@ def test_a_name_to_be_left_out_must_be_one() -> None:
 
 
 def test_physics_outside_the_catalogue_is_unlisted(tmp_path: Path) -> None:
-    _, bags = made(tmp_path, Concealed("gear_ripple"))
+    _, bags = made(tmp_path, Concealed("gear_ripple"), seconds=60.0)
     result = diagnose_recordings(read(bags[:1]), load(VEHICLE))
     assert result.json["verdict"] == "unlisted_physics"
     assert result.json["unexplained"]["structured"]
