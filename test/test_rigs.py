@@ -231,7 +231,8 @@ def ball_screw(period_m: float, amplitude_N: float) -> Recording:
     vehicle = linear_axis()
     ends = np.degrees([0.15, -0.15])  # the axis counts 1 m as 1 rad
     sweeps = tuple(Sweep(ends[i % 2], rate, 1.0) for i, rate in enumerate((2.0, 3.0, 5.0, 1.5, 4.0, 2.5)))
-    run = simulate(vehicle, motion_of(Manoeuvre("axis", "", (Hold(2.0), *sweeps)), vehicle), sensing_of(vehicle))
+    slower = dataclasses.replace(sensing_of(vehicle), angle_rate_Hz=50.0, pressure_rate_Hz=50.0)  # quicker to diagnose
+    run = simulate(vehicle, motion_of(Manoeuvre("axis", "", (Hold(2.0), *sweeps)), vehicle), slower)
     signals = {channel.name: signal for channel, signal in run.signals.items()}
     force = signals["torque"]
     position = np.interp(force.time_s, run.truth.motion.time, run.truth.motion.theta[0])
@@ -337,7 +338,7 @@ def test_one_pressure_pair_gives_the_torque_of_all_its_cylinders() -> None:
     assert float(residuals[-1]["measured_torque"]) == pytest.approx(work, rel=1e-6)
 
 
-def write_recorded(vehicle: Vehicle, bag: Path, rate_Hz: float = 25.0) -> None:
+def write_recorded(vehicle: Vehicle, bag: Path, rate_Hz: float = 12.5) -> None:
     """Two minutes of varied rates, slower than the usual 100 Hz, as that is quicker to diagnose."""
     slower = dataclasses.replace(sensing_of(vehicle), angle_rate_Hz=rate_Hz, pressure_rate_Hz=rate_Hz)
     write_bag(bag, simulate(vehicle, motion_of(BUILT_IN["varied-rates"], vehicle), slower), "test")
@@ -347,7 +348,7 @@ def write_recorded(vehicle: Vehicle, bag: Path, rate_Hz: float = 25.0) -> None:
 def test_gravity_of_a_joint_is_known_or_found(tmp_path: Path, known: bool) -> None:
     """From a bag with a torque channel; the names may share it, their sum is 6 cos + 18 sin within the sensor's 0.3 N m."""
     true = vehicle_file.load(CONFIG / "single_joint_example.yaml")
-    write_recorded(true, tmp_path / "bag")
+    write_recorded(true, tmp_path / "bag", 25.0)
     done = diagnose([tmp_path / "bag"], true if known else true.replace(gravity=None))
     if known:
         assert done.json["verdict"] == "consistent"
@@ -505,7 +506,7 @@ def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path)
 
 def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_sheet_says_of_friction() -> None:
     """Oracle: force = mass times acceleration and a loss times the rate, of a motion that is known exactly, with friction of none."""
-    time, mass, loss = np.arange(0.0, 60.0, 0.01), 40.0, 250.0
+    time, mass, loss = np.arange(0.0, 60.0, 0.02), 40.0, 250.0
     turns = [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
     position = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
     rate = sum(size * w * np.cos(w * time + phase) for size, w, phase in turns)
