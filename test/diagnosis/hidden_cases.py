@@ -18,10 +18,6 @@ from lugre_steering.vehicle import load
 VEHICLE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
 
 
-SLOWEST = 8
-"""Of 100 Hz leaves 12.5 Hz, with which most effects are found as well."""
-
-
 def made(
     folder: Path, *effects: Concealed, seed: int = 7, noise: str = "white", seconds: float = np.inf, stride: int = STRIDE
 ) -> tuple[CaseData, list[Path]]:

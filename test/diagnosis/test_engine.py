@@ -12,7 +12,8 @@ from typing import cast
 
 import numpy as np
 import pytest
-from hidden_cases import SLOWEST, VEHICLE, cut, made, read
+from bag_making import SLOWEST
+from hidden_cases import VEHICLE, cut, made, read
 from small_problem import effect, small_problem, weight
 
 import lugre_steering as ls

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag_making import STRIDE, slowly_sampled
-from hidden_cases import SLOWEST, VEHICLE, made, overlap, read
+from bag_making import SLOWEST, STRIDE, slowly_sampled
+from hidden_cases import VEHICLE, made, overlap, read
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app

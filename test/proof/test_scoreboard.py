@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bag_making import slowly_sampled
+from bag_making import SLOWEST, slowly_sampled
 from hypothesis import given
 from hypothesis import strategies as st
 from proof_page import page_lines
@@ -405,7 +405,7 @@ def test_diagnosis_sees_bags_and_sheet_alone(simulator: int, monkeypatch: pytest
 def test_blind_end_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Recordings as slow as those of the field, which are quicker to diagnose."""
     write = simulator.write_case
-    monkeypatch.setattr(simulator, "write_case", lambda data, *folders: write(slowly_sampled(data), *folders))
+    monkeypatch.setattr(simulator, "write_case", lambda data, *folders: write(slowly_sampled(data, stride=SLOWEST), *folders))
     stop = campaign.Hiding("single/end_stop/10/0", "single", ("end_stop",), 10.0, "white", 11)
     found = blind.run(blind.Job(stop, SHEET_FILE, "v", peers=False))
     assert found["error"] is None
