@@ -181,10 +181,11 @@ def _wrong_entry(done: Finished) -> WrongSheet | None:
     form = done.beside_form
     rival = 1.0 if form is None else max(excess(form.problem, form.found.baseline, form.fitted), 0.0) / left
     wrong = wrong_entry(done.problem, done.found.final.effects, rival)
-    if wrong is not None or form is None or not excess(form.problem, form.found.baseline, form.fitted) > WORTH_A_SHEET:
+    if wrong is not None or form is None or not (left := excess(form.problem, form.found.baseline, form.fitted)) > WORTH_A_SHEET:
         return wrong
-    # Where friction is of another form than the model's, what that makes is no error of any entry.
-    return wrong_entry(form.problem.unshaped(), form.found.final.effects)
+    # Where friction is of another form than the model's, what that makes is no error of any entry; nor what names begin late or bend.
+    names = max(excess(form.problem, form.found.final, form.fitted), 0.0) / left
+    return wrong_entry(form.problem.unshaped(), form.found.final.effects, names if form.found.found else 1.0)
 
 
 def _other_clocks(pieces: Sequence[Recording], clocks: Synchronised, final: Fit) -> Synchronised | None:

@@ -33,7 +33,7 @@ from lugre_steering.vehicle import load
 
 @pytest.mark.parametrize("noise", ["white", "coloured", "ripple"])
 def test_silent_when_nothing_is_hidden(tmp_path: Path, noise: str) -> None:
-    _, bags = made(tmp_path, seed=21, noise=noise, stride=SLOWEST)
+    _, bags = made(tmp_path, seed=21, noise=noise)
     result = diagnose_recordings(read(bags), load(VEHICLE))
     assert result.json["verdict"] == "consistent"
     assert result.json["effects"] == []
