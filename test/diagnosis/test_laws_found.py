@@ -74,9 +74,10 @@ def white(problem: Problem) -> Noise:
     return Noise(np.full(problem.valid.size, SIGMA), draws, 0.0)
 
 
-def named(problem: Problem, final: Fit) -> Finished:
-    """A search that came to ``final``."""
-    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, (), (), ()))
+def named(problem: Problem, final: Fit, given: bool = False) -> Finished:
+    """A search that came to ``final``; ``given``: to what every joint has."""
+    found = (SimpleNamespace(given=given),) * len(final.effects)
+    return Finished(problem, white(problem), split(problem), Search(fitted(problem), final, found, (), ()))  # type: ignore[arg-type]
 
 
 def by_run(part: object) -> Array:
@@ -349,6 +350,7 @@ def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> Non
     beside = replace(alone, problem=room, fitted=both, fit=both)
     assert beside.names == 1
     assert not leaves_names(named(problem, line), beside)
+    assert leaves_names(named(problem, line, given=True), beside)  # what every joint has was not looked for
     assert not keeps_names(named(problem, line), beside, alone)
 
 

@@ -64,10 +64,10 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
 
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     """Whether every name is still needed with laws ``beside`` it, where names are compared; one that is not has a rival there, and no
-    companion, or was named for the form of the friction law."""
+    companion, or was named for the form of the friction law. What every joint has was not looked for, and may go."""
     problem, weight, fitted = beside_form(done, beside)
     least = SURE * doubt(problem, fitted, weight)
-    for index in range(beside.names):
+    for index in (i for i, item in enumerate(done.found.found) if not item.given):
         rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
         if fit(problem, weight, rest, fitted, linearisations=6).cost - fitted.cost < least:
             return False
