@@ -70,5 +70,6 @@ def test_what_it_cannot_do_is_said_in_a_line(tmp_path: Path, capsys: pytest.Capt
         with pytest.raises(SystemExit) as ended:
             same.run(words)
         assert (ended.value.code, expected in capsys.readouterr().err) == (2, True)
-    same.run([])
-    assert "--keep FOLDER and --against FOLDER" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as ended:
+        same.run([])
+    assert (ended.value.code, "--keep FOLDER and --against FOLDER" in capsys.readouterr().err) == (2, True)

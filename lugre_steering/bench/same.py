@@ -124,8 +124,7 @@ def run(argv: Sequence[str]) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     options = parser.parse_args(argv)
     if (options.keep is None) == (options.against is None):
-        print("same: compares two trees; expected one of --keep FOLDER and --against FOLDER")
-        return
+        parser.error("compares two trees; expected one of --keep FOLDER and --against FOLDER")
     try:
         if options.keep is not None:
             keep(options.keep, options.cases)

@@ -59,6 +59,9 @@ def _check_sensors(vehicle: Vehicle, reader: Reader) -> None:
     fail, sensors, coordinate = reader.fail, vehicle.sensors, vehicle.coordinate
     if (vehicle.hydraulics is None) == (vehicle.torque_sensor is None):
         raise fail("hydraulics", None, "exactly one of 'hydraulics' and 'torque_sensor'")
+    if sensors.rate_filter_s is not None and sensors.angle_sigma == 0.0:
+        expected = "angle_noise_deg or angle_resolution_deg above zero beside it: without noise of the angle nothing is filtered"
+        raise fail("sensors.rate_filter_s", sensors.rate_filter_s, expected)
     if sensors.angle_from is not None and (
         sensors.angle_from not in vehicle.sides or len(vehicle.sides) < 2 or vehicle.axle is None
     ):

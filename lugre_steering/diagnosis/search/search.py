@@ -216,13 +216,19 @@ def _of_sure_size(
         shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
         least = shapeless[-1] if shapeless else int(np.argmin(whole))
         goes = bool(shapeless) or whole[least] < least_size
-        terms = [least] * (not shapeless) if goes else [i for i, item in enumerate(kept) if given and item.given]
+        effects: Effects = current.effects
+        if shapeless:
+            terms = []
+        elif goes:  # of two parts that do the same neither is sure, but what is left is
+            terms = [least]
+        else:
+            terms = [i for i, item in enumerate(kept) if given and item.given]
         part = least_sure_part(problem, weight, split, current, terms)
-        if part is not None:  # of two parts that do the same neither is sure, but what is left is
-            effects: Effects = without_part(current.effects, *part)
+        if part is not None:
+            effects = without_part(effects, *part)
         elif goes:
             del kept[least]
-            effects = [effect for i, effect in enumerate(current.effects) if i != least]
+            effects = [effect for i, effect in enumerate(effects) if i != least]
         else:
             return kept, current
         current = fit(problem, weight, effects, current.x)
