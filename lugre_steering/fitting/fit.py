@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg.blas import dger
 from scipy.linalg.lapack import dposv
 
 from lugre_steering.effects.entry import Parameter
@@ -37,9 +36,9 @@ MOST_SETS, PATIENCE, ROUNDING = 5, 3, 1e-12
 class Fit:
     """Result of a joint fit: nuisance x, effects with their values, prediction (n,) [N m], weighted cost.
 
-    ``slope`` (n, q): change of the prediction per scaled unit of each fitted value, times the weight of each sample; ``natural`` (q,): what
-    such a unit is; ``prior`` (q,): weight per unit of it. ``pull`` (q,): the same per unit of the value; ``pulled`` (q,): the prior's error
-    at the fit. ``weight`` (n,) of the samples; ``settled``: no further fall is to be had.
+    ``slope`` (n, q): change of the prediction per scaled unit of each fitted value, times the weight of each sample; ``gram`` (q, q): its
+    square; ``natural`` (q,): what such a unit is; ``prior`` (q,): weight per unit of it. ``pull`` (q,): the same per unit of the value;
+    ``pulled`` (q,): the prior's error at the fit. ``weight`` (n,) of the samples; ``settled``: no further fall is to be had.
     """
 
     x: Array
@@ -47,6 +46,7 @@ class Fit:
     prediction: Array
     cost: float
     slope: Array
+    gram: Array
     natural: Array
     prior: Array
     pulled: Array
@@ -65,7 +65,7 @@ class Fit:
     @cached_property
     def covariance(self) -> Array:
         """Of the fitted values (q, q); few of many fits are asked for it."""
-        spread = np.linalg.pinv(self.slope.T @ self.slope + np.diag(self.prior**2), rcond=1e-12)
+        spread = np.linalg.pinv(_stiffened(self.gram, self.prior**2), rcond=1e-12)
         return np.asarray(spread * np.outer(self.natural, self.natural), float)
 
     def basis(self, without: slice | None = None) -> Array:
@@ -125,7 +125,7 @@ def fit(
     x, fitted = vector.values(descent.p)
     error, pulled = (descent.base - problem.measured) * weight, descent.p * vector.prior
     cost, natural = _cost(error, pulled, False), vector.natural(descent.p)
-    return Fit(x, tuple(fitted), descent.base, cost, descent.slope, natural, vector.prior, pulled, weight, descent.settled)
+    return Fit(x, tuple(fitted), descent.base, cost, descent.slope, descent.gram, natural, vector.prior, pulled, weight, descent.settled)
 
 
 @dataclass(frozen=True)
@@ -190,21 +190,22 @@ class _Vector:
     def predict(self, p: Array) -> Array:
         return self.problem.predict_all(*self.values(p))
 
-    def jacobian(self, p: Array, base: Array, first: int) -> Array:
-        """Change of the prediction (n, q - first) per unit of the values from ``first`` on, at p where it is ``base``; by columns."""
-        made = np.empty((base.size, p.size - first), order="F")
+    @property
+    def bends(self) -> slice:
+        """Values in which the prediction is linear."""
+        return slice(self.problem.first_bend, self.nuisances)
+
+    def linearise(self, p: Array, base: Array, weight: Array, columns: Sequence[int], slope: Array) -> None:
+        """Put into ``columns`` of ``slope`` (n, q) the change of the prediction per unit, at p where it is ``base``, times the weight."""
 
         def fill(j: int) -> None:
-            made[:, j - first] = self._column(p, j, base)
+            np.multiply(self._column(p, j, base), weight, out=slope[:, j])
 
-        in_threads(fill, range(first, p.size))
-        return made
+        in_threads(fill, columns)
 
     def _column(self, p: Array, j: int, base: Array) -> Array:
         """One column by a forward (or, at the upper bound, backward) difference of 2 % of the scale."""
         problem, step = self.problem, 0.02 if p[j] + 0.02 <= self.high[j] else -0.02
-        if problem.first_bend <= j < self.nuisances:
-            return np.asarray(problem.bends[:, j - problem.first_bend])
         moved = p.copy()
         moved[j] += step
         x, effects = self.values(moved)
@@ -228,7 +229,8 @@ class _Vector:
 class _Descent:
     """Where a fit stands: vector ``p``, prediction ``base`` (n,), cost ``left``, weighted Jacobian ``slope`` (n, q).
 
-    ``settled``: no further fall is to be had, as a whole linearisation says from which steps have hardly brought any.
+    Bends are linear: their columns, and their part of the normal matrix, stay. ``settled``: no further fall is to be had, as a whole
+    linearisation says from which steps have hardly brought any.
     """
 
     def __init__(self, vector: _Vector, weight: Array, robust: bool, p: Array, earlier: Fit | None) -> None:
@@ -236,26 +238,36 @@ class _Descent:
         self.base, self.damping, self.settled = vector.predict(p), 1e-3, False
         self.left = self._cost(p, self.base)
         self.slope = np.empty((self.base.size, p.size), order="F")
+        bends = vector.bends
+        np.multiply(vector.problem.bends, weight[:, None], out=self.slope[:, bends])
+        self._parts = slice(0, bends.start), slice(bends.stop, p.size)
+        self.gram = np.empty((p.size, p.size))
+        self.gram[bends, bends] = self.slope[:, bends].T @ self.slope[:, bends]
         known = 0 if earlier is None else vector.known(earlier, weight)
         if earlier is None or not known:
             self.linearise(whole=True)
             return
-        self.slope[:, :known] = earlier.jacobian[:, :known] * vector.natural(p)[:known]
+        ratio = vector.natural(p)[:known] / earlier.natural[:known]
+        for part in (slice(0, bends.start), slice(bends.stop, known)):
+            np.multiply(earlier.slope[:, part], ratio[part], out=self.slope[:, part])
         same = [dict(values) for _, values in vector.effects] == [values for _, values in earlier.effects]
         self._whole = earlier.settled and known == p.size and same
-        if known < p.size:
-            np.multiply(vector.jacobian(p, self.base, known), weight[:, None], out=self.slope[:, known:])
-        self.gram = self.slope.T @ self.slope
+        self._linearise(range(known, p.size))
 
     def _cost(self, p: Array, predicted: Array) -> float:
         return _cost((predicted - self.vector.problem.measured) * self.weight, p * self.vector.prior, self.robust)
 
     def linearise(self, whole: bool) -> None:
         """The Jacobian anew, or only its columns of effects."""
+        bends = self.vector.bends
         self._whole = whole or self.p.size == self.vector.nuisances
-        first = 0 if self._whole else self.vector.nuisances
-        np.multiply(self.vector.jacobian(self.p, self.base, first), self.weight[:, None], out=self.slope[:, first:])
-        self.gram = self.slope.T @ self.slope
+        self._linearise([*range(bends.start if self._whole else 0), *range(bends.stop, self.p.size)])
+
+    def _linearise(self, columns: Sequence[int]) -> None:
+        self.vector.linearise(self.p, self.base, self.weight, columns, self.slope)
+        for part in self._parts:
+            self.gram[part] = self.slope[:, part].T @ self.slope
+            self.gram[:, part] = self.gram[part].T
 
     def advance(self, tolerance: float) -> None:
         """Steps as long as they do what the linearisation foretells, by more than ``tolerance`` of the cost."""
@@ -278,13 +290,20 @@ class _Descent:
             self.settled = self._whole and before - self.left < enough
             if fall < FORETOLD * foretold or (fall < enough and self.damping < UNDAMPED):
                 return
-            self._correct(secant - self.slope @ change, change / (change @ change))
+            self._correct(secant - self.slope @ change, change)
 
-    def _correct(self, missed: Array, along: Array) -> None:
-        """Broyden's correction: what a step missed (n,), per unit along it (q,); the normal matrix follows."""
+    def _correct(self, missed: Array, change: Array) -> None:
+        """Broyden's correction for what a step (q,) has missed (n,), of all that is not linear; the normal matrix follows."""
+        along = change.copy()
+        along[self.vector.bends] = 0.0
+        power = float(along @ along)
+        if not power > 0.0:
+            return
+        along /= power
         cross = np.outer(self.slope.T @ missed, along)
         self.gram = self.gram + cross + cross.T + (missed @ missed) * np.outer(along, along)
-        self.slope = dger(1.0, missed, along, a=self.slope, overwrite_a=True)
+        for part in self._parts:
+            self.slope[:, part] += np.outer(missed, along[part])
 
     def _step(self, normal: Array, gradient: Array, exact: bool) -> tuple[Array, Array, float]:
         """A step within bounds, the prediction there and the fall of the cost; an ``exact`` linearisation is worth ever shorter ones."""

@@ -59,8 +59,10 @@ CLAIMED = 0.5
 """Share of what an entry claims that is there at most, if its error is what names take back."""
 PUT_RIGHT = 0.03
 """Error that is left, as share of the torque, with which a sheet counts as put right."""
-FORETOLD = 0.5
-"""Share of what a wrong entry must explain that its linearisation foretells at least."""
+FORETOLD, REACHED = 0.5, 0.9
+"""Share of what a wrong entry must explain that its linearisation foretells at least, and that its torques anywhere in its range reach."""
+POINTS = 9
+"""Values, over the range of a level, at which its torque is looked at before it is fitted."""
 STEPS, MOST_SIZES = 6, 8
 """Steps that look for a factor; sizes that promise most, to which recalibration is fitted anew."""
 OFF, SEVERAL = 0.03, 1.1
@@ -171,7 +173,7 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     stuck = at_bounds(thin, baseline.x, LEVELS)
     if not stuck and surprise < SURPRISE:
         return None
-    found = sorted(_off((*_levels(thin), *_geometries(thin, baseline))), key=_least)
+    found = sorted(_off((*_levels(thin, baseline), *_geometries(thin, baseline))), key=_least)
     if not found:
         return None
     best = found[0].suspect
@@ -220,7 +222,8 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
     named = fit(thin, thin.sensor_weight, [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
-    every = (*_levels(thin), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
+    most_left = min(1.0 - EXPLAINED, BETTER * rival)
+    every = (*_levels(thin, baseline, REACHED * (1.0 - most_left)), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
     found = sorted((tried.suspect for tried in _off(every)), key=lambda item: item.cost)
     if not found:
         return None
@@ -233,8 +236,7 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     if claims:
         found = [*claims, *(suspect for suspect in found if suspect not in claims)]
         return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet claims what the recordings do not show")
-    most = min(1.0 - EXPLAINED, BETTER * rival) * excess
-    if excess <= 0.0 or left > most or (effects and beside_names - left < clearly):
+    if excess <= 0.0 or left > most_left * excess or (effects and beside_names - left < clearly):
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 
@@ -312,8 +314,8 @@ def _ratio(problem: Problem) -> float:
     return torque_ratio(float(problem.measured[problem.valid] @ expected), float(expected @ expected))
 
 
-def _levels(problem: Problem) -> Iterator[_Tried]:
-    """Hypotheses about whole levels."""
+def _levels(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tried]:
+    """Hypotheses about whole levels; only those that may explain ``least`` of what is left beyond noise, or claim a torque of their own."""
     known = [c for c in problem.calibrations if c.name != PRESSURES.name]
 
     def tried(key: str, values: Sequence[SheetValue], starts: Sequence[float], factor: Callable[[float], float] | None) -> _Tried:
@@ -323,12 +325,38 @@ def _levels(problem: Problem) -> Iterator[_Tried]:
         result = min((_fitted(trial, start=x) for x in begun), key=lambda each: each.cost)
         return _tried(problem, trial, result, key, None if factor is None else factor(float(result.x[0])), freed)
 
+    def hopeless(*values: SheetValue) -> bool:
+        return least > 0.0 and CONSERVATIVE not in values and _reach(problem, baseline, values) < least
+
     for level in levels(problem.vehicle, problem.sheet):
+        if hopeless(level.value):
+            continue
         found = tried(level.key, [level.value], level.starts, level.factor)
         claims = level.value is CONSERVATIVE and abs(found.suspect.factor or 0.0) < CLAIMED
         yield found._replace(suspect=replace(found.suspect, claims_more=claims))
-    other = tried("several entries: another vehicle", [LEVEL, STIFF, PRESSURES], (0.0,), None)
-    yield other._replace(suspect=replace(other.suspect, cost=SEVERAL * other.suspect.cost))
+    several = (LEVEL, STIFF, PRESSURES)
+    if not hopeless(*several):
+        other = tried("several entries: another vehicle", several, (0.0,), None)
+        yield other._replace(suspect=replace(other.suspect, cost=SEVERAL * other.suspect.cost))
+
+
+def _reach(problem: Problem, baseline: Fit, values: Sequence[SheetValue]) -> float:
+    """Share of what the baseline leaves beyond noise that ``values`` could explain at most: by the torques that they make over their
+    range, in any combination, whatever is recalibrated. A run of the chain each, where a fit takes hundreds."""
+    weight, others = problem.sensor_weight, [c for c in problem.calibrations if c.name not in {value.name for value in values}]
+    freed = problem.of_sheet(calibrations=[*values, *others])
+    at = dict(zip((c.name for c in problem.calibrations), baseline.x, strict=False))
+    begin = np.concatenate([[at.get(c.name, 0.0) for c in freed.calibrations], baseline.x[len(problem.calibrations) :]])
+    moved = []
+    for i, value in enumerate(values):
+        for number in np.linspace(value.low, value.high, POINTS):
+            x = begin.copy()
+            x[i] = number
+            moved.append((freed.predict_all(x) - baseline.prediction) * weight)
+    left, every = (problem.measured - baseline.prediction) * weight, np.column_stack([baseline.basis(), *moved])
+    explained = every @ np.linalg.lstsq(every, left, rcond=1e-9)[0]
+    beyond = float(left @ left) - float(np.count_nonzero(weight))
+    return float(explained @ explained) / max(beyond, 1e-30)
 
 
 def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tried]:

@@ -10,7 +10,7 @@ always beyond them. A name must take more than both.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def settled(problem: Problem, weight: Array, result: Fit, own_doubt: float | Non
     for _ in range(ROUNDS):
         now = doubt(problem, result, weight) if own_doubt is None else own_doubt
         before, sizes = problem, [problem.doubted(now, TYPICAL * share) for share in SIZES]
-        problem = min(sizes, key=lambda each: _expected(each, weight, result))
+        problem = min(sizes, key=_expected(problem, weight, result))
         result = fit(problem, weight, result.effects, result, tolerance=TRIAL_TOLERANCE)
         if problem.typical == before.typical and abs(problem.doubt - before.doubt) < ALIKE * before.doubt:
             break
@@ -90,20 +90,24 @@ def left(problem: Problem, result: Fit) -> float:
     return result.cost + problem.doubt * _volume(problem, _gram(problem, result))
 
 
-def _expected(problem: Problem, weight: Array, result: Fit) -> float:
-    """What ``left`` would be of a model that is linear about a fit, for the doubt and the sizes of bends that the problem has."""
-    slope, error, x = result.jacobian[:, : problem.nuisances], (problem.measured - result.prediction) * weight, result.x
-    gram = _gram(problem, result)
-    target = error + slope @ x
-    along = slope.T @ target
-    prior = (problem.prior_weights(True) / problem.scales()) ** 2
-    cost = float(target @ target - along @ np.linalg.solve(gram + np.diag(prior), along))
-    return cost + problem.doubt * _volume(problem, gram)
+def _expected(problem: Problem, weight: Array, result: Fit) -> Callable[[Problem], float]:
+    """What ``left`` would be of a model that is linear about a fit, by the doubt and the sizes of bends that the problem has."""
+    error, x, gram = (problem.measured - result.prediction) * weight, result.x, _gram(problem, result)
+    pull = result.slope[:, : problem.nuisances].T @ error / result.natural[: problem.nuisances]
+    along, energy = pull + gram @ x, float(error @ error + 2.0 * pull @ x + x @ gram @ x)
+
+    def expected(each: Problem) -> float:
+        prior = (each.prior_weights(True) / each.scales()) ** 2
+        cost = energy - float(along @ np.linalg.solve(gram + np.diag(prior), along))
+        return cost + each.doubt * _volume(each, gram)
+
+    return expected
 
 
 def _gram(problem: Problem, result: Fit) -> Array:
-    slope = result.jacobian[:, : problem.nuisances]
-    return np.asarray(slope.T @ slope)
+    """Square (k, k) of the change of the weighted prediction per unit of each nuisance."""
+    own = slice(0, problem.nuisances)
+    return np.asarray(result.gram[own, own] / np.outer(result.natural[own], result.natural[own]))
 
 
 def _volume(problem: Problem, gram: Array) -> float:
