@@ -221,6 +221,7 @@ class Problem:
         self.size = size_of(vehicle, self.runs)
         self.standing = standing_effects(vehicle)
         self._last_bending: tuple[bytes | None, Array] = None, np.zeros(self.measured.size)
+        self._last_calibrated: tuple[bytes | None, Array] = None, np.zeros(0)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
     @property
@@ -316,7 +317,7 @@ class Problem:
     def calibrating(self, calibration: SheetValue) -> Problem:
         """The same with one more value of the sheet that may be wrong."""
         more = copy(self)
-        more.calibrations = (*self.calibrations, calibration)
+        more.calibrations, more._last_calibrated = (*self.calibrations, calibration), (None, np.zeros(0))
         for known in ("_sheet", "_gains"):  # of the calibrations before
             more.__dict__.pop(known, None)
         return more
@@ -390,9 +391,7 @@ class Problem:
         """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion."""
         run = run or self.runs[bag]
         kind, places = self.model.parameters[0].dtype, self._at
-        numbers = self.model.parameters[0].view(np.float64).copy()
-        for field, value in self.fields(x).items():
-            numbers[places[field]] = value
+        numbers = self._calibrated(x).copy()
         numbers[places["initial_bristle"]] = x[len(self.calibrations) + bag] * self.presliding
         warmer = 0.0
         if self.vehicle.rubber is not None:
@@ -413,6 +412,17 @@ class Problem:
                         acting[places[field]] = number
             phases.append((start, records_of(acting, kind)))
         return torque_in_phases(phases, self.model.rubber, *run.steps)[:: 1 + run.midway]
+
+    def _calibrated(self, x: Array) -> Array:
+        """The numbers of the parameter record for the calibration part of x; kept, as they are the same for all bags and while a fit moves
+        anything else."""
+        key, last = x[: len(self.calibrations)].tobytes(), self._last_calibrated
+        if last[0] != key:
+            numbers = self.model.parameters[0].view(np.float64).copy()
+            for field, value in self.fields(x).items():
+                numbers[self._at[field]] = value
+            self._last_calibrated = last = key, numbers
+        return last[1]
 
     def predict(
         self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None

@@ -221,14 +221,18 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     """
     thin, _ = thinned(problem)
     baseline = _fitted(thin)
+    floor = float(np.count_nonzero(thin.valid))
+    excess = baseline.cost - floor
+    if excess <= 0.0:
+        return None
     named = fit(thin, thin.sensor_weight, [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
-    most_left = min(1.0 - EXPLAINED, BETTER * rival)
-    every = (*_levels(thin, baseline, REACHED * (1.0 - most_left)), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
+    beside_names, most_left = named.cost - floor, min(1.0 - EXPLAINED, BETTER * rival)
+    claimed = 1.0 - (max(beside_names / excess, most_left) if effects else most_left)
+    every = (*_levels(thin, baseline, 1.0 - most_left, claimed), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
     found = sorted((tried.suspect for tried in _off(every)), key=lambda item: item.cost)
     if not found:
         return None
-    floor = float(np.count_nonzero(thin.valid))
-    left, excess, beside_names = found[0].cost - floor, baseline.cost - floor, named.cost - floor
+    left = found[0].cost - floor
     # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
     clearly = max((1.0 - BETTER) * beside_names, SURPRISE)
     # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
@@ -236,7 +240,7 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     if claims:
         found = [*claims, *(suspect for suspect in found if suspect not in claims)]
         return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet claims what the recordings do not show")
-    if excess <= 0.0 or left > most_left * excess or (effects and beside_names - left < clearly):
+    if left > most_left * excess or (effects and beside_names - left < clearly):
         return None
     return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet explains most of what recalibration leaves")
 
@@ -314,8 +318,9 @@ def _ratio(problem: Problem) -> float:
     return torque_ratio(float(problem.measured[problem.valid] @ expected), float(expected @ expected))
 
 
-def _levels(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tried]:
-    """Hypotheses about whole levels; only those that may explain ``least`` of what is left beyond noise, or claim a torque of their own."""
+def _levels(problem: Problem, baseline: Fit, least: float = 0.0, claimed: float = 0.0) -> Iterator[_Tried]:
+    """Hypotheses about whole levels; only those that may explain ``least`` of what is left beyond noise, or ``claimed`` of it where they
+    are a torque of their own."""
     known = [c for c in problem.calibrations if c.name != PRESSURES.name]
 
     def tried(key: str, values: Sequence[SheetValue], starts: Sequence[float], factor: Callable[[float], float] | None) -> _Tried:
@@ -326,7 +331,8 @@ def _levels(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tr
         return _tried(problem, trial, result, key, None if factor is None else factor(float(result.x[0])), freed)
 
     def hopeless(*values: SheetValue) -> bool:
-        return least > 0.0 and CONSERVATIVE not in values and _reach(problem, baseline, values) < least
+        asked = REACHED * (claimed if CONSERVATIVE in values else least)
+        return asked > 0.0 and _reach(problem, baseline, values) < asked
 
     for level in levels(problem.vehicle, problem.sheet):
         if hopeless(level.value):

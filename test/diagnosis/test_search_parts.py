@@ -167,6 +167,12 @@ def replace_bends(problem: Problem, bends: Array) -> Problem:
     return Problem(problem.vehicle, problem.runs, problem.calibrations, bends=bends)
 
 
+def fit_of(cost: float, *effects: tuple[Candidate, dict[str, float]]) -> Fit:
+    """A fit of which only its effects and what it leaves matter."""
+    none, square = np.zeros(1), np.zeros((1, 1))
+    return Fit(none, effects, none, cost, square, square, none, none, none, none, settled=True)
+
+
 def test_the_energy_compared_is_the_evidence(slower: Problem) -> None:
     """Minus twice the logarithm of the likelihood with all linear freedoms integrated out, up to what all models share."""
     rng = np.random.default_rng(5)
@@ -176,15 +182,15 @@ def test_the_energy_compared_is_the_evidence(slower: Problem) -> None:
     energies, exact = [], []
     for typical in (0.02, 0.3):
         here = bent.doubted(1.0, typical)
-        energies.append(compare._expected(here, weight(bent), result))
+        energies.append(compare._expected(here, weight(bent), result)(here))
         slope = result.jacobian[:, : here.nuisances] * here.scales() / here.prior_weights(True)
         target = (bent.measured - result.prediction) * weight(bent) + result.jacobian[:, : here.nuisances] @ result.x
         keep = slice(0, 400)  # a dense covariance of all samples would be large
         _, size = np.linalg.slogdet(np.eye(400) + slope[keep] @ slope[keep].T)
         exact.append(float(target[keep] @ np.linalg.solve(np.eye(400) + slope[keep] @ slope[keep].T, target[keep])) + size)
-        part = compare._expected(here, np.where(np.arange(few) < 400, weight(bent), 0.0), replace(
-            result, slope=np.where(np.arange(few)[:, None] < 400, result.slope, 0.0)
-        ))  # fmt: skip
+        first = np.where(np.arange(few)[:, None] < 400, result.slope, 0.0)
+        shown = replace(result, slope=first, gram=first.T @ first)
+        part = compare._expected(here, np.where(np.arange(few) < 400, weight(bent), 0.0), shown)(here)
         assert part == pytest.approx(exact[-1], rel=1e-9)
     assert energies[0] != pytest.approx(energies[1], rel=1e-6)
 
@@ -495,10 +501,10 @@ def test_what_no_size_could_show_has_no_limit(problem: Problem) -> None:
 def test_a_name_that_must_go_as_far_as_it_may_does_not_stand_for_a_group() -> None:
     named = [effect("slope_bias", torque=1.0), effect("kingpin_jacking", amplitude=1.0)]
     score = Score(named[0][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
-    most, nothing = named[0][0].parameter("torque").high, np.zeros((1, 1))
+    most = named[0][0].parameter("torque").high
 
     def made_up(candidate: Candidate, cost: float, **values: float) -> trial.Trial:
-        made = Fit(nothing[0], ((candidate, values),), nothing[0], cost, nothing, nothing, nothing[0], nothing[0], nothing[0], True)
+        made = fit_of(cost, (candidate, values))
         return trial.Trial(score, made, cost)
 
     within, other = made_up(named[0][0], 480.0, torque=0.5 * most), made_up(named[1][0], 500.0, amplitude=1.0)
@@ -512,9 +518,8 @@ def test_an_onset_must_explain_clearly_more_to_stand_for_a_group() -> None:
     score = Score(candidates[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
 
     def made_up(candidate: Candidate, cost: float, since: tuple[float, ...] = ()) -> trial.Trial:
-        nothing = np.zeros((1, 1))
         named = ((replace(candidate, since=since), {}),)
-        made = Fit(nothing[0], named, nothing[0], cost, nothing, nothing, nothing[0], nothing[0], nothing[0], True)
+        made = fit_of(cost, *named)
         return trial.Trial(score, made, cost)
 
     always, late = made_up(candidates[0], 500.0), made_up(candidates[1], 480.0, (10.0, 10.0))
@@ -589,9 +594,8 @@ def test_a_known_rival_is_tried_where_the_leader_stands_with_the_shapes_of_its_l
 
 def test_of_one_claim_about_different_recordings_the_simpler_is_kept_unless_the_other_takes_clearly_more() -> None:
     def tried(id_: str, cost: float, bags: tuple[int, ...] | None) -> trial.Trial:
-        nothing = np.zeros((1, 1))
         named = ((replace(effect(id_)[0], bags=bags), {}),)
-        made = Fit(nothing[0], named, nothing[0], cost, nothing, nothing, nothing[0], nothing[0], nothing[0], True)
+        made = fit_of(cost, *named)
         return trial.Trial(Score(named[0][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), made, cost)
 
     whole, little, much = tried("backlash", 500.0, None), tried("backlash", 480.0, (0,)), tried("backlash", 300.0, (0,))
