@@ -14,11 +14,11 @@ from lugre_steering.diagnosis.investigate import recalibrate
 from lugre_steering.diagnosis.search import compare, propose, search, surely
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.effects.relief_saturation import CEILINGS
-from lugre_steering.fitting import fingerprint, noise, onset, split, trial
+from lugre_steering.fitting import entries, fingerprint, noise, onset, sheet, split, trial
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Candidate, Problem
+from lugre_steering.fitting.problem import Candidate, Problem, SheetValue
 from lugre_steering.fitting.sheet import thinned
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import EffectEntry
@@ -193,6 +193,31 @@ def test_the_energy_compared_is_the_evidence(slower: Problem) -> None:
         part = compare._expected(here, np.where(np.arange(few) < 400, weight(bent), 0.0), shown)(here)
         assert part == pytest.approx(exact[-1], rel=1e-9)
     assert energies[0] != pytest.approx(energies[1], rel=1e-6)
+
+
+def test_bends_keep_their_columns_and_a_fit_hands_on_its_normal_matrix(slower: Problem) -> None:
+    """Whatever steps have corrected on the way: bends are linear, and the normal matrix is that of the columns that are handed on."""
+    bent = replace_bends(slower, np.random.default_rng(5).standard_normal((slower.measured.size, 3)) * 4.0 * SIGMA)
+    (name,) = [effect("line_loss_quadratic", c=3e4)]
+    bent.measured = bent.predict_all(np.append(slower.start(), (0.5, -0.5, 0.2)), [name])
+    result = fit(bent, weight(bent), [(name[0], {"c": 1e4})], linearisations=3)
+    own = slice(bent.first_bend, bent.nuisances)
+    assert np.array_equal(result.slope[:, own], bent.bends * weight(bent)[:, None])
+    square = result.slope.T @ result.slope
+    np.testing.assert_allclose(result.gram, square, rtol=1e-9, atol=1e-9 * square.max())
+    assert result.x[own] == pytest.approx((0.5, -0.5, 0.2), abs=0.01)
+    assert result.effects[0][1]["c"] == pytest.approx(3e4, rel=1e-3)
+
+
+@pytest.mark.parametrize(("wrong", "by"), [(entries.STIFF, 1.4), (entries.LEVEL, 1.0), (entries.LEVEL, -2.0), (entries.CONSERVATIVE, 0.3)])
+def test_a_wrong_level_reaches_what_it_makes(slower: Problem, wrong: SheetValue, by: float) -> None:
+    """However far it is off, so that it is fitted; what an inertia makes it does not reach."""
+    freed = slower.of_sheet(calibrations=[wrong, *(own for own in slower.calibrations if own.name != wrong.name)])
+    mistyped = with_torque(slower, freed.predict_all(np.append(by, freed.start()[1:])))
+    heavy = with_torque(slower, slower.predict_all(slower.start(), [effect("yaw_inertia", inertia=3000.0)]))
+    own, other = (sheet._reach(hidden, sheet._fitted(hidden), [wrong]) for hidden in (mistyped, heavy))
+    assert own > 0.99
+    assert other < 0.5
 
 
 def test_bends_are_as_large_as_the_data_ask_for(slower: Problem) -> None:
