@@ -180,7 +180,12 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     floor = float(np.count_nonzero(thin.valid)) / doubt
     fits = best.puts_right or best.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(tried.surprise for tried in found if tried.suspect.cost < TIED * best.cost) > RELIEVED * surprise:
-        return None
+        # What is left may be friction of another form, which no entry explains: one that takes the surprise is wrong all the same.
+        taking = [tried for tried in found if max(tried.surprise, surprise - (baseline.cost - tried.suspect.cost)) < RELIEVED * surprise]
+        if not taking:
+            return None
+        found = [*taking, *(tried for tried in found if tried not in taking)]
+        best = found[0].suspect
     rest = (best.cost - floor) / max(baseline.cost - floor, 1e-30)
     return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), stuck=bool(stuck), rest=rest)
 
