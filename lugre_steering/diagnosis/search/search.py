@@ -16,6 +16,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.search import flexible
 from lugre_steering.diagnosis.search.compare import (
+    ALIKE,
     SIZES,
     SURE,
     TIE,
@@ -35,6 +36,7 @@ from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviat
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
+from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
@@ -295,7 +297,8 @@ def _in_place(
     progress: Callable[[str], None],
 ) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
     """Further names beside those of a vehicle that stand for ``sure``, where all together without freedoms are clearly more evident than
-    the former with them, and each is needed: with problem and baseline without freedoms. ``problem``: without bends of names.
+    the former with them and leave no more in doubt, as they would of friction of another form, and each is needed: with problem and
+    baseline without freedoms. ``problem``: without bends of names.
     """
     found, there, free = sure
     exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
@@ -311,7 +314,7 @@ def _in_place(
         if name.gain < needed(exact, current, weight, stands):
             return None
         found = [*found, name]
-    if len(found) == len(sure[0]):
+    if len(found) == len(sure[0]) or doubt(exact, current, weight) > (1.0 + ALIKE) * there.doubt:
         return None
     least = needed(exact, current, weight, stands)
     for index in range(len(found)):
