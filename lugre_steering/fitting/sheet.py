@@ -181,7 +181,8 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     fits = best.puts_right or best.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(tried.surprise for tried in found if tried.suspect.cost < TIED * best.cost) > RELIEVED * surprise:
         # What is left may be friction of another form, which no entry explains: one that takes the surprise is wrong all the same.
-        taking = [tried for tried in found if max(tried.surprise, surprise - (baseline.cost - tried.suspect.cost)) < RELIEVED * surprise]
+        unstuck = [tried for tried in found if not tried.stuck and tried.surprise < RELIEVED * surprise]
+        taking = [tried for tried in unstuck if baseline.cost - tried.suspect.cost > (1.0 - RELIEVED) * surprise]
         if not taking:
             return None
         found = [*taking, *(tried for tried in found if tried not in taking)]

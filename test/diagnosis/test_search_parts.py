@@ -220,6 +220,21 @@ def test_a_wrong_level_reaches_what_it_makes(slower: Problem, wrong: SheetValue,
     assert other < 0.5
 
 
+@pytest.mark.parametrize("by", [0.62, -0.6, 0.0])
+def test_a_wrong_level_is_told_beside_friction_of_another_form(slower: Problem, by: float) -> None:
+    """A tenth more and less along the ground, which no entry explains; the torque is one that a sensor measures, without cylinders."""
+    bare = Problem(slower.vehicle.replace(hydraulics=None), slower.runs, slower.calibrations)
+    freed = bare.of_sheet(calibrations=[entries.LEVEL, *(own for own in bare.calibrations if own.name != entries.LEVEL.name)])
+    along = np.concatenate([run.theta.mean(axis=0) for run in bare.runs])
+    uneven = freed.predict_all(np.append(by, freed.start()[1:])) * (1.0 + 0.1 * np.sin(60.0 * along))
+    told = sheet.wrong_sheet(with_torque(bare, uneven))
+    assert (told is None) == (by == 0.0)
+    if told is not None:
+        assert "friction.coulomb" in [suspect.key for suspect in told.suspects[:2]]
+        assert told.rest > 0.5  # most of what is left stays
+        assert not told.certain
+
+
 def test_bends_are_as_large_as_the_data_ask_for(slower: Problem) -> None:
     """None where the torque is the model's; as large as real rubber shows where it is bent by that."""
     shapes = np.random.default_rng(6).standard_normal((slower.measured.size, 4)) * 20.0 * SIGMA
