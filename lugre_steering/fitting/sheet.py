@@ -166,7 +166,8 @@ def torque_ratio(product: float, square: float) -> float:
 
 
 def wrong_sheet(problem: Problem) -> WrongSheet | None:
-    """Whether the recalibrated baseline needs more than nominal values allow, and another entry puts that right; else None."""
+    """Whether the recalibrated baseline needs more than nominal values allow, and another entry puts that right, or at least takes that
+    need away; else None."""
     thin, doubt = _doubted(thinned(problem)[0])
     baseline = _fitted(thin)
     surprise = _surprise(thin, baseline)
@@ -181,14 +182,18 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
     fits = best.puts_right or best.cost - floor < RELIEVED * (baseline.cost - floor)
     if not fits or min(tried.surprise for tried in found if tried.suspect.cost < TIED * best.cost) > RELIEVED * surprise:
         # What is left may be friction of another form, which no entry explains: one that takes the surprise is wrong all the same.
-        unstuck = [tried for tried in found if not tried.stuck and tried.surprise < RELIEVED * surprise]
-        taking = [tried for tried in unstuck if baseline.cost - tried.suspect.cost > (1.0 - RELIEVED) * surprise]
+        taking = [tried for tried in found if _takes_surprise(tried, baseline.cost, surprise)]
         if not taking:
             return None
         found = [*taking, *(tried for tried in found if tried not in taking)]
         best = found[0].suspect
     rest = (best.cost - floor) / max(baseline.cost - floor, 1e-30)
     return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), stuck=bool(stuck), rest=rest)
+
+
+def _takes_surprise(tried: _Tried, cost: float, surprise: float) -> bool:
+    """Whether with an entry put right recalibration stops at no bound and is no surprise any more, and that is what makes it cost less."""
+    return not tried.stuck and max(tried.surprise, surprise - (cost - tried.suspect.cost)) < RELIEVED * surprise
 
 
 def physics_instead(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
