@@ -12,6 +12,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.calibration.calibrate import Calibrated
+from lugre_steering.fitting.doubt import NORMAL
 from lugre_steering.fitting.keys import KEYS
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, SERIES, figure
 
@@ -57,7 +58,7 @@ def _parameters(ax: Any, rows: list[dict[str, Any]]) -> None:
     for i, row in enumerate(rows):
         value, (low, high) = row["value"] / row["sheet"], sorted(end / row["sheet"] for end in row["ci95"])
         if row["prior_relative_sd"]:
-            reach = np.exp(1.96 * row["prior_relative_sd"])
+            reach = np.exp(NORMAL * row["prior_relative_sd"])
             ax.plot([1.0 / reach, reach], [i, i], color="#dddddd", linewidth=9.0, solid_capstyle="butt")
         weak = row["at_bound"] or row["prior_dominated"]
         colour = SERIES[1] if weak else SERIES[0]
@@ -67,7 +68,7 @@ def _parameters(ax: Any, rows: list[dict[str, Any]]) -> None:
     ax.set_yticks(range(len(rows)), [titles.get(row["key"], row["key"]) for row in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)
     ends = [end / row["sheet"] for row in rows for end in (row["value"], *row["ci95"])]
-    ends += [np.exp(sign * 1.96 * row["prior_relative_sd"]) for row in rows if row["prior_relative_sd"] for sign in (-1, 1)]
+    ends += [np.exp(sign * NORMAL * row["prior_relative_sd"]) for row in rows if row["prior_relative_sd"] for sign in (-1, 1)]
     ax.set_xlim(max(0.2, min(0.6, min(ends) - 0.05)), min(3.0, max(1.4, max(ends) + 0.05)))
     sheet = ", grey: the sheet's own" if any(row["prior_relative_sd"] for row in rows) else ""
     ax.set_title(f"95 % intervals{sheet}; orange: hardly determined, or at a bound")

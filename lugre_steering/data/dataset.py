@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import correlate1d, gaussian_filter1d, minimum_filter1d
 
 from lugre_steering.data.sensing import SensorNoise, louder, sensed
 from lugre_steering.data.smoother import smooth_angle
@@ -32,6 +32,8 @@ REACH, LONG = 3.0, 0.9
 """Standard deviations over which an average reaches; share of the time between two samples of the longer of two steps."""
 BRIDGED = 1.5
 """Times the usual time between messages from which one is missing."""
+MEAN = np.array([0.125, 0.75, 0.125])
+"""Shares of samples in the mean over a step about the middle one, of what is straight between them."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
 
@@ -77,6 +79,8 @@ class Run:
     """Where a sample of a channel is missing (n,), so that a line is in its place."""
     average_s: float = 0.0
     """Standard deviation [s] of the Gaussian average through which ``measured`` is seen, as predictions must be; see ``in_parallel``."""
+    mean_of: float | None = None
+    """Where each sample of ``measured`` is the mean over its step, as predictions must be: of how many independent ones, by its noise."""
     midway: bool = False
     """Whether the friction level follows the rate midway between samples, to second order, and not that at their end."""
 
@@ -128,6 +132,8 @@ def acceleration(time: Array, theta: Array) -> Array:
 
 def averaged(run: Run, torque: Array) -> Array:
     """A torque (n,) [N m] through the average of a run."""
+    if run.mean_of is not None:
+        torque = np.asarray(correlate1d(torque, MEAN, mode="nearest"))
     if not run.average_s:
         return torque
     return np.asarray(gaussian_filter1d(torque, run.average_s / float(run.time[1] - run.time[0]), truncate=REACH))

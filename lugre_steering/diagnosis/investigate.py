@@ -12,14 +12,14 @@ import numpy as np
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.form import Bent, bent
+from lugre_steering.diagnosis.means import means
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
 from lugre_steering.fitting.problem import Problem, is_rig
-from lugre_steering.fitting.sheet import thinned
 from lugre_steering.fitting.split import Split, balanced, split
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE
-from lugre_steering.recording import Array, IntArray
+from lugre_steering.recording import Array
 
 NULL_DRAWS = 16
 SAMPLES, FASTEST_HZ, ALONE = 6000, 200.0, 5
@@ -49,10 +49,8 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
     """What the search comes to, with names fitted as a vehicle file holds them: without the freedoms."""
     # What else joints and axes may do is found by name: their sheets know little of their friction anyhow.
     alone = is_rig(problem.vehicle)
-    thin, kept = _coarser(problem, baseline, ALONE * SAMPLES if alone else SAMPLES)
+    thin, fewer, used = means(problem, noise, roles, baseline, ALONE * SAMPLES if alone else SAMPLES, FASTEST_HZ)
     freer, words, freedoms = Bent(thin, (), ()) if alone else bent(thin, baseline)
-    fewer = Noise(noise.sigma[kept], noise.draws[:, kept], noise.slow_doubt)
-    used = Split(roles.fit[kept], roles.held[kept], roles.cluster[kept])
     there, found = search(freer, fewer, used, _unbent(freer, np.where(used.fit, 1.0 / fewer.sigma, 0.0), baseline), progress)
     beside = Finished(there, fewer, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))), freedoms=freedoms)
     done = Finished(problem, noise, roles, replace(found, baseline=baseline), beside_form=beside)
@@ -65,14 +63,6 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
 def _with_final(done: Finished, beside: Fit) -> Finished:
     """The search with its names as a vehicle file holds them; ``beside``: they and the freedoms."""
     return replace(done, found=replace(done.found, final=done.in_file(done.fitted, beside.effects, beside.x)))
-
-
-def _coarser(problem: Problem, baseline: Fit, most: int) -> tuple[Problem, IntArray]:
-    """The problem on fewer samples, and which; what longer steps change of the baseline's torque is no error of the model."""
-    thin, kept = thinned(problem, most, FASTEST_HZ)
-    change = np.split(thin.predict_all(baseline.x) - baseline.prediction[kept], thin.edges[1:-1])
-    runs = [replace(run, measured=run.measured + part) for run, part in zip(thin.runs, change, strict=True)]
-    return Problem(thin.vehicle, runs, thin.calibrations), kept
 
 
 def _unbent(problem: Problem, weight: Array, baseline: Fit) -> Fit:

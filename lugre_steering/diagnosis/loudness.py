@@ -15,9 +15,9 @@ from lugre_steering.fitting.sensors import beside_sensors
 from lugre_steering.recording import Array
 
 OWN_ERROR = 0.05
-"""Energy, in noise variances per sample, that simulation and smoothing may leave with nothing hidden (measured on nulls)."""
+"""Energy per sample, in noise variances of one as recorded, that simulation and smoothing may leave with nothing hidden (of nulls)."""
 SLOW_EXCESS, FAST_EXCESS = 0.25, 1.0
-"""Energy left over, in noise variances, that is structure: slow and above the doubt about slow noise, or of any kind."""
+"""Energy left over, in noise variances of a sample as recorded, that is structure: slow and above the doubt about slow noise, or any."""
 FORM_LEFT = 0.15
 """Share of the energy that the freedoms of the friction law explain that may be left beside them without being structure, since they too
 are of another form than nature."""
@@ -41,7 +41,8 @@ def loudness(problem: Problem, noise: Noise, result: Fit) -> Loudness:
     excess = float(np.mean(standardised[weight > 0.0] ** 2)) - 1.0
     doubt = FORM_LEFT * form_energy(problem, result, weight) / max(int(np.count_nonzero(weight)), 1)
     # Slow errors tell physics from ripple and vibration, which standstill does not show as they are in motion.
-    return Loudness(excess, slow, slow > max(SLOW_EXCESS, noise.slow_doubt, doubt) or excess > FAST_EXCESS + doubt)
+    slow_most, most = SLOW_EXCESS * problem.mean_of, FAST_EXCESS * problem.mean_of + doubt
+    return Loudness(excess, slow, slow > max(slow_most, noise.slow_doubt, doubt) or excess > most)
 
 
 def excess(problem: Problem, result: Fit, weight: Array) -> float:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
 
 from lugre_steering.fitting import onset
 from lugre_steering.fitting.fit import Fit, fit
@@ -19,8 +18,6 @@ from lugre_steering.recording import Array, IntArray, Mask
 RESAMPLES = 2000
 ENOUGH = 5
 """Stretches of CLUSTER_S that must be left to judge by."""
-NORMAL = float(stats.norm.ppf(0.975))
-"""Half width of a 95 % interval in standard deviations."""
 
 
 def rmse(problem: Problem, result: Fit, mask: Mask) -> float:

@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import stats
 
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
+NORMAL = float(stats.norm.ppf(0.975))
+"""Half width of a 95 % interval in standard deviations."""
 MEMORY_S, FORGOTTEN = 3.0, 0.05
 """Longest memory of errors looked for, and the correlation at which it has ended."""
 

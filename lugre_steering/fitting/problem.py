@@ -234,6 +234,11 @@ class Problem:
         """One over ``sigma`` (n,) [1/(N m)] where samples are valid, 0 elsewhere: before a fit has shown the noise."""
         return np.asarray(self.valid / self.sigma)
 
+    @cached_property
+    def mean_of(self) -> float:
+        """Energy of the noise of a sample as recorded, in that of the means that stand for them, on the average of all; 1 where none do."""
+        return float(np.mean(np.repeat([run.mean_of or 1.0 for run in self.runs], np.diff(self.edges))))
+
     @property
     def nuisances(self) -> int:
         """Calibration values, one initial bristle deflection per bag, its weather, and bends."""

@@ -10,7 +10,6 @@ from typing import cast
 import numpy as np
 
 from lugre_steering import units
-from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.headline import inside
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.loudness import FORM_LEFT
@@ -19,6 +18,7 @@ from lugre_steering.diagnosis.search import locate
 from lugre_steering.diagnosis.search.compare import tied
 from lugre_steering.diagnosis.search.search import Found
 from lugre_steering.diagnosis.search.surely import deviations, moved_by_form
+from lugre_steering.fitting.doubt import NORMAL
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate
 from lugre_steering.fitting.trial import Trial, cost
@@ -72,7 +72,7 @@ def _intervals(done: Finished, whole: Fit, bent: Fit) -> list[dict[str, FittedVa
         parameters: dict[str, FittedValue] = {}
         form = moved_by_form(there.problem, there.weight, bent, index)
         for key in candidate.free:
-            known = verify.NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
+            known = NORMAL * float(np.hypot(deviation[position], share * (freely[key] - shifted[key])))
             half = float(np.hypot(known, 0.0 if item.given else form[key]))
             parameters[candidate.line if candidate.effect.per_line else key] = FittedValue(
                 values[key], (values[key] - half, values[key] + half), done.unit(candidate.parameter(key).unit)

@@ -25,7 +25,10 @@ from lugre_steering.diagnosis.laws.rival import (
     leaves_names,
     room_for_laws,
 )
+from lugre_steering.diagnosis.loudness import beyond_calibration
 from lugre_steering.diagnosis.result import Verdict
+from lugre_steering.diagnosis.search.compare import SURE
+from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Candidate, Problem, is_rig
@@ -101,7 +104,18 @@ def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tupl
         both = formed_beside(done, stands.lawful, seed)
         return done, stands if both is None else replace(stands, lawful=both[0], judged=both[0].judged, form=both[1])
     form = (tested.form if stands.named else None) or formed(timed_by_all(done) if stands.named else done, stands.named, seed)
+    if form is not None and stands.named and len(acting := _acting(done, form)) < len(done.found.found):
+        return standing(done.only(acting), seed, progress)
     return done, replace(stands, form=form, judged=form.judged if form is not None and stands.named else stands.judged)
+
+
+def _acting(done: Finished, form: Formed) -> list[int]:
+    """Which names do more than a recalibration would beside the form of the friction where that runs in the chain, not only linear as
+    they were compared: one that had stood for what is not linear in it does nothing there."""
+    there = done.compared
+    least = SURE * there.problem.doubt * np.count_nonzero(done.fitted) / np.count_nonzero(there.fitted)
+    parts = [contribution(form.problem, form.fitted, i) for i in range(len(done.found.found))]
+    return [i for i, part in enumerate(parts) if beyond_calibration(form.problem, form.fitted, part) > least]
 
 
 def without_laws(done: Finished, stands: Stands, seed: int) -> Stands:

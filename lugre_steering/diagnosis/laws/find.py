@@ -104,7 +104,7 @@ def find(
         progress("screening laws" if not index else "screening for a second law")
         screen = Screen(sought, current, weight, roles, there.noise.draws, trace(sought, current, place, axes_of(sought)), seed)
         screened = screen.search()
-        least = max(bar(screened), OWN_ERROR * samples, SECOND * gains[0] if gains else 0.0)
+        least = max(bar(screened), OWN_ERROR * sought.mean_of * samples, SECOND * gains[0] if gains else 0.0)
         first_bar = first_bar or bar(screened)
         if screened[0].gain < least:
             break

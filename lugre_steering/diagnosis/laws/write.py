@@ -16,13 +16,13 @@ from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law, law_of
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.effects import laws
+from lugre_steering.fitting.doubt import NORMAL
 from lugre_steering.recording import Array
 from lugre_steering.report import words
 from lugre_steering.vehicle import LawEntry, Vehicle
 
 WRITTEN_KNOTS = 65
 """Knots of a table in a file; of a fine one more."""
-NORMAL = 1.96
 POINTS = 24
 """Steps of the coordinate in which the data are shown beside f."""
 CHANNEL_WORDS = {

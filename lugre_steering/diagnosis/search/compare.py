@@ -122,7 +122,7 @@ def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) ->
     Of what freedoms and names do, some part is always of another form than nature; of the freedoms as much as may be left at most.
     """
     samples = float(np.count_nonzero(weight))
-    own = OWN_ERROR * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
+    own = OWN_ERROR * problem.mean_of * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
     most_left = max(excess(problem, result, weight) * samples, 0.0) + SURE_OF_LEFT * float(np.sqrt(2.0 * samples * problem.doubt))
     form = min(most_left, FORM_LEFT * form_energy(problem, result, weight))
     return SURE * problem.doubt + form + stands + own

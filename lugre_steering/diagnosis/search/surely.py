@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.search.compare import END, NAME_TAKEN
 from lugre_steering.diagnosis.search.locate import contribution
-from lugre_steering.diagnosis.verify import NORMAL
+from lugre_steering.fitting.doubt import NORMAL
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import BLOCK_S, CLUSTER_S, Split
