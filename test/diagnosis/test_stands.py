@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis.conclude.stands import _clock, _missed_by, _of_one_vehicle, _tested
+from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis.conclude.formed import Formed
+from lugre_steering.diagnosis.conclude.stands import _acting, _clock, _missed_by, _of_one_vehicle, _tested
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.search.search import Found, Search
 from lugre_steering.fitting.fingerprint import Score
@@ -44,6 +46,20 @@ def test_a_name_is_judged_beside_the_freedoms_that_it_was_compared_beside(there:
     done = finished(problem, **({"beside_form": beside} if freed else {}))
     assert done.needs_form
     assert _tested(done, 1).named == named
+
+
+@pytest.mark.parametrize(("torque", "loss", "acting"), [(0.0, 3e4, [1]), (60.0, 3e4, [0, 1]), (60.0, 10.0, [0]), (1.0, 0.0, [])])
+def test_names_that_do_nothing_beside_the_form_of_the_friction_in_the_chain_are_not_told(
+    torque: float, loss: float, acting: list[int]
+) -> None:
+    roles, noise = split(NOTHING), Noise(np.full(NOTHING.valid.size, SIGMA), np.zeros((1, NOTHING.valid.size)), 0.0)
+    fitted = np.where(roles.fit, weight(NOTHING), 0.0)
+    names = [effect("slope_bias", torque=torque), effect("line_loss_quadratic", c=loss)]
+    baseline, inside = fit(NOTHING, fitted), fit(NOTHING, fitted, [(replace(candidate, free=()), values) for candidate, values in names])
+    item = Found(Score(SLOPE[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.zeros(1)), (), (), 100.0)
+    done = Finished(NOTHING, noise, roles, Search(baseline, inside, (item, item), (), ()))
+    judged = verify.judged_once(NOTHING, baseline, inside, roles, 1)
+    assert _acting(done, Formed(NOTHING, inside, inside, (), judged, judged)) == acting
 
 
 @pytest.mark.parametrize(("received", "late_s", "apart"), [(True, 0.02, True), (False, 0.02, False), (True, 0.2, False)])
