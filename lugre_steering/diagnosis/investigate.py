@@ -23,7 +23,7 @@ from lugre_steering.recording import Array
 
 NULL_DRAWS = 16
 SAMPLES, FASTEST_HZ, ALONE = 6000, 200.0, 5
-"""Samples on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
+"""Means on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
 times as many are as quick without freedoms."""
 NOISE_ROUNDS, QUIETER = 2, 0.8
 """Searches repeated, and the fall of the noise floor, once physics is found, that asks for it."""
