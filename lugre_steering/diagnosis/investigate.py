@@ -22,7 +22,7 @@ from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array
 
 NULL_DRAWS = 16
-SAMPLES, FASTEST_HZ, ALONE = 6000, 200.0, 5
+SAMPLES, FASTEST_HZ, ALONE = 3000, 200.0, 10
 """Means on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
 times as many are as quick without freedoms."""
 NOISE_ROUNDS, QUIETER = 2, 0.8

@@ -46,7 +46,8 @@ def evident(done: Finished, alone: FoundLaws) -> bool:
         return False
     problem, weight, fitted = beside_form(done, alone)
     mine, base = _energies(done, [(problem, weight, fitted)])
-    return base - mine > needed(*settled(problem, weight, fitted), weight)
+    there, settled_in = settled(problem, weight, fitted)
+    return base - mine > needed(there, settled_in, weight, shapes=_values(fitted.effects[alone.names :]))
 
 
 def _stuck(problem: Problem, result: Fit) -> bool:

@@ -116,15 +116,16 @@ def _volume(problem: Problem, gram: Array) -> float:
     return float(np.linalg.slogdet(np.eye(prior.size) + gram / np.outer(prior, prior))[1])
 
 
-def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0) -> float:
+def needed(problem: Problem, result: Fit, weight: Array, stands: float = 0.0, shapes: int = 1) -> float:
     """Energy that a name must take to be believed, where ``result`` has it; ``stands``: ``may_differ`` of the names before it.
 
-    Of what freedoms and names do, some part is always of another form than nature; of the freedoms as much as may be left at most.
+    Of what freedoms and names do, some part is always of another form than nature; of the freedoms as much as may be left at most, and as
+    many times that as there are ``shapes`` to take it: a law whose values make its shape takes of any error what as many names would.
     """
     samples = float(np.count_nonzero(weight))
     own = OWN_ERROR * problem.mean_of * samples * (OWN_SHARE if problem.bends.shape[1] else 1.0)
     most_left = max(excess(problem, result, weight) * samples, 0.0) + SURE_OF_LEFT * float(np.sqrt(2.0 * samples * problem.doubt))
-    form = min(most_left, FORM_LEFT * form_energy(problem, result, weight))
+    form = min(shapes * most_left, FORM_LEFT * form_energy(problem, result, weight))
     return SURE * problem.doubt + form + stands + own
 
 
