@@ -116,6 +116,10 @@ def test_what_a_name_must_take_is_what_is_left_until_all_of_it_may_be_the_form()
     left = float(np.sum(((there.problem.measured - worse[1.0].prediction) * used) ** 2)) - np.count_nonzero(used)
     assert asked[1.0] - asked[0.0] == pytest.approx(left)  # the errors of the baseline itself are within noise
     assert asked[10.0] == asked[20.0] == pytest.approx(FORM_LEFT * whole, rel=0.01)
+    more = [compare.needed(there.problem, worse[1.0], used, shapes=count) for count in (1, 2, 3, 10**6)]
+    assert more[1] - more[0] == pytest.approx(more[2] - more[1])  # one share of what is left for each shape that may take it
+    assert more[1] - more[0] > left
+    assert more[3] == asked[10.0]  # but never more than all of the form that may be left
 
 
 def error_elsewhere(vehicle: Vehicle) -> float:
