@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import correlate1d, minimum_filter1d
 
+from lugre_steering.data.dataset import Run
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
@@ -18,21 +19,27 @@ from lugre_steering.recording import Array, Mask
 
 
 class _Steps:
-    """Every ``stride``-th sample of a recording, and the step about each, which is as long as they are apart."""
+    """The steps of a recording of which ``few`` samples are kept, each as long as these are apart and about one of them; its samples
+    begin at ``first``."""
 
-    def __init__(self, stride: int) -> None:
-        self.kept = slice(None, None, stride)
+    def __init__(self, few: Run, run: Run, first: int) -> None:
+        stride = round((few.time[1] - few.time[0]) / (run.time[1] - run.time[0]))
+        self.part, self.kept = slice(first, first + run.time.size), slice(None, None, stride)
         self.share = np.ones(stride + 1 - stride % 2) / stride
         if stride % 2 == 0:  # symmetric all the same: half a sample of delay would look like physics
             self.share[[0, -1]] *= 0.5
 
     def mean(self, values: Array) -> Array:
-        """Means (..., m) of values (..., n)."""
-        return np.asarray(correlate1d(values, self.share, mode="nearest")[..., self.kept])
+        """Means (..., m) of those of values (..., n) that are of this recording."""
+        return np.asarray(correlate1d(values[..., self.part], self.share, mode="nearest")[..., self.kept])
 
     def whole(self, mask: Mask) -> Mask:
         """Steps (m,) of which all samples are in a mask (n,)."""
-        return np.asarray(minimum_filter1d(mask.astype(np.uint8), self.share.size, mode="nearest")[self.kept] > 0)
+        return np.asarray(minimum_filter1d(mask[self.part].astype(np.uint8), self.share.size, mode="nearest")[self.kept] > 0)
+
+    def noise(self, draws: Array) -> float:
+        """Noise of a mean in that of a sample, as draws (k, n) have it."""
+        return float(np.std(self.mean(draws)) / np.std(draws[:, self.part])) if self.share.size > 1 else 1.0
 
 
 def means(
@@ -40,27 +47,17 @@ def means(
 ) -> tuple[Problem, Noise, Split]:
     """At most so many means, no more often than that; what longer steps change of the baseline's torque is no error of the model."""
     thin, kept = thinned(problem, most, fastest_Hz)
-    parts = [slice(a, b) for a, b in zip(problem.edges[:-1], problem.edges[1:], strict=True)]
-    bags = [
-        (few, _Steps(round((few.time[1] - few.time[0]) / (run.time[1] - run.time[0]))), part)
-        for few, run, part in zip(thin.runs, problem.runs, parts, strict=True)
-    ]
+    bags = [_Steps(*each) for each in zip(thin.runs, problem.runs, problem.edges[:-1].tolist(), strict=True)]
     draws, error = noise.draws / noise.sigma, problem.measured - baseline.prediction
-    drawn = [steps.mean(draws[:, part]) for _, steps, part in bags]
-    quieter = [float(np.std(draws[:, part]) / np.std(mean)) for (_, _, part), mean in zip(bags, drawn, strict=True)]
+    less = [bag.noise(draws) for bag in bags]
     runs = [
-        replace(few, mean_of=factor**2 if steps.share.size > 1 else None, sigma=few.sigma / factor, valid=steps.whole(problem.valid[part]))
-        for (few, steps, part), factor in zip(bags, quieter, strict=True)
+        replace(few, mean_of=share**-2 if bag.share.size > 1 else None, sigma=few.sigma * share, valid=bag.whole(problem.valid))
+        for few, share, bag in zip(thin.runs, less, bags, strict=True)
     ]  # fmt: skip
     expected = np.split(thin.over(runs).predict_all(baseline.x), thin.edges[1:-1])
-    runs = [
-        replace(run, measured=torque + steps.mean(error[part]))
-        for run, torque, (_, steps, part) in zip(runs, expected, bags, strict=True)
-    ]
-    sigma = noise.sigma[kept]
-    less = Noise(
-        sigma / np.repeat(quieter, np.diff(thin.edges)), np.concatenate(drawn, axis=1) * sigma,
-        noise.slow_doubt * float(np.mean(np.repeat(quieter, np.diff(thin.edges)) ** 2)),
-    )  # fmt: skip
-    fitted, held = (np.concatenate([steps.whole(role[part]) for _, steps, part in bags]) for role in (roles.fit, roles.held))
-    return thin.over(runs), less, Split(fitted, held, roles.cluster[kept])
+    runs = [replace(run, measured=torque + bag.mean(error)) for run, torque, bag in zip(runs, expected, bags, strict=True)]
+    seen, sigma = thin.over(runs), noise.sigma[kept]
+    drawn = np.concatenate([bag.mean(draws) for bag in bags], axis=1) * sigma
+    quiet = Noise(sigma * np.repeat(less, np.diff(seen.edges)), drawn, noise.slow_doubt * seen.mean_of)
+    fitted, held = (np.concatenate([bag.whole(role) for bag in bags]) for role in (roles.fit, roles.held))
+    return seen, quiet, Split(fitted, held, roles.cluster[kept])
