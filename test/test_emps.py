@@ -142,6 +142,20 @@ def test_the_second_recording_holds_pulses_where_its_own_channel_says(
 
 
 @needs_data
+@pytest.mark.parametrize("name", [QUIET, PULSES])
+def test_no_law_takes_the_place_of_what_the_literature_found(bags: Path, name: str) -> None:
+    """As a user runs it: what is left over is more than noise, and laws that follow it had moved viscous friction by a third."""
+    result = ls.diagnose(bags / name, VEHICLE).json
+    assert result["laws"] == []
+    held = {effect["id"]: next(iter(effect["parameters"].values()))["ci95"] for effect in result["effects"]}
+    for id_, published in {"yaw_inertia": 95.11, "viscous_friction": 203.5, "slope_bias": -3.16}.items():
+        low, high = held.pop(id_)
+        assert low < published < high
+    assert not held
+    assert result["augmented"]["heldout_rmse_Nm"] < 0.065 * result["baseline"]["heldout_rmse_Nm"]
+
+
+@needs_data
 def test_without_viscous_friction_a_law_of_the_rate_takes_its_place(bags: Path) -> None:
     """As the page on real data says; the published model is the oracle of the law."""
     result = ls.diagnose(bags / QUIET, VEHICLE, without="viscous_friction").json

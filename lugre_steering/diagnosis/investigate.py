@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from lugre_steering.data.dataset import Run
+from lugre_steering.diagnosis.fewer import fewer
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.form import Bent, bent
-from lugre_steering.diagnosis.means import means
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
@@ -23,7 +23,7 @@ from lugre_steering.recording import Array
 
 NULL_DRAWS = 16
 SAMPLES, FASTEST_HZ, ALONE = 3000, 200.0, 10
-"""Means on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
+"""Samples on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
 times as many are as quick without freedoms."""
 NOISE_ROUNDS, QUIETER = 2, 0.8
 """Searches repeated, and the fall of the noise floor, once physics is found, that asks for it."""
@@ -49,10 +49,11 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
     """What the search comes to, with names fitted as a vehicle file holds them: without the freedoms."""
     # What else joints and axes may do is found by name: their sheets know little of their friction anyhow.
     alone = is_rig(problem.vehicle)
-    thin, fewer, used = means(problem, noise, roles, baseline, ALONE * SAMPLES if alone else SAMPLES, FASTEST_HZ)
+    most = ALONE * SAMPLES if alone else SAMPLES
+    thin, less, used = fewer(problem, noise, roles, baseline, most, FASTEST_HZ, means=not alone)
     freer, words, freedoms = Bent(thin, (), ()) if alone else bent(thin, baseline)
-    there, found = search(freer, fewer, used, _unbent(freer, np.where(used.fit, 1.0 / fewer.sigma, 0.0), baseline), progress)
-    beside = Finished(there, fewer, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))), freedoms=freedoms)
+    there, found = search(freer, less, used, _unbent(freer, np.where(used.fit, 1.0 / less.sigma, 0.0), baseline), progress)
+    beside = Finished(there, less, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))), freedoms=freedoms)
     done = Finished(problem, noise, roles, replace(found, baseline=baseline), beside_form=beside)
     done = _with_final(done, found.final)
     if not there.bends.shape[1] or not found.found or any(item.in_place for item in found.found) or not done.needs_form:

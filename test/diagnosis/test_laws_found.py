@@ -27,6 +27,7 @@ from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _sure, find, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
 from lugre_steering.diagnosis.laws.rival import (
+    _in_place_of_given,
     beside_form,
     evident,
     in_place,
@@ -37,6 +38,7 @@ from lugre_steering.diagnosis.laws.rival import (
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
 from lugre_steering.diagnosis.laws.write import described, entries, sentence
 from lugre_steering.diagnosis.search.search import Search
+from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.effects.law_entry import LawEntry
 from lugre_steering.effects.own import read_effects
 from lugre_steering.effects.registry import CATALOGUE
@@ -352,6 +354,27 @@ def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> Non
     assert not leaves_names(named(problem, line), beside)
     assert leaves_names(named(problem, line, given=True), beside)  # what every joint has was not looked for
     assert not keeps_names(named(problem, line), beside, alone)
+
+
+@pytest.mark.parametrize(
+    ("channel", "moved", "given", "in_its_place"),
+    [
+        ("conservative_torque", 10.0, True, True), ("conservative_torque", 10.0, False, False),
+        ("conservative_torque", 1.0, True, False), ("viscous_loss", 10.0, True, False),
+    ],
+)  # fmt: skip
+def test_a_law_that_does_what_every_joint_has_is_in_its_place(channel: str, moved: float, given: bool, in_its_place: bool) -> None:
+    """A constant torque does what an offset does; a loss does not, and where it moves the offset, this was another for want of it."""
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + 400.0)
+    offset = fitted(problem, effect("slope_bias", torque=400.0))
+    room, used = Problem(problem.vehicle, problem.runs, more_laws=1, beside_names=True), np.where(split(problem).fit, weight(problem), 0.0)
+    law = free_law(room, Cell(channel, Axis("none"), -1.0, 1.0, 1), 0, np.zeros(1))
+    beside = fit(room, used, [*offset.effects, law], offset.x)
+    (spread,) = deviations(problem, used, split(problem), offset)[problem.nuisances :]
+    candidate, values = offset.effects[0]
+    elsewhere = candidate, {**values, "torque": values["torque"] + moved * float(spread)}
+    beside = replace(beside, effects=(elsewhere, *beside.effects[1:]))
+    assert _in_place_of_given(named(problem, offset, given), room, used, beside) == in_its_place
 
 
 def test_a_line_is_found_where_the_data_show_only_a_part_of_the_pieces() -> None:

@@ -16,6 +16,7 @@ from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, with_freedo
 from lugre_steering.diagnosis.laws.refine import law_of
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
+from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Effects, Problem
@@ -26,6 +27,8 @@ OPPOSING = (
     "friction_level", "presliding_stiffness", "coulomb_friction", "load_friction", "viscous_loss", "turbulent_loss", "gain",
 )  # fmt: skip
 """Channels whose torque is against the motion, as friction is, or a share of the whole, of which friction is most."""
+MOVED, BLURRED = 4.0, 2.0
+"""Standard deviations by which laws beside what every joint has may move its values, if they make these as many times as large."""
 TRUER = 0.5
 """Share of what another model leaves beyond noise that one must leave at most to be far truer."""
 
@@ -65,14 +68,33 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
 
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     """Whether every name is still needed with laws ``beside`` it, where names are compared; one that is not has a rival there, and no
-    companion, or was named for the form of the friction law. What every joint has was not looked for, and may go."""
+    companion, or was named for the form of the friction law. What every joint has was not looked for, and may go where laws show that it
+    is nothing, but not where they only do the same."""
     problem, weight, fitted = beside_form(done, beside)
+    if _in_place_of_given(done, problem, weight, fitted):
+        return False
     least = SURE * doubt(problem, fitted, weight)
     for index in (i for i, item in enumerate(done.found.found) if not item.given):
         rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
         if fit(problem, weight, rest, fitted, linearisations=6).cost - fitted.cost < least:
             return False
     return True
+
+
+def _in_place_of_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:
+    """Whether a value of what every joint has is another in a fit ``beside`` laws than it may be without them, and is known far less well
+    there: the laws do the same."""
+    there, final = done.compared, done.compared.found.final
+    before = deviations(there.problem, there.fitted, there.roles, final)[there.problem.nuisances :]
+    after = deviations(problem, weight, there.roles, beside)[problem.nuisances :]
+    position = 0
+    for item, (candidate, was), (_, now) in zip(done.found.found, final.effects, beside.effects, strict=False):
+        for place, name in enumerate(candidate.free, position):
+            moved = abs(now[name] - was[name]) > MOVED * before[place]
+            if item.given and moved and after[place] > BLURRED * before[place]:
+                return True
+        position += len(candidate.free)
+    return False
 
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:

@@ -1,6 +1,10 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Fewer samples on which to compare names, each the mean of those of its step: their noise is less, and none is thrown away."""
+"""Fewer samples on which to compare names, each the mean of those of its step: their noise is less, and none is thrown away.
+
+Not of a joint or axis, whose friction law has no freedoms: what is left of that counts the more the less noise there is, and laws that
+follow it take the place of what the joint has.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +26,12 @@ class _Steps:
     """The steps of a recording of which ``few`` samples are kept, each as long as these are apart and about one of them; its samples
     begin at ``first``."""
 
-    def __init__(self, few: Run, run: Run, first: int) -> None:
+    def __init__(self, few: Run, run: Run, first: int, means: bool) -> None:
         stride = round((few.time[1] - few.time[0]) / (run.time[1] - run.time[0]))
         self.part, self.kept = slice(first, first + run.time.size), slice(None, None, stride)
-        self.share = np.ones(stride + 1 - stride % 2) / stride
-        if stride % 2 == 0:  # symmetric all the same: half a sample of delay would look like physics
+        width = stride if means else 1
+        self.share = np.ones(width + 1 - width % 2) / width
+        if width % 2 == 0:  # symmetric all the same: half a sample of delay would look like physics
             self.share[[0, -1]] *= 0.5
 
     def mean(self, values: Array) -> Array:
@@ -42,12 +47,12 @@ class _Steps:
         return float(np.std(self.mean(draws)) / np.std(draws[:, self.part])) if self.share.size > 1 else 1.0
 
 
-def means(
-    problem: Problem, noise: Noise, roles: Split, baseline: Fit, most: int, fastest_Hz: float
+def fewer(
+    problem: Problem, noise: Noise, roles: Split, baseline: Fit, most: int, fastest_Hz: float, *, means: bool
 ) -> tuple[Problem, Noise, Split]:
-    """At most so many means, no more often than that; what longer steps change of the baseline's torque is no error of the model."""
+    """At most so many samples, no more often than that; what longer steps change of the baseline's torque is no error of the model."""
     thin, kept = thinned(problem, most, fastest_Hz)
-    bags = [_Steps(*each) for each in zip(thin.runs, problem.runs, problem.edges[:-1].tolist(), strict=True)]
+    bags = [_Steps(*each, means) for each in zip(thin.runs, problem.runs, problem.edges[:-1].tolist(), strict=True)]
     draws, error = noise.draws / noise.sigma, problem.measured - baseline.prediction
     less = [bag.noise(draws) for bag in bags]
     runs = [

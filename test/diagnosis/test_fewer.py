@@ -10,12 +10,11 @@ import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import averaged
-from lugre_steering.diagnosis.means import means
+from lugre_steering.diagnosis.fewer import fewer
 from lugre_steering.fitting import split
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.fitting.sheet import thinned
 
 
 class Seen(NamedTuple):
@@ -36,23 +35,23 @@ def in_white_noise(problem: Problem) -> Seen:
     return Seen(problem, Noise(np.full(problem.measured.size, SIGMA), draws, 0.5), split.split(problem))
 
 
-def in_steps_of(count: int, seen: Seen) -> Seen:
+def in_steps_of(count: int, seen: Seen, means: bool = True) -> Seen:
     problem, noise, roles = seen
     baseline, rate_Hz = fit(problem, weight(problem)), 1.0 / float(problem.runs[0].time[1] - problem.runs[0].time[0])
-    return Seen(*means(problem, noise, roles, baseline, problem.measured.size, rate_Hz / count))
+    return Seen(*fewer(problem, noise, roles, baseline, problem.measured.size, rate_Hz / count, means=means))
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])
 def test_noise_is_that_of_means(problem: Problem, count: int) -> None:
     """Of n samples the mean has a variance of one n-th; of an even n half of the outer ones belong to the neighbours."""
-    fewer = in_steps_of(count, in_white_noise(problem))
+    less = in_steps_of(count, in_white_noise(problem))
     energy = 1.0 / count if count % 2 else (count - 0.5) / count**2
-    assert fewer.problem.measured.size == pytest.approx(problem.measured.size / count, abs=2)
-    assert fewer.problem.mean_of == pytest.approx(1.0 / energy, rel=0.02)
-    assert fewer.noise.floor == pytest.approx(SIGMA * energy**0.5, rel=0.02)
-    assert np.std(fewer.noise.draws) == pytest.approx(SIGMA * energy**0.5, rel=0.02)
-    assert fewer.noise.slow_doubt == pytest.approx(0.5 / energy, rel=0.02)  # slow noise is no less in a mean
-    left = fewer.problem.measured - fit(fewer.problem, 1.0 / fewer.noise.sigma).prediction
+    assert less.problem.measured.size == pytest.approx(problem.measured.size / count, abs=2)
+    assert less.problem.mean_of == pytest.approx(1.0 / energy, rel=0.02)
+    assert less.noise.floor == pytest.approx(SIGMA * energy**0.5, rel=0.02)
+    assert np.std(less.noise.draws) == pytest.approx(SIGMA * energy**0.5, rel=0.02)
+    assert less.noise.slow_doubt == pytest.approx(0.5 / energy, rel=0.02)  # slow noise is no less in a mean
+    left = less.problem.measured - fit(less.problem, 1.0 / less.noise.sigma).prediction
     assert np.std(left) == pytest.approx(SIGMA * energy**0.5, rel=0.05)
 
 
@@ -74,16 +73,13 @@ def test_an_effect_takes_as_much_evidence_as_of_all_samples_in_a_fifth_of_them(
 ) -> None:
     truth = effect(id_, **values)
     seen = in_white_noise(with_torque(problem, problem.predict_all(problem.start(), [truth])))
-    fewer = in_steps_of(5, seen)
-    sliced, kept = thinned(seen.problem, seen.problem.measured.size, 10.0)
 
-    def taken(there: Problem, sigma: np.ndarray) -> float:
-        used = np.where(there.valid, 1.0 / sigma, 0.0)
-        return fit(there, used).cost - fit(there, used, [truth]).cost
+    def taken(seen: Seen) -> float:
+        used = np.where(seen.problem.valid, 1.0 / seen.noise.sigma, 0.0)
+        return fit(seen.problem, used).cost - fit(seen.problem, used, [truth]).cost
 
-    whole = taken(seen.problem, seen.noise.sigma)
-    assert taken(fewer.problem, fewer.noise.sigma) == pytest.approx(whole, rel=0.1)
-    assert taken(sliced, seen.noise.sigma[kept]) < 0.4 * whole
+    assert taken(in_steps_of(5, seen)) == pytest.approx(taken(seen), rel=0.1)
+    assert taken(in_steps_of(5, seen, means=False)) < 0.4 * taken(seen)
 
 
 def test_no_mean_holds_a_sample_that_is_held_out_or_not_valid(problem: Problem) -> None:
@@ -96,7 +92,9 @@ def test_no_mean_holds_a_sample_that_is_held_out_or_not_valid(problem: Problem) 
     measured = np.split(np.where(unseen, 1e6, seen.problem.measured), problem.edges[1:-1])
     spoiled = Problem(problem.vehicle, [replace(run, measured=part) for run, part in zip(runs, measured, strict=True)])
     baseline = fit(seen.problem, np.where(seen.roles.fit, weight(seen.problem), 0.0))
-    clean, foul = (means(each, seen.noise, seen.roles, baseline, problem.measured.size, 20.0) for each in (seen.problem, spoiled))
+    clean, foul = (
+        fewer(each, seen.noise, seen.roles, baseline, problem.measured.size, 10.0, means=True) for each in (seen.problem, spoiled)
+    )
     used = clean[2].fit & clean[0].valid
     assert used.sum() > 0.5 * used.size
     assert np.array_equal(clean[0].measured[used], foul[0].measured[used])
