@@ -42,7 +42,7 @@ class _Steps:
         """Steps (m,) of which all samples are in a mask (n,)."""
         return np.asarray(minimum_filter1d(mask[self.part].astype(np.uint8), self.share.size, mode="nearest")[self.kept] > 0)
 
-    def noise(self, draws: Array) -> float:
+    def noise_left(self, draws: Array) -> float:
         """Noise of a mean in that of a sample, as draws (k, n) have it."""
         return float(np.std(self.mean(draws)) / np.std(draws[:, self.part])) if self.share.size > 1 else 1.0
 
@@ -54,15 +54,15 @@ def fewer(
     thin, kept = thinned(problem, most, fastest_Hz)
     bags = [_Steps(*each, means) for each in zip(thin.runs, problem.runs, problem.edges[:-1].tolist(), strict=True)]
     draws, error = noise.draws / noise.sigma, problem.measured - baseline.prediction
-    less = [bag.noise(draws) for bag in bags]
+    noise_left = [bag.noise_left(draws) for bag in bags]
     runs = [
-        replace(few, mean_of=share**-2 if bag.share.size > 1 else None, sigma=few.sigma * share, valid=bag.whole(problem.valid))
-        for few, share, bag in zip(thin.runs, less, bags, strict=True)
+        replace(few, mean_of=left**-2 if bag.share.size > 1 else None, sigma=few.sigma * left, valid=bag.whole(problem.valid))
+        for few, left, bag in zip(thin.runs, noise_left, bags, strict=True)
     ]  # fmt: skip
     expected = np.split(thin.over(runs).predict_all(baseline.x), thin.edges[1:-1])
     runs = [replace(run, measured=torque + bag.mean(error)) for run, torque, bag in zip(runs, expected, bags, strict=True)]
     seen, sigma = thin.over(runs), noise.sigma[kept]
     drawn = np.concatenate([bag.mean(draws) for bag in bags], axis=1) * sigma
-    quiet = Noise(sigma * np.repeat(less, np.diff(seen.edges)), drawn, noise.slow_doubt * seen.mean_of)
+    quiet = Noise(sigma * np.repeat(noise_left, np.diff(seen.edges)), drawn, noise.slow_doubt * seen.mean_of)
     fitted, held = (np.concatenate([bag.whole(role) for bag in bags]) for role in (roles.fit, roles.held))
     return seen, quiet, Split(fitted, held, roles.cluster[kept])

@@ -13,7 +13,9 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.formed import Formed
 from lugre_steering.diagnosis.conclude.stands import _acting, _clock, _missed_by, _of_one_vehicle, _tested
+from lugre_steering.diagnosis.fewer import fewer
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.loudness import beyond_calibration
 from lugre_steering.diagnosis.search.search import Found, Search
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import fit
@@ -60,6 +62,22 @@ def test_names_that_do_nothing_beside_the_form_of_the_friction_in_the_chain_are_
     done = Finished(NOTHING, noise, roles, Search(baseline, inside, (item, item), (), ()))
     judged = verify.judged_once(NOTHING, baseline, inside, roles, 1)
     assert _acting(done, Formed(NOTHING, inside, inside, (), judged, judged)) == acting
+
+
+@pytest.mark.parametrize(("doubts", "acts"), [(20.0, False), (35.0, True)])
+def test_a_name_must_do_as_much_on_all_samples_as_where_names_are_compared_on_means(doubts: float, acts: bool) -> None:
+    """A third as many means hold the same energy: 25 doubts are as many on all samples."""
+    draws = SIGMA * np.random.default_rng(4).standard_normal((16, NOTHING.valid.size))
+    roles, noise = split(NOTHING), Noise(np.full(NOTHING.valid.size, SIGMA), draws, 0.0)
+    used, rate_Hz = np.where(roles.fit, weight(NOTHING), 0.0), 1.0 / float(NOTHING.runs[0].time[1] - NOTHING.runs[0].time[0])
+    baseline = fit(NOTHING, used)
+    means, less, there = fewer(NOTHING, noise, roles, baseline, NOTHING.valid.size, rate_Hz / 3.0, means=True)
+    energy = beyond_calibration(NOTHING, baseline, np.ones(NOTHING.valid.size))
+    inside = fit(NOTHING, used, [(replace(SLOPE[0], free=()), {"torque": float(np.sqrt(doubts / energy))})])
+    found = Search(baseline, inside, (Found(Score(SLOPE[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.zeros(1)), (), (), 100.0),), (), ())
+    done = Finished(NOTHING, noise, roles, found, beside_form=Finished(means, less, there, found))
+    judged = verify.judged_once(NOTHING, baseline, inside, roles, 1)
+    assert _acting(done, Formed(NOTHING, inside, inside, (), judged, judged)) == [0] * acts
 
 
 @pytest.mark.parametrize(("received", "late_s", "apart"), [(True, 0.02, True), (False, 0.02, False), (True, 0.2, False)])

@@ -113,7 +113,9 @@ def _acting(done: Finished, form: Formed) -> list[int]:
     """Which names do more than a recalibration would beside the form of the friction where that runs in the chain, not only linear as
     they were compared: one that had stood for what is not linear in it does nothing there."""
     there = done.compared
-    least = SURE * there.problem.doubt * np.count_nonzero(done.fitted) / np.count_nonzero(there.fitted)
+    # As much evidence as where names are compared, on samples that are more but no means.
+    more = np.count_nonzero(done.fitted) / (np.count_nonzero(there.fitted) * there.problem.mean_of)
+    least = SURE * there.problem.doubt * more
     parts = [contribution(form.problem, form.fitted, i) for i in range(len(done.found.found))]
     return [i for i, part in enumerate(parts) if beyond_calibration(form.problem, form.fitted, part) > least]
 
