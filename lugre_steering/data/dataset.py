@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import correlate1d, gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from lugre_steering.data.sensing import SensorNoise, louder, sensed
 from lugre_steering.data.smoother import smooth_angle
@@ -32,8 +32,8 @@ REACH, LONG = 3.0, 0.9
 """Standard deviations over which an average reaches; share of the time between two samples of the longer of two steps."""
 BRIDGED = 1.5
 """Times the usual time between messages from which one is missing."""
-MEAN = np.array([0.125, 0.75, 0.125])
-"""Shares of samples in the mean over a step about the middle one, of what is straight between them."""
+MEAN = (0.75, 0.125)
+"""Shares of the middle sample, and of each beside it, in the mean over a step of what is straight between them."""
 CLOCK_S = 1e-3
 """What is left of an offset between clocks [s] after it was measured: they wander."""
 
@@ -133,7 +133,9 @@ def acceleration(time: Array, theta: Array) -> Array:
 def averaged(run: Run, torque: Array) -> Array:
     """A torque (n,) [N m] through the average of a run."""
     if run.mean_of is not None:
-        torque = np.asarray(correlate1d(torque, MEAN, mode="nearest"))
+        middle, sides = MEAN
+        wide = np.concatenate([torque[:1], torque, torque[-1:]])
+        torque = middle * torque + sides * (wide[:-2] + wide[2:])
     if not run.average_s:
         return torque
     return np.asarray(gaussian_filter1d(torque, run.average_s / float(run.time[1] - run.time[0]), truncate=REACH))

@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dposv
 
 from lugre_steering.effects.entry import Parameter
 from lugre_steering.fitting.problem import Candidate, Problem, in_threads
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, Mask
 
 ROBUST = 3.0
 """Standard deviations beyond which the robust fit counts an error linearly."""
@@ -342,17 +342,16 @@ def _stiffened(matrix: Array, more: Array) -> Array:
 def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> Array:
     """Where 1/2 d'A d + g'd is least within low <= d <= high, for positive definite A (q, q), by block principal pivoting.
 
-    All values on the wrong side of their bound, or held at one that they would leave, are exchanged at once; where that does not make them
-    fewer, one by one, which always ends (Judice and Pires, Computers Oper. Res. 21 (1994) 587). On normal equations its
-    cost is independent of the number of samples. After MOST_SETS sets of bounds the last one is returned.
+    It begins with those bounds held that zero stands at. All values on the wrong side of their bound, or held at one that they would
+    leave, are exchanged at once; where that does not make them fewer, one by one, which always ends (Judice and Pires, Computers Oper.
+    Res. 21 (1994) 587). On normal equations its cost is independent of the number of samples. After MOST_SETS sets of bounds the last
+    one is returned.
     """
-    step = _solved(normal, -gradient)
-    if np.all((low <= step) & (step <= high)):
-        return step
-    at_low, at_high = np.zeros(step.size, bool), np.zeros(step.size, bool)
-    fewest, patience = step.size + 1, PATIENCE
+    at_low, at_high = low >= 0.0, high <= 0.0
     sizes, least = np.abs(normal), np.abs(gradient)
-    for _ in range(MOST_SETS * step.size):
+    fewest, patience = gradient.size + 1, PATIENCE
+    step = _with_bounds(normal, gradient, low, high, at_low, at_high)
+    for _ in range(MOST_SETS * gradient.size):
         held = at_low | at_high
         below, above = ~held & (step < low), ~held & (step > high)
         exchanged = below | above
@@ -368,11 +367,19 @@ def bounded_minimum(normal: Array, gradient: Array, low: Array, high: Array) -> 
         if patience < 0:
             wrong = wrong[-1:]
         at_low[wrong], at_high[wrong] = below[wrong], above[wrong]
-        step = np.where(at_low, low, np.where(at_high, high, 0.0))
-        free = ~(at_low | at_high)
-        if free.any():
-            step[free] = _solved(normal[free][:, free], -(gradient + normal @ step)[free])
+        step = _with_bounds(normal, gradient, low, high, at_low, at_high)
     return np.asarray(np.clip(step, low, high))
+
+
+def _with_bounds(normal: Array, gradient: Array, low: Array, high: Array, at_low: Mask, at_high: Mask) -> Array:
+    """The least point where some values are held at their bounds and the others have none."""
+    free = ~(at_low | at_high)
+    if free.all():
+        return _solved(normal, -gradient)
+    step = np.where(at_low, low, np.where(at_high, high, 0.0))
+    if free.any():
+        step[free] = _solved(normal[free][:, free], -(gradient + normal @ step)[free])
+    return step
 
 
 def _solved(matrix: Array, right: Array) -> Array:

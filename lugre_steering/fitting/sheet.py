@@ -238,14 +238,17 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
         return None
     named = fit(thin, thin.sensor_weight, [(c, dict(v)) for c, v in effects], baseline.x, robust=True) if effects else baseline
     beside_names, most_left = named.cost - floor, min(1.0 - EXPLAINED, BETTER * rival)
-    claimed = 1.0 - (max(beside_names / excess, most_left) if effects else most_left)
-    every = (*_levels(thin, baseline, 1.0 - most_left, claimed), *_geometries(thin, baseline, FORETOLD * EXPLAINED))
+    # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
+    clearly = max((1.0 - BETTER) * beside_names, SURPRISE)
+    wanted, claimed = 1.0 - most_left, 1.0 - most_left
+    if effects:
+        wanted = max(wanted, 1.0 - (beside_names - clearly) / excess)
+        claimed = 1.0 - max(beside_names / excess, most_left)
+    every = (*_levels(thin, baseline, wanted, claimed), *(_geometries(thin, baseline, FORETOLD * wanted) if wanted < 1.0 else ()))
     found = sorted((tried.suspect for tried in _off(every)), key=lambda item: item.cost)
     if not found:
         return None
     left = found[0].cost - floor
-    # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
-    clearly = max((1.0 - BETTER) * beside_names, SURPRISE)
     # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
     claims = [suspect for suspect in found if effects and suspect.claims_more and suspect.cost - floor - beside_names < clearly]
     if claims:
