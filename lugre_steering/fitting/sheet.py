@@ -29,7 +29,7 @@ from lugre_steering.fitting.entries import (
     sizes,
 )
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Candidate, Problem, SheetValue, Values
+from lugre_steering.fitting.problem import Candidate, Problem, SheetValue, Values, is_rig
 from lugre_steering.recording import Array, BagFinding, IntArray
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.vehicle import Vehicle
@@ -250,7 +250,11 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
         return None
     left = found[0].cost - floor
     # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
-    claims = [suspect for suspect in found if effects and suspect.claims_more and suspect.cost - floor - beside_names < clearly]
+    least_taken = BETTER * (excess - beside_names)
+    claims = [
+        suspect for suspect in found
+        if effects and suspect.claims_more and suspect.cost - floor - beside_names < clearly and baseline.cost - suspect.cost > least_taken
+    ]  # fmt: skip
     if claims:
         found = [*claims, *(suspect for suspect in found if suspect not in claims)]
         return WrongSheet(_ratio(thin), tuple(found[:SHOWN]), "one entry of this sheet claims what the recordings do not show")
@@ -270,6 +274,12 @@ def at_bounds(problem: Problem, x: Array, names: Sequence[str]) -> list[str]:
         c.name for c, value in zip(problem.calibrations, x, strict=False)
         if c.name in names and not c.low + EDGE * (c.high - c.low) < value < c.high - EDGE * (c.high - c.low)
     ]  # fmt: skip
+
+
+def gone_too_far(problem: Problem, x: Array) -> bool:
+    """Whether friction level or stiffness stand at an end of their range: beside these a name only makes up for something else. What the
+    sheet of an unknown rig says is a guess anyhow."""
+    return not is_rig(problem.vehicle) and bool(at_bounds(problem, x, LEVELS))
 
 
 def thinned(problem: Problem, most: int = SAMPLES, rate_Hz: float = RATE_HZ) -> tuple[Problem, IntArray]:

@@ -31,8 +31,8 @@ from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.fitting.clocks import APART_S, LONGEST_S
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Candidate, Problem, is_rig
-from lugre_steering.fitting.sheet import LEVELS, at_bounds
+from lugre_steering.fitting.problem import Candidate, Problem
+from lugre_steering.fitting.sheet import gone_too_far
 
 SURELY = 2.0
 """Standard deviations by which a delay must be longer than those of clocks, where stamps are given on receipt."""
@@ -149,8 +149,7 @@ def _tested(done: Finished, seed: int) -> _Tested:
         beside = verify.verify(there.problem, there.weight, there.found.baseline, there.found.final, there.roles, seed)
         form = formed(timed_by_all(done), True, seed) if judged.gain <= -CONTRADICTED and beside.interval[0] > 0.0 else None
     clock = _clock(done)
-    # Beside a baseline that has gone as far as it may, a name only makes up for it; what an unknown rig's sheet says is a guess anyhow.
-    stuck = not is_rig(problem.vehicle) and bool(at_bounds(done.compared.problem, done.compared.found.final.x, LEVELS))
+    stuck = gone_too_far(done.compared.problem, done.compared.found.final.x)
     harmless = max(judged.gain, -np.inf if form is None else form.judged.gain) > -CONTRADICTED
     surely = beside.interval[0] > 0.0 or (judged.interval[0] > 0.0 and beside.interval[1] > 0.0)
     together = _of_one_vehicle([candidate for candidate, _ in found.final.effects], len(problem.runs))

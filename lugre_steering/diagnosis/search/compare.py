@@ -21,6 +21,7 @@ from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import TYPICAL, Problem
+from lugre_steering.fitting.sheet import gone_too_far
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, rank
 from lugre_steering.recording import Array
@@ -157,12 +158,15 @@ def tied(
     """Rivals that this data cannot tell from the best.
 
     Either no clear difference block by block (Vuong 1989), or one smaller than the doubts and what another form of the rival's law than
-    nature's may leave of what the best takes; nothing where the law is ``exact``.
+    nature's may leave of what the best takes; nothing where the law is ``exact``. What recalibration must go too far for could not be
+    named alone, nor in place of what does without.
     """
-    found = []
+    found, sound = [], not gone_too_far(problem, best.fit.x)
     error = ((problem.measured - best.fit.prediction) * weight) ** 2
     for other in others:
         if other.candidate.label == best.candidate.label or before - other.cost < HALF * (before - best.cost):
+            continue
+        if sound and gone_too_far(problem, other.fit.x):
             continue
         difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
         t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
