@@ -597,6 +597,26 @@ def test_laws_that_differ_by_less_than_their_own_form_are_tied(problem: Problem)
         assert bool(rivals) == tied
 
 
+def test_what_needs_recalibration_at_its_bounds_ties_with_nothing(problem: Problem) -> None:
+    """It could not be named alone either; beside a best one that needs the same it may be as good."""
+    roles, x = split.split(problem), problem.start()
+    truth, rival = effect("slope_bias", torque=2000.0), effect("back_pressure", torque=1.0)
+    hidden = with_torque(problem, problem.predict_all(x, [truth]))
+    seen = np.where(roles.fit, weight(hidden), 0.0)
+    score, right = Score(truth[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), fit(hidden, seen, [truth])
+    before = trial.cost(hidden, fit(hidden, seen), seen)
+    level = next(i for i, c in enumerate(hidden.calibrations) if c.name == "friction_level")
+    far = right.x.copy()
+    far[level] = hidden.calibrations[level].high
+
+    def tried(own: tuple[Candidate, dict[str, float]], x: Array) -> trial.Trial:
+        return trial.Trial(score, replace(right, x=x, effects=(own,)), right.cost)
+
+    sound, too_far = tried(rival, right.x), tried(rival, far)
+    for best, other, tied in ((right.x, sound, True), (right.x, too_far, False), (far, too_far, True)):
+        assert bool(compare.tied(hidden, seen, roles, tried(truth, best), [other], before)) == tied
+
+
 def test_a_rival_comes_with_all_parts_of_its_law(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those that it had when it was found to fit as well, when that is asked again with more known."""
     compared: list[trial.Trial] = []
