@@ -240,8 +240,8 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     beside_names, most_left = named.cost - floor, min(1.0 - EXPLAINED, BETTER * rival)
     # Where sensors are quieter than the sheet says, names may leave less than their noise: a share of that tells nothing.
     clearly = max((1.0 - BETTER) * beside_names, SURPRISE)
-    wanted, claimed = 1.0 - most_left, 1.0 - most_left
-    if effects:
+    wanted = claimed = 1.0 - most_left
+    if effects:  # beside these an entry must leave clearly less, or claim what they take back
         wanted = max(wanted, 1.0 - (beside_names - clearly) / excess)
         claimed = 1.0 - max(beside_names / excess, most_left)
     every = (*_levels(thin, baseline, wanted, claimed), *(_geometries(thin, baseline, FORETOLD * wanted) if wanted < 1.0 else ()))
