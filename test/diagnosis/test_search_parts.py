@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts of the search on small problems whose answer is known: noise, split, late effects, freer shapes."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -119,6 +120,25 @@ def test_two_effects_are_found_together(slower: Problem) -> None:
     found = searched(with_torque(slower, slower.predict_all(slower.start(), truth)))
     assert {candidate.effect.id for candidate, _ in found.final.effects} == {"line_loss_quadratic", "slope_bias"}
     assert len(found.found) == len(found.final.effects)
+
+
+@pytest.mark.parametrize("last_is_short", [False, True])
+def test_three_of_which_each_keeps_the_others_in_doubt_stand_together(
+    slower: Problem, monkeypatch: pytest.MonkeyPatch, last_is_short: bool
+) -> None:
+    """The first two are short of what a name must take; all stand where the third is not, and none where it is."""
+    truth = [effect("line_loss_quadratic", c=3e4), effect("kingpin_jacking", amplitude=400.0), effect("slope_bias", torque=200.0)]
+    hidden = with_torque(slower, slower.predict_all(slower.start(), truth))
+
+    def step(seen: object, current: Fit, names: Sequence[search.Found], weight: Array, *_: object) -> search._Step:
+        count = len(names) + 1
+        name = search.Found(Score(truth[count - 1][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1e3)
+        return search._Step(hidden, fit(hidden, weight, truth[:count], current.x[: hidden.nuisances]), name, short=count < 3 or last_is_short)
+
+    monkeypatch.setattr(search, "_step", step)
+    monkeypatch.setattr(search, "_round", lambda problem, *_: propose.Proposal(problem, fit(problem, weight(problem)), (), []))
+    named = [item.score.candidate.effect.id for item in searched(hidden).found]
+    assert named == ([] if last_is_short else [candidate.effect.id for candidate, _ in truth])
 
 
 def test_the_shape_of_a_law_gets_no_name_of_its_own(slower: Problem) -> None:
@@ -407,29 +427,39 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
     assert all(item.in_place for item in found.found)
 
 
-@pytest.mark.parametrize(("uneven", "doubt_of_freedoms"), [(0.02, 1.0), (0.9, 1.0), (0.02, 0.8)])
-def test_names_stand_for_freedoms_beside_which_they_are_short(slower: Problem, uneven: float, doubt_of_freedoms: float) -> None:
+@pytest.mark.parametrize(
+    ("alone", "stretches", "uneven", "doubt_of_freedoms", "stand"),
+    [
+        (False, 16, 0.02, 1.0, True), (False, 16, 0.9, 1.0, False), (False, 16, 0.02, 0.8, False),
+        (True, 16, 0.02, 1.0, False), (True, 64, 0.02, 1.0, True),
+    ],
+)  # fmt: skip
+def test_names_stand_for_freedoms_beside_which_they_are_short(
+    slower: Problem, alone: bool, stretches: int, uneven: float, doubt_of_freedoms: float, stand: bool
+) -> None:
     """Beside one that stands: freedoms may do what two do in each stretch of time by itself, nearly of one law in all or by far not; and
-    not where they leave less in doubt than the two."""
-    stands, others = effect("slope_bias", torque=400.0), [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
-    base = slower.predict_all(slower.start(), [stands])
-    both = slower.predict_all(slower.start(), [stands, *others]) - base
-    stretch = np.arange(both.size) * 16 // both.size
-    pieces = np.where(stretch[:, None] == np.arange(16), both[:, None], 0.0)
-    torque = base + pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))
+    not where they leave less in doubt than the two. Alone only where all those freedoms are worth what a name must take."""
+    stands = [] if alone else [effect("slope_bias", torque=400.0)]
+    others = [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
+    base = slower.predict_all(slower.start(), stands)
+    both = slower.predict_all(slower.start(), [*stands, *others]) - base
+    stretch = np.arange(both.size) * stretches // both.size
+    pieces = np.where(stretch[:, None] == np.arange(stretches), both[:, None], 0.0)
+    torque = base + pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], stretches))
     hidden = replace_bends(with_torque(slower, torque), 3.0 * pieces)
     hidden = hidden.doubted(doubt_of_freedoms, hidden.typical)
     roles = split.split(hidden)
     fitted = np.where(roles.fit, weight(hidden), 0.0)
     draws = SIGMA * np.random.default_rng(4).standard_normal((16, hidden.measured.size))
     seen = noise.Noise(np.full(hidden.measured.size, SIGMA), draws, 0.0)
-    name = search.Found(Score(stands[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1000.0)
-    sure = [name], hidden, fit(hidden, fitted, [stands])
+    names = [search.Found(Score(one[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1000.0) for one in stands]
+    sure = names, hidden, fit(hidden, fitted, stands)
     found = search._in_place(hidden, seen, fitted, roles, sure, lambda _: None)
-    assert (found is None) == (uneven > 0.5 or doubt_of_freedoms < 1.0)
+    assert (found is not None) == stand
     if found is not None:
-        assert {candidate.effect.id for candidate, _ in found[2][2].effects} == {"slope_bias", "line_loss_quadratic", "kingpin_jacking"}
-        assert [item.in_place for item in found[2][0]] == [False, True, True]
+        both_beside = {candidate.effect.id for candidate, _ in [*stands, *others]}
+        assert {candidate.effect.id for candidate, _ in found[2][2].effects} == both_beside
+        assert [item.in_place for item in found[2][0]] == [*[False] * len(stands), True, True]
         assert found[0].typical < hidden.typical
 
 

@@ -100,7 +100,7 @@ def search(
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
         step = _step(seen, current, found[given:], weight, split, progress)
-        if step is None or (step.short and (waiting or len(found) + 1 == given + MAX_EFFECTS)):
+        if step is None or (step.short and len(found) + 1 == given + MAX_EFFECTS):
             break
         there, both = step.problem, [*found, step.name]
         if step.instead is not None:
@@ -115,7 +115,7 @@ def search(
         waiting = step.short  # what another one keeps in doubt may stand beside that one
         if not waiting:
             sure = found, now, current
-    if len(sure[0]) > given and (instead := _in_place(problem, noise, weight, split, sure, progress)) is not None:
+    if (instead := _in_place(problem, noise, weight, split, sure, progress)) is not None:
         problem, baseline, sure = instead
     found, now, current = sure
     if found and is_rig(problem.vehicle):
@@ -296,32 +296,37 @@ def _in_place(
     problem: Problem, noise: Noise, weight: Array, split: Split, sure: tuple[list[Found], Problem, Fit],
     progress: Callable[[str], None],
 ) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
-    """Further names beside those of a vehicle that stand for ``sure``, where all together without freedoms are clearly more evident than
-    the former with them and leave no more in doubt, as they would of friction of another form, and each is needed: with problem and
-    baseline without freedoms. ``problem``: without bends of names.
+    """Names beside those of a vehicle that stand for ``sure``, or together where none does, where all without freedoms are clearly more
+    evident than the former with them, by as much as a name must take where none stands, and leave no more in doubt, as they would of
+    friction of another form, and each is needed: with problem and baseline without freedoms. ``problem``: without bends of names.
     """
     found, there, free = sure
     exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
     if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
-    current, clearly_less = _settled_in(exact, weight, free.effects, free.x), left(there, free) - TIE * there.doubt
-    stands = may_differ(there, free, len(free.effects), [item.gain for item in found if not item.given])
-    while left(exact, current) > clearly_less:
-        own = _round(exact, noise, weight, current, True, progress) if len(found) < MAX_EFFECTS else None
-        if own is None or not own.trials:
-            return None
+    given, stands = sum(item.given for item in found), may_differ(there, free, len(free.effects), [i.gain for i in found if not i.given])
+    most_left = left(there, free) - (TIE * there.doubt if len(found) > given else needed(there, free, weight))
+    now, current, best = exact, _settled_in(exact, weight, free.effects, free.x), None
+    while len(found) < given + MAX_EFFECTS:
+        own = _round(now, noise, weight, current, True, progress)
+        if not own.trials or own.before - own.trials[0].cost < HOPELESS * needed(now, own.best, weight, stands):
+            break
         _, current, name = _simplest(own, weight, split)
-        if name.gain < needed(exact, current, weight, stands):
-            return None
+        if name.gain < needed(now, current, weight, stands):
+            break
         found = [*found, name]
-    if len(found) == len(sure[0]) or doubt(exact, current, weight) > (1.0 + ALIKE) * there.doubt:
+        now, x = _shaped(exact, now, current, range(given, len(found)))
+        current = fit(now, weight, current.effects, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
+        if left(now, current) < most_left and doubt(now, current, weight) < (1.0 + ALIKE) * there.doubt:
+            best = found, now, current
+    if best is None:
         return None
-    least = needed(exact, current, weight, stands)
-    for index in range(len(found)):
-        rest = [own for i, own in enumerate(current.effects) if i != index]
-        if _settled_in(exact, weight, rest, current.x).cost - current.cost < least:
+    found, now, current = best
+    least = needed(now, current, weight, stands)
+    for index in range(len(sure[0]), len(found)):
+        if _spared(exact, now, weight, current, range(given, len(found)), index)[1].cost - current.cost < least:
             return None
-    return exact, _settled_in(exact, weight, (), free.x), (found, exact, current)
+    return exact, _settled_in(exact, weight, (), free.x), best
 
 
 def _settled_in(problem: Problem, weight: Array, effects: Effects, x: Array) -> Fit:
