@@ -130,10 +130,11 @@ def test_three_of_which_each_keeps_the_others_in_doubt_stand_together(
     truth = [effect("line_loss_quadratic", c=3e4), effect("kingpin_jacking", amplitude=400.0), effect("slope_bias", torque=200.0)]
     hidden = with_torque(slower, slower.predict_all(slower.start(), truth))
 
-    def step(seen: object, current: Fit, names: Sequence[search.Found], weight: Array, *_: object) -> search._Step:
+    def step(_: object, current: Fit, names: Sequence[search.Found], weight: Array, *__: object) -> search._Step:
         count = len(names) + 1
         name = search.Found(Score(truth[count - 1][0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1e3)
-        return search._Step(hidden, fit(hidden, weight, truth[:count], current.x[: hidden.nuisances]), name, short=count < 3 or last_is_short)
+        result = fit(hidden, weight, truth[:count], current.x[: hidden.nuisances])
+        return search._Step(hidden, result, name, short=count < 3 or last_is_short)
 
     monkeypatch.setattr(search, "_step", step)
     monkeypatch.setattr(search, "_round", lambda problem, *_: propose.Proposal(problem, fit(problem, weight(problem)), (), []))
