@@ -4,7 +4,7 @@
 
 An offset shifts the whole torque, so what is left of a recalibrated baseline goes with the torque's slope, dM/dt. It is believed
 where it is larger than what the rest of the residual makes of it by chance (scores summed over blocks; Liang and Zeger 1986)
-and where a slow sensor does not explain it better. Larger ones are left to the check of wiring and to the catalogue.
+and where a slow sensor, play or a spring does not explain it better. Larger ones are left to the check of wiring and to the catalogue.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ APART_S = 0.015
 where the law is the recording's own."""
 ROUNDS = 6
 SLOWER = 0.6
-"""Share of the cost with an offset below which a slow sensor explains it better."""
+"""Share of the cost with an offset below which a slow sensor, or what else makes torque late, explains it better."""
+LIKE_LATENESS = {"lag", "wind_up"}
+"""Laws of what makes the torque late and is no clock."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def synchronised(
         baseline = _baseline(problem, effects, baseline)
     if _alike(late, deviation) and not any(received):
         return known(as_stamped, deviation, SHORTEST_S)  # clocks that agree so well have not wandered
-    if not late.any() or _slow_sensor(as_stamped.problem, start, baseline, late):
+    if not late.any() or _no_clock(as_stamped.problem, start, baseline, late):
         return known(as_stamped, deviation)
     return known(Synchronised(problem, late, {
         recording.name: clock_finding(vehicle, float(shift), float(spread))
@@ -169,17 +171,22 @@ def clock_offsets(problem: Problem, baseline: Fit) -> list[Offset]:
     return offsets
 
 
-def _slow_sensor(original: Problem, start: Fit, shifted: Fit, late: Array) -> bool:
-    """Whether the lag of a slow sensor explains the recordings as stamped better than offsets of the clock do."""
-    if late.mean() <= 0.0:
-        return False
-    slow_sensor = next(effect for effect in CATALOGUE.values() if "lag" in effect.hooks)
-    (tau,) = slow_sensor.parameters
-    lag = Candidate(slow_sensor, free=(tau.name,)), {tau.name: float(late.mean())}
+def _no_clock(original: Problem, start: Fit, shifted: Fit, late: Array) -> bool:
+    """Whether a slow sensor, or play or springs before the contact, which give late too, explain the recordings as stamped better than
+    offsets of the clock do."""
     weight = original.sensor_weight
-    slow = fit(original, weight, [*start.effects, lag], start.x, linearisations=10, robust=True, tolerance=1e-4)
     used = np.count_nonzero(weight)
-    return bool(slow.cost - used < SLOWER * (shifted.cost - used) and slow.cost < shifted.cost)
+    for effect in (effect for effect in CATALOGUE.values() if effect.hooks.keys() & LIKE_LATENESS):
+        values = {p.name: 0.0 if p.optional else p.scale for p in effect.parameters}
+        if slows(effect):
+            if late.mean() <= 0.0:
+                continue
+            values = dict.fromkeys(values, float(late.mean()))
+        one = Candidate(effect, free=tuple(values)), values
+        fitted = fit(original, weight, [*start.effects, one], start.x, linearisations=10, robust=True, tolerance=1e-4)
+        if fitted.cost - used < SLOWER * (shifted.cost - used) and fitted.cost < shifted.cost:
+            return True
+    return False
 
 
 def earlier(recording: Recording, shift: float) -> Recording:

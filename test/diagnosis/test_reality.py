@@ -132,6 +132,14 @@ def test_a_delay_that_every_recording_shows_is_left_for_its_name() -> None:
     np.testing.assert_array_equal(problem.measured, Problem(VEHICLE, [prepare(r, VEHICLE) for r in shifted(0.02, 0.02)]).measured)
 
 
+@pytest.mark.parametrize(("name", "value"), [("linkage_compliance", {"compliance": 5e-7}), ("backlash", {"width": 0.003})])
+def test_what_makes_the_torque_late_is_no_clock(name: str, value: dict[str, float]) -> None:
+    """A spring or play before the contact: the torque comes late after each reversal, more so in one drive than in another."""
+    told = synchronised(record(VEHICLE.replace(effects=(EffectEntry(name, value),)), QUICK, 5), VEHICLE)
+    np.testing.assert_array_equal(told.late, 0.0)
+    assert told.findings == {}
+
+
 def test_clocks_are_known_as_well_as_they_were_measured() -> None:
     """Sound ones to a millisecond, as they wander, better where all recordings agree; not at all where a lag that is known hides them."""
 

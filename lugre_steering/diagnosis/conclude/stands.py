@@ -95,7 +95,7 @@ class Stands:
 def standing(done: Finished, seed: int, progress: Callable[[str], None]) -> tuple[Finished, Stands]:
     """What stands, and the search as it was judged: where only held-out data tell that a name began late, with that name timed by all."""
     tested = _tested(done, seed)
-    if not tested.named and done.found.found and (late := begun_late(done)) is not done:
+    if not tested.named and done.found.found and (late := timed_by_all(begun_late(done))) is not done:
         done, tested = late, _tested(late, seed)
     if not tested.named and done.of_every_joint is not done:
         done, tested = done.of_every_joint, _tested(done.of_every_joint, seed)
