@@ -176,7 +176,7 @@ def _misplaced(done: Finished) -> WrongSheet | None:
 def _wrong_entry(done: Finished) -> WrongSheet | None:
     """An entry of the sheet that explains what recalibration leaves, better than names and the form of the friction law."""
     left = excess(done.problem, done.found.baseline, done.fitted)
-    if not left > WORTH_A_SHEET:
+    if not left > WORTH_A_SHEET or not (done.found.found or done.needs_form):  # nothing is left that any entry had to explain
         return None
     form = done.beside_form
     rival = 1.0 if form is None else max(excess(form.problem, form.found.baseline, form.fitted), 0.0) / left

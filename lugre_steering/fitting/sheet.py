@@ -350,7 +350,7 @@ def _levels(problem: Problem, baseline: Fit, least: float = 0.0, claimed: float 
     def tried(key: str, values: Sequence[SheetValue], starts: Sequence[float], factor: Callable[[float], float] | None) -> _Tried:
         freed = [value.name for value in values]
         trial = problem.of_sheet(calibrations=[*values, *(c for c in known if c.name not in freed)])
-        begun = (np.concatenate([[start], trial.start()[1:]]) for start in starts)
+        begun = [_begun(problem, baseline, trial), *(np.concatenate([[start], trial.start()[1:]]) for start in starts)]
         result = min((_fitted(trial, start=x) for x in begun), key=lambda each: each.cost)
         return _tried(problem, trial, result, key, None if factor is None else factor(float(result.x[0])), freed)
 
@@ -375,9 +375,7 @@ def _reach(problem: Problem, baseline: Fit, values: Sequence[SheetValue]) -> flo
     range, in any combination, whatever is recalibrated. A run of the chain each, where a fit takes hundreds."""
     weight, others = problem.sensor_weight, [c for c in problem.calibrations if c.name not in {value.name for value in values}]
     freed = problem.of_sheet(calibrations=[*values, *others])
-    at = dict(zip((c.name for c in problem.calibrations), baseline.x, strict=False))
-    begin = np.concatenate([[at.get(c.name, 0.0) for c in freed.calibrations], baseline.x[len(problem.calibrations) :]])
-    moved = []
+    begin, moved = _begun(problem, baseline, freed), []
     for i, value in enumerate(values):
         for number in np.linspace(value.low, value.high, POINTS):
             x = begin.copy()
@@ -387,6 +385,12 @@ def _reach(problem: Problem, baseline: Fit, values: Sequence[SheetValue]) -> flo
     explained = every @ np.linalg.lstsq(every, left, rcond=1e-9)[0]
     beyond = float(left @ left) - float(np.count_nonzero(weight))
     return float(explained @ explained) / max(beyond, 1e-30)
+
+
+def _begun(problem: Problem, baseline: Fit, trial: Problem) -> Array:
+    """Where the baseline stands in a problem with other calibrations."""
+    at = dict(zip((c.name for c in problem.calibrations), baseline.x, strict=False))
+    return np.concatenate([[at.get(c.name, 0.0) for c in trial.calibrations], baseline.x[len(problem.calibrations) :]])
 
 
 def _geometries(problem: Problem, baseline: Fit, least: float = 0.0) -> Iterator[_Tried]:

@@ -297,7 +297,7 @@ def _in_place(
     progress: Callable[[str], None],
 ) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
     """Names beside those of a vehicle that stand for ``sure``, or together where none does, where all without freedoms are clearly more
-    evident than the former with them, by as much as a name must take where none stands, and leave no more in doubt, as they would of
+    evident than the former with them, by SURE for each name where none stands, and leave no more in doubt, as they would of
     friction of another form, and each is needed: with problem and baseline without freedoms. ``problem``: without bends of names.
     """
     found, there, free = sure
@@ -305,7 +305,6 @@ def _in_place(
     if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
     given, stands = sum(item.given for item in found), may_differ(there, free, len(free.effects), [i.gain for i in found if not i.given])
-    most_left = left(there, free) - (TIE * there.doubt if len(found) > given else needed(there, free, weight))
     now, current, best = exact, _settled_in(exact, weight, free.effects, free.x), None
     while len(found) < given + MAX_EFFECTS:
         own = _round(now, noise, weight, current, True, progress)
@@ -317,7 +316,8 @@ def _in_place(
         found = [*found, name]
         now, x = _shaped(exact, now, current, range(given, len(found)))
         current = fit(now, weight, current.effects, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
-        if left(now, current) < most_left and doubt(now, current, weight) < (1.0 + ALIKE) * there.doubt:
+        clearly = TIE if len(sure[0]) > given else SURE * (len(found) - given)
+        if left(now, current) < left(there, free) - clearly * there.doubt and doubt(now, current, weight) < (1.0 + ALIKE) * there.doubt:
             best = found, now, current
     if best is None:
         return None
