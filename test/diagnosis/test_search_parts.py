@@ -454,7 +454,7 @@ def test_names_stand_for_freedoms_beside_which_they_are_short(
     slower: Problem, alone: bool, stretches: int, uneven: float, doubt_of_freedoms: float, stand: bool
 ) -> None:
     """Beside one that stands: freedoms may do what two do in each stretch of time by itself, nearly of one law in all or by far not; and
-    not where they leave less in doubt than the two. Alone only where those freedoms are so many that doing without is evidence for two names."""
+    not where they leave less in doubt than the two. Alone only where doing without so many freedoms is evidence for two names."""
     stands = [] if alone else [effect("slope_bias", torque=400.0)]
     others = [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
     base = slower.predict_all(slower.start(), stands)
