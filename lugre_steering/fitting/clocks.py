@@ -40,7 +40,7 @@ APART_S = 0.015
 """How far torque and angles may still be apart once their clocks are set, as that is done beside a friction law of another form; nothing
 where the law is the recording's own."""
 ROUNDS = 6
-SLOWER = 0.6
+NO_CLOCK = 0.6
 """Share of the cost with an offset below which a slow sensor, or what else makes torque late, explains it better."""
 LIKE_LATENESS = {"lag", "wind_up"}
 """Laws of what makes the torque late and is no clock."""
@@ -184,7 +184,7 @@ def _no_clock(original: Problem, start: Fit, shifted: Fit, late: Array) -> bool:
             values = dict.fromkeys(values, float(late.mean()))
         one = Candidate(effect, free=tuple(values)), values
         fitted = fit(original, weight, [*start.effects, one], start.x, linearisations=10, robust=True, tolerance=1e-4)
-        if fitted.cost - used < SLOWER * (shifted.cost - used) and fitted.cost < shifted.cost:
+        if fitted.cost - used < NO_CLOCK * (shifted.cost - used) and fitted.cost < shifted.cost:
             return True
     return False
 

@@ -444,21 +444,21 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
 
 
 @pytest.mark.parametrize(
-    ("alone", "stretches", "uneven", "doubt_of_freedoms", "stand"),
+    ("beside", "stretches", "uneven", "doubt_of_freedoms", "stand"),
     [
-        (False, 16, 0.02, 1.0, True), (False, 16, 0.9, 1.0, False), (False, 16, 0.02, 0.8, False),
-        (True, 4, 0.02, 1.0, False), (True, 16, 0.02, 1.0, True),
+        ("true", 16, 0.02, 1.0, True), ("true", 16, 0.9, 1.0, False), ("true", 16, 0.02, 0.8, False), ("in vain", 16, 0.02, 1.0, False),
+        ("", 4, 0.02, 1.0, False), ("", 16, 0.02, 1.0, True),
     ],
 )  # fmt: skip
 def test_names_stand_for_freedoms_beside_which_they_are_short(
-    slower: Problem, alone: bool, stretches: int, uneven: float, doubt_of_freedoms: float, stand: bool
+    slower: Problem, beside: str, stretches: int, uneven: float, doubt_of_freedoms: float, stand: bool
 ) -> None:
-    """Beside one that stands: freedoms may do what two do in each stretch of time by itself, nearly of one law in all or by far not; and
-    not where they leave less in doubt than the two. Alone only where doing without so many freedoms is evidence for two names."""
-    stands = [] if alone else [effect("slope_bias", torque=400.0)]
+    """Freedoms may do what two do in each stretch of time by itself, nearly of one law in all or by far not; the two do not stand where
+    those leave less in doubt, nor beside a name that does nothing, nor alone where not so many freedoms are evidence for two names."""
+    stands = [effect("slope_bias", torque=400.0)] if beside else []
     others = [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
-    base = slower.predict_all(slower.start(), stands)
-    both = slower.predict_all(slower.start(), [*stands, *others]) - base
+    base = slower.predict_all(slower.start(), stands if beside == "true" else [])
+    both = slower.predict_all(slower.start(), others) - slower.predict_all(slower.start())
     stretch = np.arange(both.size) * stretches // both.size
     pieces = np.where(stretch[:, None] == np.arange(stretches), both[:, None], 0.0)
     torque = base + pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], stretches))

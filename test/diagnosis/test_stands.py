@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
-from lugre_steering.diagnosis import verify
+from lugre_steering.diagnosis import engine, verify
 from lugre_steering.diagnosis.conclude.formed import Formed
 from lugre_steering.diagnosis.conclude.stands import _acting, _clock, _missed_by, _of_one_vehicle, _tested
 from lugre_steering.diagnosis.fewer import fewer
@@ -78,6 +78,24 @@ def test_a_name_must_do_as_much_on_all_samples_as_where_names_are_compared_on_me
     done = Finished(NOTHING, noise, roles, found, beside_form=Finished(means, less, there, found))
     judged = verify.judged_once(NOTHING, baseline, inside, roles, 1)
     assert _acting(done, Formed(NOTHING, inside, inside, (), judged, judged)) == [0] * acts
+
+
+@pytest.mark.parametrize(("named", "left_sigmas", "sought"), [(False, 1.35, False), (True, 1.35, True), (False, 2.0, True)])
+def test_no_entry_is_sought_where_nothing_but_noise_is_left(
+    named: bool, left_sigmas: float, sought: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More is left than noise, as much as an entry would be worth, but not loud, and no name stands."""
+    random = np.random.default_rng(5)
+    roles, draws = split(NOTHING), SIGMA * random.standard_normal((16, NOTHING.valid.size))
+    left = NOTHING.predict_all(NOTHING.start()) + left_sigmas * SIGMA * random.standard_normal(NOTHING.valid.size)
+    problem, fitted = with_torque(NOTHING, left), np.where(roles.fit, weight(NOTHING), 0.0)
+    baseline = fit(problem, fitted)
+    names = (Found(Score(SLOPE[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.zeros(1)), (), (), 100.0),) if named else ()
+    done = Finished(problem, Noise(np.full(NOTHING.valid.size, SIGMA), draws, 0.0), roles, Search(baseline, baseline, names, (), ()))
+    asked = list[Problem]()
+    monkeypatch.setattr(engine, "wrong_entry", lambda problem, *_: asked.append(problem))
+    assert engine._wrong_entry(done) is None
+    assert bool(asked) == sought
 
 
 @pytest.mark.parametrize(("received", "late_s", "apart"), [(True, 0.02, True), (False, 0.02, False), (True, 0.2, False)])

@@ -304,9 +304,9 @@ def _in_place(
     exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
     if there.typical <= exact.typical or not problem.bends.shape[1]:
         return None
-    given, stands = sum(item.given for item in found), may_differ(there, free, len(free.effects), [i.gain for i in found if not i.given])
+    stands = may_differ(there, free, len(free.effects), [item.gain for item in found])
     now, current, best = exact, _settled_in(exact, weight, free.effects, free.x), None
-    while len(found) < given + MAX_EFFECTS:
+    while len(found) < MAX_EFFECTS:
         own = _round(now, noise, weight, current, True, progress)
         if not own.trials or own.before - own.trials[0].cost < HOPELESS * needed(now, own.best, weight, stands):
             break
@@ -314,17 +314,17 @@ def _in_place(
         if name.gain < needed(now, current, weight, stands):
             break
         found = [*found, name]
-        now, x = _shaped(exact, now, current, range(given, len(found)))
+        now, x = _shaped(exact, now, current, range(len(found)))
         current = fit(now, weight, current.effects, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
-        clearly = TIE if len(sure[0]) > given else SURE * (len(found) - given)
+        clearly = TIE if sure[0] else SURE * len(found)
         if left(now, current) < left(there, free) - clearly * there.doubt and doubt(now, current, weight) < (1.0 + ALIKE) * there.doubt:
             best = found, now, current
     if best is None:
         return None
     found, now, current = best
     least = needed(now, current, weight, stands)
-    for index in range(len(sure[0]), len(found)):
-        if _spared(exact, now, weight, current, range(given, len(found)), index)[1].cost - current.cost < least:
+    for index in range(len(found)):
+        if _spared(exact, now, weight, current, range(len(found)), index)[1].cost - current.cost < least:
             return None
     return exact, _settled_in(exact, weight, (), free.x), best
 
