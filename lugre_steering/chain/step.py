@@ -144,7 +144,7 @@ def torque_in_phases(
     """Like ``torque_side``, with other parameters from given times [s] on, in ascending order; the state is carried over.
 
     Motions of several tracks (tracks, n) give the sum of their torques. The memory of an effect begins when the effect does; the
-    air takes its new temperature at once.
+    air takes its new temperature at once. An angle that is read otherwise from then on turns no contact.
     """
     acting = [has_effects(p) for _, p in phases]
     if not any(acting):
@@ -161,6 +161,12 @@ def torque_in_phases(
             continue
         if first > 0:
             states["air_temperature"] += p["air_temperature"] - before["air_temperature"]
+            read, just = states.copy(), slice(first - 1, first)
+            motion = (np.ascontiguousarray(values[..., just]) for values in (time, theta, omega, alpha))
+            _torques(p, read, rubber, scratch, *motion, np.empty((len(theta), 1)), 0, 1, effects)
+            otherwise = read["theta"] - states["theta"]
+            states["theta"] += otherwise
+            states["contact_angle"] += otherwise
         before = p
         _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects)
     return np.asarray(np.add.reduce(torques))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array
 
@@ -52,6 +53,13 @@ def with_sensors(problem: Problem) -> Problem:
     for k, (part, row) in enumerate(own):
         columns[part, k] = row
     return problem.bent([columns])
+
+
+def fitted_with_sensors(problem: Problem, weight: Array, current: Fit) -> tuple[Problem, Fit]:
+    """The problem with all these as bends, and the fit there of what a fit has."""
+    there = with_sensors(problem)
+    x = np.append(current.x, np.zeros(there.nuisances - current.x.size))
+    return there, fit(there, weight, current.effects, x, linearisations=6)
 
 
 def beside_sensors(problem: Problem, residual: Array, weight: Array, weighted: Array) -> Array:

@@ -77,3 +77,15 @@ def test_a_phase_without_samples_hides_nothing_from_the_next() -> None:
     found = torque_in_phases([(-np.inf, before), (START_S - 0.004, drifting), (START_S - 0.002, both)], rubber, *MOTION)
     apart = torque_in_phases([(-np.inf, before), (START_S - 0.002, drifting)], rubber, *MOTION)
     np.testing.assert_allclose(found - apart, np.where(LATER, 100.0, 0.0) / both["sides"], atol=1e-6)
+
+
+@pytest.mark.parametrize("wrong_s", [-1.0, 0.0, 1.0])
+def test_a_sensor_that_slips_while_it_turns_moves_no_contact(wrong_s: float) -> None:
+    """It slips within a second; told a second too early or too late, the torque is nearly that of the true angle all the same."""
+    slip = 0.005
+    before, after, rubber = late(angle_offset_offset=slip)
+    time, theta, omega, alpha = MOTION
+    truth, start_s = torque_side(before, rubber, *MOTION), float(time[np.argmax(np.abs(omega) * (time > START_S))])
+    seen = theta + slip * np.clip(time - start_s, 0.0, 1.0)
+    found = torque_in_phases([(-np.inf, before), (start_s + 0.5 + wrong_s, after)], rubber, time, seen, omega, alpha)
+    assert np.abs(found - truth).max() < 0.1 * slip * float(before["sigma_0"][0])

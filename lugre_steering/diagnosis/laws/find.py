@@ -149,9 +149,10 @@ def _with_places(problem: Problem, before: Fit) -> Problem:
     return Problem(problem.vehicle, problem.runs, problem.calibrations, more_laws=MOST_LAWS, beside_names=bool(before.effects))
 
 
-def with_freedoms(there: Finished, *, beside_names: bool) -> Problem:
-    """The problem on which names are compared, with places for laws; of the freedoms those of the friction law, not those of names."""
-    compared, of_names = there.problem, there.form.count("")
+def with_freedoms(there: Finished, *, beside_names: bool, bent: bool = False) -> Problem:
+    """The problem on which names are compared, with places for laws; of the freedoms those of the friction law, and those of names only
+    if they are ``bent``."""
+    compared, of_names = there.problem, 0 if bent else there.form.count("")
     columns = compared.bends[:, : compared.bends.shape[1] - of_names]
     problem = Problem(
         compared.vehicle, compared.runs, compared.calibrations, more_laws=MOST_LAWS, beside_names=beside_names, bends=columns

@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Effects, Problem
+from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.sheet import at_bounds
 from lugre_steering.recording import Array
 
@@ -42,15 +43,25 @@ def room_for_laws(done: Finished) -> bool:
 
 
 def evident(done: Finished, alone: FoundLaws) -> bool:
-    """Whether laws take as much as a name must, beside the same freedoms, and the first is no more of these: where what is left is not
-    loud, only that tells of them, and friction along what its own law depends on is of that form which is not known."""
+    """Whether laws take as much as a name must, beside the same freedoms, and the first is no more of these, nor all of them what sound
+    sensors may be: where what is left is not loud, only that tells of them, and friction along what its own law depends on is of that form
+    which is not known."""
     first = law_of(alone.fitted.effects[alone.names][0].effect).cell
     if first.channel in OPPOSING and first.axis in {Axis(freedom.coordinate) for freedom in done.compared.freedoms}:
         return False
     problem, weight, fitted = beside_form(done, alone)
     mine, base = _energies(done, [(problem, weight, fitted)])
     there, settled_in = settled(problem, weight, fitted)
-    return base - mine > needed(there, settled_in, weight, shapes=_values(fitted.effects[alone.names :]))
+    values = _values(fitted.effects[alone.names :])
+    clearly = base - mine > needed(there, settled_in, weight, shapes=values)
+    return clearly and not _of_sensors(there, weight, settled_in, alone.names, values)
+
+
+def _of_sensors(problem: Problem, weight: Array, laws: Fit, names: int, values: int) -> bool:
+    """Whether sound sensors do so much of what laws after so many ``names`` do that these take no more than chance and their values may."""
+    there, beside = fitted_with_sensors(problem, weight, laws)
+    without = fit(there, weight, beside.effects[:names], beside, linearisations=6)
+    return without.cost - beside.cost < (SURE + PER_VALUE * values) * problem.doubt
 
 
 def _stuck(problem: Problem, result: Fit) -> bool:
@@ -114,7 +125,7 @@ def in_place_of_one(done: Finished, alone: FoundLaws, seed: int) -> FoundLaws | 
     best, energy, form = None, np.inf, beside_form(done, alone)
     for index in range(len(alone.gains) if len(alone.gains) > 1 else 0):
         swapped = _swapped(done, alone, index, seed)
-        mine, laws, base = _energies(done, [beside_form(done, swapped), form])
+        mine, laws, base = _energies(done, [beside_form(done, swapped, bent=True), form])
         if mine < laws + MARGIN * (base - laws) and mine < energy and leaves_names(done, swapped):
             best, energy = swapped, mine
     return best
@@ -157,8 +168,9 @@ def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> l
     return energies
 
 
-def beside_form(done: Finished, laws: FoundLaws) -> tuple[Problem, Array, Fit]:
-    """Laws where names are compared, beside the freedoms of the friction law but those of the names: problem, weight and fit."""
-    problem = with_freedoms(done.compared, beside_names=laws.names > 0)
+def beside_form(done: Finished, laws: FoundLaws, *, bent: bool = False) -> tuple[Problem, Array, Fit]:
+    """Laws where names are compared, beside the freedoms of the friction law but those of the names, unless these are ``bent``: problem,
+    weight and fit."""
+    problem = with_freedoms(done.compared, beside_names=laws.names > 0, bent=bent)
     x = np.append(laws.fitted.x[: problem.first_bend], np.zeros(problem.bends.shape[1]))
     return problem, done.compared.fitted, fit(problem, done.compared.fitted, laws.fitted.effects, x)

@@ -41,7 +41,7 @@ from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
-from lugre_steering.fitting.sensors import with_sensors
+from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine
 from lugre_steering.recording import Array
@@ -130,7 +130,8 @@ def search(
         given = sum(item.given for item in found)
     while (index := _of_sensors(now, weight, current, found)) is not None:
         bare, without = _spared(problem, now, weight, current, range(given, len(found)), index)
-        now, current = settled(bare, weight, without)  # what it took in vain is in doubt again
+        beside = fitted_with_sensors(bare, weight, without)
+        now, current = settled(bare, weight, without, doubt(*beside, weight))  # what sensors do not do of it is in doubt again
         found = [item for i, item in enumerate(found) if i != index]
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
@@ -242,8 +243,7 @@ def _of_sensors(problem: Problem, weight: Array, current: Fit, found: Sequence[F
     names = [i for i, item in enumerate(found) if not item.given]
     if not names:
         return None
-    there = with_sensors(problem)
-    beside = fit(there, weight, current.effects, np.append(current.x, np.zeros(there.nuisances - current.x.size)), linearisations=6)
+    there, beside = fitted_with_sensors(problem, weight, current)
 
     def taken(index: int) -> float:
         rest = [effect for i, effect in enumerate(beside.effects) if i != index]
