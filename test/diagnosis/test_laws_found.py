@@ -197,6 +197,17 @@ def test_friction_along_what_its_own_law_depends_on_is_no_law_where_nothing_is_l
     assert evident(replace(named(problem, fitted(problem)), freedoms=(freedom,)), found) == stands
 
 
+@pytest.mark.parametrize(("range_bar", "stands"), [(10.0, True), (400.0, False)])
+def test_what_zeros_of_sensors_may_be_is_no_law(range_bar: float, stands: bool) -> None:
+    """A torque that fades within the first seconds, which a function of the power resembles."""
+    sheet = NOTHING.vehicle.replace(sensors=replace(NOTHING.vehicle.sensors, pressure_range_Pa=1e5 * range_bar))
+    fading = by_run(lambda run: 200.0 * np.exp(-(run.time - run.time[0]) / 12.0))
+    problem = Problem(sheet, with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + fading).runs)
+    found = in_what_is_left(problem, fitted(problem))
+    assert found is not None
+    assert evident(named(problem, fitted(problem)), found) == stands
+
+
 def test_of_laws_that_tie_the_one_that_can_happen_again_is_preferred() -> None:
     """Along the angle or along the way since the start, which no other recording repeats; unless the way explains clearly more."""
     room = Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1)

@@ -381,11 +381,12 @@ def test_a_name_that_only_takes_back_what_an_entry_claims_is_that_entry(lever: f
         assert found.suspects[0].factor == pytest.approx(1.0 / lever, abs=0.03)
 
 
-@pytest.mark.parametrize(("taken", "blamed"), [(0.95, True), (0.5, False)])
+@pytest.mark.parametrize(("taken", "rival", "blamed"), [(0.95, 1.0, True), (0.5, 1.0, False), (0.95, 0.01, False)])
 def test_an_entry_that_claims_too_much_takes_what_names_do_or_is_not_blamed(
-    taken: float, blamed: bool, monkeypatch: pytest.MonkeyPatch
+    taken: float, rival: float, blamed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where far more is left than either takes, as of friction of another form, next to the same is left by both."""
+    """Where far more is left than either takes, as of friction of another form, next to the same is left by both; nor where the freedoms of
+    that form leave far less: then both only make up for it."""
     arms, form = {"linear": 0.0, "quadratic": 0.1}, EffectEntry("payne_softening", {"angle": 0.02, "amplitude": 0.4})
     problem = synchronised(record(VEHICLE.replace(effects=(EffectEntry("moment_arm_error", arms), form)), QUICK, 5), VEHICLE).problem
     thin, _ = sheet.thinned(problem)
@@ -395,7 +396,7 @@ def test_an_entry_that_claims_too_much_takes_what_names_do_or_is_not_blamed(
     entry = sheet.Suspect("axle.kingpin_lever_arm_m", 0.0, 0.1, alone.cost - taken * (alone.cost - named.cost), claims_more=True)
     monkeypatch.setattr(sheet, "_levels", lambda *_: [sheet._Tried(entry, 0.0, False)])
     monkeypatch.setattr(sheet, "_geometries", lambda *_: [])
-    assert (sheet.wrong_entry(problem, name, rival=0.01) is not None) == blamed
+    assert (sheet.wrong_entry(problem, name, rival=rival) is not None) == blamed
 
 
 def test_arms_of_two_cylinders_exchanged_are_told_though_the_torque_is_nothing_like_the_model() -> None:

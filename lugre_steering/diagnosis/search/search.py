@@ -128,11 +128,7 @@ def search(
                 now, current = settled(now, weight, current)
         found, current = _of_sure_size(now, weight, split, current, found, given=True)
         given = sum(item.given for item in found)
-    while (index := _of_sensors(now, weight, current, found)) is not None:
-        bare, without = _spared(problem, now, weight, current, range(given, len(found)), index)
-        beside = fitted_with_sensors(bare, weight, without)
-        now, current = settled(bare, weight, without, doubt(*beside, weight))  # what sensors do not do of it is in doubt again
-        found = [item for i, item in enumerate(found) if i != index]
+    now, current, found = _without_those_of_sensors(problem, now, weight, current, found)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
         if item.rivals:
             bare, fitted = _without_own_bends(problem, now, weight, current, range(given, len(found)), i)
@@ -236,6 +232,21 @@ def _of_sure_size(
             return kept, current
         current = fit(problem, weight, effects, current.x)
     return kept, current
+
+
+def _without_those_of_sensors(
+    plain: Problem, problem: Problem, weight: Array, current: Fit, found: list[Found]
+) -> tuple[Problem, Fit, list[Found]]:
+    """Without names that sound sensors may be as well, with the problem of the fit; ``plain``: without bends of any name.
+
+    What sensors do not do of such a name is in doubt again; what they do leaves the others as sure as they were.
+    """
+    given = sum(item.given for item in found)
+    while (index := _of_sensors(problem, weight, current, found)) is not None:
+        bare, without = _spared(plain, problem, weight, current, range(given, len(found)), index)
+        problem, current = settled(bare, weight, without, doubt(*fitted_with_sensors(bare, weight, without), weight))
+        found = [item for i, item in enumerate(found) if i != index]
+    return problem, current, found
 
 
 def _of_sensors(problem: Problem, weight: Array, current: Fit, found: Sequence[Found]) -> int | None:
