@@ -162,8 +162,8 @@ def torque_in_phases(
         if first > 0:
             states["air_temperature"] += p["air_temperature"] - before["air_temperature"]
             read, just = states.copy(), slice(first - 1, first)
-            motion = (np.ascontiguousarray(values[..., just]) for values in (time, theta, omega, alpha))
-            _torques(p, read, rubber, scratch, *motion, np.empty((len(theta), 1)), 0, 1, effects)
+            time_s, *motion = (np.ascontiguousarray(values[..., just]) for values in (time, theta, omega, alpha))
+            _torques(p, read, rubber, scratch, time_s, motion[0], motion[1], motion[2], np.empty((len(theta), 1)), 0, 1, effects)
             otherwise = read["theta"] - states["theta"]
             states["theta"] += otherwise
             states["contact_angle"] += otherwise

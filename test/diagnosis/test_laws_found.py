@@ -316,6 +316,18 @@ def test_names_win_a_draw_unless_they_are_more_and_have_more_values(count: int, 
     assert in_place(done, found, None) == stands
 
 
+@pytest.mark.parametrize("bent", [False, True])
+def test_what_a_name_may_bend_by_is_free_beside_laws_only_where_it_is_asked(bent: bool) -> None:
+    """Laws alone have no names that could bend; a name in the place of one of them may, as where it was found."""
+    problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * (run.theta > 0.1), axis=0)))
+    assert found is not None
+    wave = 50.0 * SIGMA * np.sin(np.arange(problem.measured.size) / 300.0)
+    waving = with_torque(problem, problem.measured + wave).bent([wave[:, None]])
+    done = replace(named(waving, fitted(waving)), form=("",))
+    _, _, result = beside_form(done, found, bent=bent)
+    assert (result.cost < 10.0 * np.count_nonzero(done.fitted)) == bent
+
+
 def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     """Viscous friction, and a torque that remembers the rate: a law alone would have to be both."""
 
