@@ -167,23 +167,27 @@ def _cornered(problem: Problem, current: Fit) -> bool:
 
 def retime(problem: Problem, weight: Array, trial: Trial) -> Trial:
     """A late effect from the instants that fit best, one per bag, with its values fitted anew."""
-    return _begun(problem, weight, trial, onset.timed(problem, weight, trial.fit, len(trial.fit.effects) - 1))
+    again = _begun(problem, weight, trial, onset.timed(problem, weight, trial.fit, len(trial.fit.effects) - 1))
+    return again if again.cost < trial.cost else trial
 
 
-def begun_with(problem: Problem, weight: Array, trial: Trial, other: Trial) -> Trial:
-    """A late effect from the instants of another one, where it explains more from these: timing sees only what is near its own."""
-    since = other.candidate.since
-    if not trial.candidate.since or not since or trial.candidate.since == since:
+def begun_with(problem: Problem, weight: Array, trial: Trial, other: Trial, before: float) -> Trial:
+    """An effect from the instants of a late one, where it explains more from these: timing sees only what is near its own. One that acts
+    always must explain clearly more of the cost ``before``."""
+    since, own = other.candidate.since, trial.candidate
+    if not since or own.since == since or own.bags is not None:
         return trial
-    return _begun(problem, weight, trial, since)
+    again = _begun(problem, weight, trial, since)
+    clearly = 0.0 if own.since else PARTIAL * (before - again.cost)
+    return again if again.cost < trial.cost - clearly else trial
 
 
 def _begun(problem: Problem, weight: Array, trial: Trial, since: tuple[float, ...]) -> Trial:
-    """A late effect from other instants, fitted anew, if it explains more from these."""
+    """A late effect from other instants, fitted anew."""
     *earlier, (candidate, values) = trial.fit.effects
     effects = [*earlier, (replace(candidate, since=since), values)]
     result = fit(problem, weight, effects, trial.fit, linearisations=8, tolerance=TRIAL_TOLERANCE)
-    return Trial(trial.score, result, result.cost) if result.cost < trial.cost else trial
+    return Trial(trial.score, result, result.cost)
 
 
 def rank(trial: Trial, before: float) -> float:

@@ -96,15 +96,25 @@ def test_a_late_effect_acts_from_its_start_and_is_timed(problem: Problem) -> Non
     assert tried.fit.effects[0][1]["torque"] == pytest.approx(400.0, rel=0.02)
 
 
-def test_a_late_rival_is_tried_from_the_instants_of_the_leader(problem: Problem) -> None:
+@pytest.mark.parametrize("acts_always", [False, True])
+def test_a_rival_is_tried_from_the_instants_of_the_leader(problem: Problem, acts_always: bool) -> None:
     candidate, values = effect("slope_bias", torque=400.0)
-    right, wrong = replace(candidate, since=(30.0, 41.0)), replace(candidate, since=(5.0, 60.0))
+    right, wrong = replace(candidate, since=(30.0, 41.0)), replace(candidate, since=() if acts_always else (5.0, 60.0))
     hidden = with_torque(problem, problem.predict_all(problem.start(), [(right, values)]))
-    score = Score(candidate, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+    score, before = Score(candidate, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), fit(hidden, weight(hidden)).cost
     fits = [fit(hidden, weight(hidden), [(own, values)]) for own in (right, wrong)]
     leader, rival = (trial.Trial(score, own, own.cost) for own in fits)
-    assert trial.begun_with(hidden, weight(hidden), rival, leader).candidate.since == right.since
-    assert trial.begun_with(hidden, weight(hidden), leader, rival) is leader
+    assert trial.begun_with(hidden, weight(hidden), rival, leader, before).candidate.since == right.since
+    assert trial.begun_with(hidden, weight(hidden), leader, rival, before) is leader
+
+
+def test_what_explains_as_much_always_is_not_told_to_begin_late(problem: Problem) -> None:
+    candidate, values = effect("slope_bias", torque=400.0)
+    hidden = with_torque(problem, problem.predict_all(problem.start(), [(candidate, values)]))
+    score, before = Score(candidate, 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), fit(hidden, weight(hidden)).cost
+    late = replace(candidate, since=(1.0, 1.0))
+    leader, always = (trial.Trial(score, own := fit(hidden, weight(hidden), [(each, values)]), own.cost) for each in (late, candidate))
+    assert trial.begun_with(hidden, weight(hidden), always, leader, before) is always
 
 
 def searched(hidden: Problem) -> search.Search:

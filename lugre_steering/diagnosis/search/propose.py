@@ -101,7 +101,11 @@ def closer(problem: Problem, weight: Array, seen: Sequence[Proposal]) -> Proposa
             best = min(best, trials[i].cost)
     if trials:
         leads = min(trials, key=lambda each: rank(each, current.cost))
-        trials = [begun_with(problem, weight, trial, leads) if trial.cost <= near else trial for trial in trials]
+        known = {*rivals(leads.candidate.effect)}
+        trials = [
+            begun_with(problem, weight, trial, leads, current.cost) if trial.cost <= near or trial.candidate.effect.id in known else trial
+            for trial in trials
+        ]
     return Proposal(problem, current, seen[0].scores, ranked(_one_of_each(trials, current.cost), current.cost))
 
 
