@@ -167,7 +167,8 @@ from lugre_steering.vehicle import EffectEntry, load
 from lugre_steering.vehicle.model import build_model
 
 registry.add_files([sys.argv[1]])
-model = build_model(load(r"{SHEET}"))
+vehicle = load(r"{SHEET}").replace(effects=(EffectEntry("own_spring", {{"stiffness": 0.0}}),))
+model = build_model(vehicle, lean=True)
 p, time = model.parameters[0].copy(), np.arange(50) * 0.01
 still = np.zeros(50), np.zeros(50)
 plain = torque_side(p, model.rubber, time, np.full(50, 0.1), *still)
