@@ -18,11 +18,15 @@ MEMORY_S, FORGOTTEN = 3.0, 0.05
 
 
 def doubt(problem: Problem, result: Fit, weight: Array) -> float:
-    """Energy, in noise variances, that counts as one independent error: their mean square times the samples that they last.
+    """Energy, in noise variances, that counts as one independent error of a fit."""
+    return doubt_of(problem, (problem.measured - result.prediction) * weight, weight)
+
+
+def doubt_of(problem: Problem, error: Array, weight: Array) -> float:
+    """The same of errors (n,) in noise standard deviations: their mean square times the samples that they last.
 
     How long they last is one time for all recordings, in steps of the slowest; a faster one has more samples in it.
     """
-    error = (problem.measured - result.prediction) * weight
     used = (weight > 0.0).astype(float)
     steps = [float(run.time[1] - run.time[0]) for run in problem.runs]
     slowest = max(steps)

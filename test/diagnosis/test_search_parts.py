@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
 
 from lugre_steering.diagnosis.conclude import effects, experiment, limits
@@ -455,17 +456,19 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
 
 
 @pytest.mark.parametrize(
-    ("beside", "stretches", "uneven", "doubt_of_freedoms", "stand"),
+    ("beside", "stretches", "uneven", "waves", "noise_waves", "stand"),
     [
-        ("true", 16, 0.02, 1.0, True), ("true", 16, 0.9, 1.0, False), ("true", 16, 0.02, 0.8, False), ("in vain", 16, 0.02, 1.0, False),
-        ("", 4, 0.02, 1.0, False), ("", 16, 0.02, 1.0, True),
+        ("true", 16, 0.02, 0.0, 0.0, True), ("true", 16, 0.9, 0.0, 0.0, False), ("true", 40, 0.02, 0.5, 0.0, False),
+        ("true", 40, 0.02, 0.5, 0.5, True), ("in vain", 16, 0.02, 0.0, 0.0, False), ("", 4, 0.02, 0.0, 0.0, False),
+        ("", 16, 0.02, 0.0, 0.0, True),
     ],
 )  # fmt: skip
 def test_names_stand_for_freedoms_beside_which_they_are_short(
-    slower: Problem, beside: str, stretches: int, uneven: float, doubt_of_freedoms: float, stand: bool
+    slower: Problem, beside: str, stretches: int, uneven: float, waves: float, noise_waves: float, stand: bool
 ) -> None:
     """Freedoms may do what two do in each stretch of time by itself, nearly of one law in all or by far not; the two do not stand where
-    those leave less in doubt, nor beside a name that does nothing, nor alone where not so many freedoms are evidence for two names."""
+    they leave slow waves, unless noise has such too, nor beside a name that does nothing, nor alone where not so many freedoms are
+    evidence for two names."""
     stands = [effect("slope_bias", torque=400.0)] if beside else []
     others = [effect("line_loss_quadratic", c=1e5), effect("kingpin_jacking", amplitude=900.0)]
     base = slower.predict_all(slower.start(), stands if beside == "true" else [])
@@ -473,11 +476,13 @@ def test_names_stand_for_freedoms_beside_which_they_are_short(
     stretch = np.arange(both.size) * stretches // both.size
     pieces = np.where(stretch[:, None] == np.arange(stretches), both[:, None], 0.0)
     torque = base + pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], stretches))
-    hidden = replace_bends(with_torque(slower, torque), 3.0 * pieces)
-    hidden = hidden.doubted(doubt_of_freedoms, hidden.typical)
+    slow = lfilter([0.3], [1.0, -0.95], np.random.default_rng(6).standard_normal((17, both.size)))
+    wave = SIGMA * slow[-1]
+    hidden = replace_bends(with_torque(slower, torque + waves * wave), 3.0 * np.column_stack([pieces, wave]))
+    hidden = hidden.doubted(1.0, hidden.typical)
     roles = split.split(hidden)
     fitted = np.where(roles.fit, weight(hidden), 0.0)
-    draws = SIGMA * np.random.default_rng(4).standard_normal((16, hidden.measured.size))
+    draws = SIGMA * np.random.default_rng(4).standard_normal((16, hidden.measured.size)) + noise_waves * SIGMA * slow[:16]
     seen = noise.Noise(np.full(hidden.measured.size, SIGMA), draws, 0.0)
     names = [search.Found(Score(one[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4)), (), (), 1000.0) for one in stands]
     sure = names, hidden, fit(hidden, fitted, stands)

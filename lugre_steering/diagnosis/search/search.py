@@ -36,7 +36,7 @@ from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviat
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
-from lugre_steering.fitting.doubt import doubt
+from lugre_steering.fitting.doubt import doubt, doubt_of
 from lugre_steering.fitting.fingerprint import Score, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
@@ -308,8 +308,9 @@ def _in_place(
     progress: Callable[[str], None],
 ) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
     """Names beside those of a vehicle that stand for ``sure``, or together where none does, where all without freedoms are clearly more
-    evident than the former with them, by SURE for each name where none stands, and leave no more in doubt, as they would of
-    friction of another form, and each is needed: with problem and baseline without freedoms. ``problem``: without bends of names.
+    evident than the former with them, by SURE for each name where none stands, and leave no more in doubt than the former or noise alone
+    does, as they would of friction of another form, and each is needed: with problem and baseline without freedoms.
+    ``problem``: without bends of names.
     """
     found, there, free = sure
     exact = problem.doubted(there.doubt, TYPICAL * SIZES[0])
@@ -317,6 +318,7 @@ def _in_place(
         return None
     stands = may_differ(there, free, len(free.effects), [item.gain for item in found])
     now, current, best = exact, _settled_in(exact, weight, free.effects, free.x), None
+    most = (1.0 + ALIKE) * max(there.doubt, float(np.median([doubt_of(exact, draw * weight, weight) for draw in noise.draws])))
     while len(found) < MAX_EFFECTS:
         own = _round(now, noise, weight, current, True, progress)
         if not own.trials or own.before - own.trials[0].cost < HOPELESS * needed(now, own.best, weight, stands):
@@ -328,7 +330,7 @@ def _in_place(
         now, x = _shaped(exact, now, current, range(len(found)))
         current = fit(now, weight, current.effects, x, linearisations=20, tolerance=TRIAL_TOLERANCE)
         clearly = TIE if sure[0] else SURE * len(found)
-        if left(now, current) < left(there, free) - clearly * there.doubt and doubt(now, current, weight) < (1.0 + ALIKE) * there.doubt:
+        if left(now, current) < left(there, free) - clearly * there.doubt and doubt(now, current, weight) < most:
             best = found, now, current
     if best is None:
         return None
