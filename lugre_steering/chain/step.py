@@ -138,6 +138,15 @@ def torque_side(p: Records, rubber: Array, time: Array, theta: Array, omega: Arr
     return torque_in_phases([(-np.inf, p)], rubber, time, theta, omega, alpha)
 
 
+def _read_otherwise(p: Records, states: Records, rubber: Array, scratch: Records, time: Array, *motion: Array) -> None:
+    """Turn the angles at which tracks stand to what parameters ``p`` read of the last sample, without turning any contact."""
+    read, (theta, omega, alpha) = states.copy(), motion
+    _torques(p, read, rubber, scratch, time, theta, omega, alpha, np.empty(theta.shape), 0, 1, True)
+    turned = read["theta"] - states["theta"]
+    states["theta"] += turned
+    states["contact_angle"] += turned
+
+
 def torque_in_phases(
     phases: Sequence[tuple[float, Records]], rubber: Array, time: Array, theta: Array, omega: Array, alpha: Array
 ) -> Array:
@@ -161,12 +170,9 @@ def torque_in_phases(
             continue
         if first > 0:
             states["air_temperature"] += p["air_temperature"] - before["air_temperature"]
-            read, just = states.copy(), slice(first - 1, first)
-            time_s, *motion = (np.ascontiguousarray(values[..., just]) for values in (time, theta, omega, alpha))
-            _torques(p, read, rubber, scratch, time_s, motion[0], motion[1], motion[2], np.empty((len(theta), 1)), 0, 1, effects)
-            otherwise = read["theta"] - states["theta"]
-            states["theta"] += otherwise
-            states["contact_angle"] += otherwise
+            if effects:
+                motion = (np.ascontiguousarray(values[..., first - 1 : first]) for values in (time, theta, omega, alpha))
+                _read_otherwise(p, states, rubber, scratch, *motion)
         before = p
         _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects)
     return np.asarray(np.add.reduce(torques))

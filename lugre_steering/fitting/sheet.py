@@ -251,10 +251,10 @@ def wrong_entry(problem: Problem, effects: Sequence[tuple[Candidate, Values]] = 
     left = found[0].cost - floor
     # What is missing adds to a sheet; names that only take away what an entry of it claims are that entry's error.
     least_taken = BETTER * (excess - beside_names)
-    rest = min(beside_names, rival * excess) + clearly  # far more than a rival leaves is no matter of names or this sheet
+    may_leave = min(beside_names, rival * excess) + clearly  # far more than a rival leaves is no matter of names or this sheet
     claims = [
         suspect for suspect in found
-        if effects and suspect.claims_more and suspect.cost - floor < rest and baseline.cost - suspect.cost > least_taken
+        if effects and suspect.claims_more and suspect.cost - floor < may_leave and baseline.cost - suspect.cost > least_taken
     ]  # fmt: skip
     if claims:
         found = [*claims, *(suspect for suspect in found if suspect not in claims)]

@@ -54,10 +54,10 @@ def evident(done: Finished, alone: FoundLaws) -> bool:
     there, settled_in = settled(problem, weight, fitted)
     values = _values(fitted.effects[alone.names :])
     clearly = base - mine > needed(there, settled_in, weight, shapes=values)
-    return clearly and not _of_sensors(there, weight, settled_in, alone.names, values)
+    return clearly and not _sensors_do_as_well(there, weight, settled_in, alone.names, values)
 
 
-def _of_sensors(problem: Problem, weight: Array, laws: Fit, names: int, values: int) -> bool:
+def _sensors_do_as_well(problem: Problem, weight: Array, laws: Fit, names: int, values: int) -> bool:
     """Whether sound sensors do so much of what laws after so many ``names`` do that these take no more than chance and their values may."""
     there, beside = fitted_with_sensors(problem, weight, laws)
     without = fit(there, weight, beside.effects[:names], beside, linearisations=6)
