@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-from lugre_steering.chain.compiled import IN_PLACE, LAW_OPTIONS, inner
+from lugre_steering.chain.compiled import IN_PLACE, LAW_OPTIONS
 from lugre_steering.chain.compose import Composition, compose, composition_of, name_of
 from lugre_steering.chain.layout import BASELINE_FIELDS, OUTPUT
 from lugre_steering.recording import Array
@@ -60,20 +60,16 @@ def _run(p, s, rubber, time, theta, omega, alpha, out, previous, effects):
         previous = time[i]
 
 
-@inner
-def _torque(p, s, rubber, scratch, time, theta, omega, alpha, torque, previous, effects):
-    for i in range(time.size):
-        step(p[0], s[0], rubber, scratch[0], time[i] - previous, theta[i], omega[i], alpha[i], effects)
-        torque[i] = scratch[0].torque
-        previous = time[i]
-
-
 @njit(nogil=True, cache=True)
 def _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects):
+    # Sample by sample: tracks do not wait for each other, so the processor works on both at once.
     previous = time[max(first - 1, 0)]
-    for track in range(theta.shape[0]):
-        here, motion = states[track : track + 1], (theta[track, first:last], omega[track, first:last], alpha[track, first:last])
-        _torque(p, here, rubber, scratch, time[first:last], *motion, torques[track, first:last], previous, effects)
+    for i in range(first, last):
+        for track in range(theta.shape[0]):
+            here = states[track], rubber, scratch[track]
+            step(p[0], *here, time[i] - previous, theta[track, i], omega[track, i], alpha[track, i], effects)
+            torques[track, i] = scratch[track].torque
+        previous = time[i]
 
 
 def new_parameters(composition: Composition) -> Records:
@@ -162,7 +158,7 @@ def torque_in_phases(
     if theta.ndim == 1:
         theta, omega, alpha = np.atleast_2d(theta, omega, alpha)
     time, theta, omega, alpha = map(np.ascontiguousarray, (time, theta, omega, alpha))  # one compiled form
-    torques, states, scratch = np.empty(theta.shape), new_state(before, len(theta)), _empty(OUTPUT)
+    torques, states, scratch = np.empty(theta.shape), new_state(before, len(theta)), _empty(OUTPUT, len(theta))
     alone = len(phases) == 1 and phases[0][0] == -np.inf
     edges = [0, time.size] if alone else [*np.searchsorted(time, [start for start, _ in phases]), time.size]
     for (_, p), effects, first, last in zip(phases, acting, edges, edges[1:], strict=False):
