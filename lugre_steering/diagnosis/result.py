@@ -160,12 +160,14 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left: whether it is structure, where, and the formula of the laws found for it."""
+    """What is left: whether it is structure, where, and the formula of the laws found for it; effects of which one alone would do what
+    friction of another form than the model's does."""
 
     structured: bool
     description: str
     formula: str | None = None
     where: tuple[Place, ...] | None = None
+    indistinguishable_from: tuple[str, ...] = field(default=(), metadata=ADDED)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.data.dataset import Run, ideal_run
+from lugre_steering.diagnosis.conclude.formed import Formed
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.find import FoundLaws
 from lugre_steering.diagnosis.laws.refine import Law
@@ -112,9 +113,11 @@ def recommend(problem: Problem, energies: Mapping[str, float]) -> tuple[str, str
     return best, manoeuvres(problem)[best].description, energies[best]
 
 
-def next_experiment(done: Finished, verdict: str, whole: Fit, laws: FoundLaws | None = None) -> Experiment | None:
-    """For a tie of names or of laws the manoeuvre that separates the rivals best; for unlisted structure those that vary one quantity
-    at a time."""
+def next_experiment(
+    done: Finished, verdict: str, whole: Fit, laws: FoundLaws | None = None, form: Formed | None = None
+) -> Experiment | None:
+    """For a tie of names, of laws, or of a name and the ``form`` of the friction the manoeuvre that separates the rivals best; for
+    unlisted structure those that vary one quantity at a time."""
     for index, item in enumerate(done.found.found if verdict == "missing_physics" else ()):
         rivals = [trial for trial in item.trials if trial.candidate.effect.id in item.rivals]
         if rivals:
@@ -127,6 +130,11 @@ def next_experiment(done: Finished, verdict: str, whole: Fit, laws: FoundLaws | 
         energies = separation(laws.problem, laws.fitted, *sides, done.noise.floor)
         if energies:
             return _between(laws.problem, energies, tuple(_in_words(side[-1], done.problem.vehicle) for side in sides))
+    if verdict == "consistent" and form is not None and (instead := done.compared.found.instead):
+        name = instead[0].fit.effects[-1]
+        energies = separation(form.problem, form.whole, form.whole.effects, [name], done.noise.floor)
+        if energies:
+            return _between(form.problem, energies, ("friction of another form", name[0].effect.id))
     if verdict == "unlisted_physics":
         return Experiment(
             "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",

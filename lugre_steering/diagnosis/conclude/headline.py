@@ -78,7 +78,7 @@ def unlisted(done: Finished, error: float, said: str) -> str:
 
 def consistent(done: Finished, error: float, left: str) -> str:
     """For a model that leaves no physics: ``error`` [N m] on held-out data, and what is ``left``."""
-    more = f" {sentence(left)}" if done.needs_form else ""
+    more = f" {sentence(left)}" if done.needs_form or done.compared.found.instead else ""
     return (
         f"No missing physics is seen: recalibrated, the model explains the torque to {done.torque(error)} "
         f"({_share(error / done.amplitude)}).{more} Use augmented.yaml, the recalibrated vehicle file."

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lugre_steering import units
+from lugre_steering.diagnosis.conclude.headline import inside
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.loudness import beyond_calibration, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
@@ -38,11 +39,17 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     excess, slow, loud = loudness(done.problem, done.noise, final)
     if not loud:
         description = "what is left is within noise and the simulation's own error"
+        instead = tuple(trial.candidate.effect.id for trial in done.found.instead)
+        alone = " or ".join(inside(done.title(name)) for name in instead)
         if needs_form:
             form = _form(done, final)
             other = f"friction of another form than the model's does, mostly {form}" if form else "the named laws do when bent a little"
             description = f"what is left beyond noise is within what {other}"
-        return LeftOver(Unexplained(False, description), "", False)
+            if instead:
+                description += f"; {alone} alone would do as much"
+        elif instead:
+            description += f"; {alone} would explain a part of it, and friction of another form than the model's as well"
+        return LeftOver(Unexplained(False, description, indistinguishable_from=instead), "", False)
     if not final.effects:
         # A least-squares fit spreads what it cannot explain over the whole record; a robust one leaves it in its place.
         sound = fit(done.problem, done.fitted, (), final.x, robust=True, linearisations=25)

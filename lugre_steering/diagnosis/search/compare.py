@@ -157,24 +157,33 @@ def tied(
 ) -> list[Trial]:
     """Rivals that this data cannot tell from the best.
 
-    Either no clear difference block by block (Vuong 1989), or one smaller than the doubts and what another form of the rival's law than
-    nature's may leave of what the best takes; nothing where the law is ``exact``. What recalibration must go too far for could not be
-    named alone, nor in place of what does without.
+    What recalibration must go too far for could not be named alone, nor in place of what does without.
     """
     found, sound = [], not gone_too_far(problem, best.fit.x)
-    error = ((problem.measured - best.fit.prediction) * weight) ** 2
     for other in others:
         if other.candidate.label == best.candidate.label or before - other.cost < HALF * (before - best.cost):
             continue
         if sound and gone_too_far(problem, other.fit.x):
             continue
-        difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
-        t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
-        apart = other.cost - best.cost
-        law = 0.0 if exact else TAKEN_OF_SLOW if _slow(other.candidate.effect) else NAME_TAKEN
-        if (apart < SURE * problem.doubt and t < TIE_T) or apart < TIE * problem.doubt + law * (before - best.cost):
+        if alike(problem, weight, split, best.fit, other, before, exact=exact):
             found.append(other)
     return found
+
+
+def alike(
+    problem: Problem, weight: Array, split: Split, best: Fit, other: Trial, before: float, *, exact: bool = False
+) -> bool:
+    """Whether this data cannot tell another model from the best fit; ``before``: energy without either.
+
+    Either no clear difference block by block (Vuong 1989), or one smaller than the doubts and what another form of its law than
+    nature's may leave of what the best takes; nothing where the law is ``exact``.
+    """
+    error = ((problem.measured - best.prediction) * weight) ** 2
+    difference = np.bincount(split.cluster, ((problem.measured - other.fit.prediction) * weight) ** 2 - error)
+    t = difference.sum() / max(np.sqrt(np.sum(difference**2)), 1e-9)
+    apart = other.cost - best.cost
+    law = 0.0 if exact else TAKEN_OF_SLOW if _slow(other.candidate.effect) else NAME_TAKEN
+    return bool((apart < SURE * problem.doubt and t < TIE_T) or apart < TIE * problem.doubt + law * (before - best.cost))
 
 
 def as_far_as_it_may(current: Fit, names: int) -> bool:

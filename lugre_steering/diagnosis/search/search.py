@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.search.compare import (
     SIZES,
     SURE,
     TIE,
+    alike,
     as_far_as_it_may,
     clearest,
     left,
@@ -74,13 +75,17 @@ class Found:
 
 @dataclass(frozen=True)
 class Search:
-    """What the search came to: fits without and with what was found; scores of the first round and every trial, for the report."""
+    """What the search came to: fits without and with what was found; scores of the first round and every trial, for the report.
+
+    ``instead``: names of which each alone explains as much as the friction law's freedoms, where these stand and no name does.
+    """
 
     baseline: Fit
     final: Fit
     found: tuple[Found, ...]
     first_scores: tuple[Score, ...]
     trials: tuple[Trial, ...]
+    instead: tuple[Trial, ...] = ()
 
 
 def search(
@@ -92,13 +97,14 @@ def search(
     now, current = settled(problem, weight, current)
     found = [_told(item, _rivals(now, noise, weight, split, current, item, i)) for i, item in enumerate(found)]
     problem, baseline = (now, current) if not found else settled(problem, weight, baseline)
-    given, first, tried = len(found), tuple[Score, ...](), list[Trial]()
+    given, first, tried, instead_of_form = len(found), tuple[Score, ...](), list[Trial](), tuple[Trial, ...]()
     sure, waiting = (found, now, current), False
     while len(found) < given + MAX_EFFECTS:
         progress("fingerprints")
         further = len(found) > given
         seen = [_round(world, noise, weight, current, further, progress) for world in ([now] if further else worlds(now))]
         first, tried = first or seen[0].scores, tried + [trial for own in seen for trial in own.trials]
+        instead_of_form = instead_of_form if further else _as_well_as_form(seen, weight, split)
         step = _step(seen, current, found[given:], weight, split, progress)
         if step is None or (step.short and len(found) + 1 == given + MAX_EFFECTS):
             break
@@ -136,7 +142,8 @@ def search(
     if not any(item.in_place for item in found):
         problem, baseline = settled(problem, weight, baseline, now.doubt)
     more = np.zeros(now.nuisances - baseline.x.size)
-    return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried))
+    instead_of_form = () if len(found) > given else instead_of_form
+    return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), instead_of_form)
 
 
 class _Step(NamedTuple):
@@ -301,6 +308,16 @@ def _in_place_of_form(seen: Sequence[Proposal], weight: Array) -> Proposal | Non
     if exact.before - best.cost < needed(exact.problem, best.fit, weight):
         return None
     return exact if best.cost - free.before < REST * (exact.before - free.before) else None
+
+
+def _as_well_as_form(seen: Sequence[Proposal], weight: Array, split: Split) -> tuple[Trial, ...]:
+    """Names, best first, of which one without the freedoms explains what these do without it: the data cannot tell it from friction of
+    another form."""
+    free, exact = seen[0], seen[-1]
+    if free is exact or not exact.problem.bends.shape[1]:
+        return ()
+    believed = [trial for trial in exact.trials if exact.before - trial.cost >= needed(exact.problem, trial.fit, weight)]
+    return tuple(trial for trial in believed if alike(free.problem, weight, split, free.current, trial, exact.before))
 
 
 def _in_place(
