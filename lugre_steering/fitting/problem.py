@@ -308,6 +308,10 @@ class Problem:
         other.doubt, other.typical, other.shapes = self.doubt, self.typical, self.shapes
         return other
 
+    def with_names(self) -> Problem:
+        """The same without bends, with all of the catalogue beside its places for laws."""
+        return Problem(self.vehicle, self.runs, self.calibrations, more_laws=self._places[0], beside_names=True)
+
     def over(self, runs: Sequence[Run]) -> Problem:
         """The same vehicle, with as many places for laws, in other runs; without bends."""
         more_laws, beside_names = self._places

@@ -9,10 +9,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from small_problem import small_problem, weight, with_torque
+from small_problem import effect, small_problem, weight, with_torque
 
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
+from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.formed import formed
 from lugre_steering.diagnosis.conclude.left_over import left_over
 from lugre_steering.diagnosis.conclude.stands import standing
@@ -22,10 +23,11 @@ from lugre_steering.diagnosis.investigate import investigate
 from lugre_steering.diagnosis.loudness import FORM_LEFT, form_energy
 from lugre_steering.diagnosis.search import compare
 from lugre_steering.fitting.apply import apply_calibration
+from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import CYCLE
-from lugre_steering.fitting.trial import cost
+from lugre_steering.fitting.trial import Trial, cost
 from lugre_steering.fitting.weather import initial_of
 from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Manoeuvre, Sweep
@@ -100,6 +102,22 @@ def test_no_name_is_given_to_friction_of_another_form() -> None:
     per_sample = [form_energy(there.problem, baseline, used) / np.count_nonzero(used) for used in (there.fitted, there.held)]
     assert per_sample[1] == pytest.approx(per_sample[0])
     assert per_sample[0] > 1.0
+
+
+def test_a_name_that_would_do_as_much_is_told_with_the_manoeuvre_that_separates_them() -> None:
+    done, spring = rubbed(), effect("linkage_compliance", compliance=2e-6)
+    there = done.compared
+    alone = fit(there.problem, there.fitted, [spring])
+    trial = Trial(Score(spring[0], 0.0, 0.0, 0.0, 0.0, (), np.zeros(0)), alone, alone.cost)
+    told = replace(done, beside_form=replace(there, found=replace(there.found, instead=(trial,))))
+    for each, names in ((done, ()), (told, ("linkage_compliance",))):
+        entry = left_over(each.compared, there.found.baseline, each.needs_form).entry
+        assert entry.indistinguishable_from == names
+        assert ("linkage" in entry.description) == bool(names)
+    advice = next_experiment(told, "consistent", done.found.baseline, form=formed(told, False, 1))
+    assert advice is not None
+    assert advice.separates == ("friction of another form", "linkage_compliance")
+    assert next_experiment(done, "consistent", done.found.baseline, form=formed(done, False, 1)) is None
 
 
 def test_what_a_name_must_take_is_what_is_left_until_all_of_it_may_be_the_form() -> None:

@@ -458,6 +458,23 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
 
 
 @pytest.mark.parametrize(
+    ("uneven", "names", "instead"), [(0.2, ["line_loss_quadratic"], []), (0.3, [], ["line_loss_quadratic"]), (0.5, [], [])]
+)
+def test_a_name_that_ties_with_freedoms_is_told_in_their_place(
+    slower: Problem, uneven: float, names: list[str], instead: list[str]
+) -> None:
+    """Of a weak loss that is uneven by stretches: it stands, the data cannot tell it from the freedoms, or these do clearly better."""
+    base = slower.predict_all(slower.start())
+    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=3e3)]) - base
+    stretch = np.arange(loss.size) * 16 // loss.size
+    pieces = np.where(stretch[:, None] == np.arange(16), loss[:, None], 0.0)
+    torque = pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))
+    found = searched(replace_bends(with_torque(slower, base + torque), 3.0 * pieces))
+    assert [item.score.candidate.effect.id for item in found.found] == names
+    assert [trial.candidate.effect.id for trial in found.instead] == instead
+
+
+@pytest.mark.parametrize(
     ("beside", "stretches", "uneven", "waves", "noise_waves", "stand"),
     [
         ("true", 16, 0.02, 0.0, 0.0, True), ("true", 16, 0.9, 0.0, 0.0, False), ("true", 40, 0.02, 0.5, 0.0, False),

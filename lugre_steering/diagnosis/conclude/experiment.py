@@ -131,10 +131,10 @@ def next_experiment(
         if energies:
             return _between(laws.problem, energies, tuple(_in_words(side[-1], done.problem.vehicle) for side in sides))
     if verdict == "consistent" and form is not None and (instead := done.compared.found.instead):
-        name = instead[0].fit.effects[-1]
-        energies = separation(form.problem, form.whole, form.whole.effects, [name], done.noise.floor)
+        name, problem = instead[0].fit.effects[-1], form.problem.with_names()
+        energies = separation(problem, form.whole, form.whole.effects, [name], done.noise.floor)
         if energies:
-            return _between(form.problem, energies, ("friction of another form", name[0].effect.id))
+            return _between(problem, energies, ("friction of another form", name[0].effect.id))
     if verdict == "unlisted_physics":
         return Experiment(
             "varied-rates, then small-loops and hold-and-rest: each changes one of rate, amplitude and dwell only",
