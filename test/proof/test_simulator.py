@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -68,8 +69,9 @@ def _short_manoeuvre(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hydraulics, "line_gain", GAIN)
 
 
-def short_case(*effects: Concealed, seed: int = 4, noise: str = "white") -> Case:
-    return Case(seed, effects, noise=noise, manoeuvres=("short", "short"))  # type: ignore[arg-type]
+def short_case(*effects: Concealed, seed: int = 4, noise: str = "white", bags: int = 2) -> Case:
+    """``bags``: one will do where only the first is looked at, or where each shows the same."""
+    return Case(seed, effects, noise=noise, manoeuvres=("short",) * bags)  # type: ignore[arg-type]
 
 
 def lumped() -> Patches:
@@ -243,7 +245,7 @@ def test_same_seed_same_recording_and_only_the_effect_differs(sheet: Sheet, monk
 def test_every_effect_acts_and_grows_with_its_strength(effect: str, sheet: Sheet) -> None:
     size = {}
     for strength in (0.0, 0.5, 1.0):
-        data = simulate_case(short_case(Concealed(effect, strength)), sheet)
+        data = simulate_case(short_case(Concealed(effect, strength), bags=1), sheet)
         assert all(np.isfinite(bag.torque).all() and np.isfinite(bag.pressures[0].value).all() for bag in data.bags)
         size[strength] = np.sqrt(np.mean([removable_variance(bag) for bag in data.bags]))
     if effect != "relief_saturation":  # at margin 0 its ceiling still touches the very peak
@@ -257,7 +259,7 @@ def test_an_effect_can_be_limited_to_a_bag_or_begin_late(sheet: Sheet) -> None:
     assert removable_variance(data.bags[0]) == 0.0
     assert removable_variance(data.bags[1]) > 0.0
     for effect in ("viscous_friction", "line_loss_linear", "wear_polishing", "stress_relaxation", "backlash"):
-        bag = simulate_case(short_case(Concealed(effect, from_time_s=25.0)), sheet).bags[0]
+        bag = simulate_case(short_case(Concealed(effect, from_time_s=25.0), bags=1), sheet).bags[0]
         added = np.abs(bag.torque - bag.torque_without)
         assert added[bag.time < 25.0].max() < 1e-3
         assert added[bag.time > 26.0].max() > 50.0
@@ -267,13 +269,13 @@ def test_an_effect_can_be_limited_to_a_bag_or_begin_late(sheet: Sheet) -> None:
 @pytest.mark.parametrize("effect", list(ZONED))
 def test_a_zone_can_be_moved_to_the_edge(effect: str, sheet: Sheet) -> None:
     usual, barely = (
-        simulate_case(short_case(Concealed(effect, barely=edge), seed=6), sheet).bags[0] for edge in (False, True)
+        simulate_case(short_case(Concealed(effect, barely=edge), seed=6, bags=1), sheet).bags[0] for edge in (False, True)
     )
     assert 0.0 < removable_variance(barely) < 0.5 * removable_variance(usual)
 
 
 def test_two_effects_each_keep_their_own_part(sheet: Sheet) -> None:
-    data = simulate_case(short_case(Concealed("end_stop"), Concealed("line_loss_linear")), sheet)
+    data = simulate_case(short_case(Concealed("end_stop"), Concealed("line_loss_linear"), bags=1), sheet)
     bag = data.bags[0]
     total = bag.torque - bag.torque_without
     np.testing.assert_allclose(bag.effect_torque["end_stop"] + bag.effect_torque["line_loss_linear"], total, atol=1e-6)
@@ -286,7 +288,7 @@ def test_two_effects_each_keep_their_own_part(sheet: Sheet) -> None:
 def test_sensors_have_the_noise_they_claim(sheet: Sheet) -> None:
     spread = {}
     for noise in ("white", "coloured", "ripple"):
-        data = simulate_case(short_case(noise=noise), sheet)
+        data = simulate_case(short_case(noise=noise, bags=1), sheet)
         bag = data.bags[0]
         spread[noise] = noise_variance(data, bag)
         angle = bag.angles[0]
@@ -407,9 +409,9 @@ def test_the_error_that_the_engine_allows_itself_covers_what_the_baseline_cannot
 def test_generated_law_is_hidden_in_the_second_simulator_too(sheet: Sheet, tmp_path: Path) -> None:
     """With a law the torque differs, without strength it does not; the unseen manoeuvre is written apart."""
     for seed in (21, 22, 24):
-        off = simulate_case(Case(seed, manoeuvres=("short", "short"), law=0.0), sheet)
+        off = simulate_case(replace(short_case(seed=seed, bags=1), law=0.0), sheet)
         np.testing.assert_allclose(off.bags[0].torque, off.bags[0].torque_without, atol=1e-6)
-    data = simulate_case(Case(21, manoeuvres=("short", "short"), law=1.0), sheet)
+    data = simulate_case(replace(short_case(seed=21), law=1.0), sheet)
     assert removable_variance(data.bags[0]) > 0.0
     write_case(data, tmp_path / "seen", tmp_path / "unseen")
     assert not list((tmp_path / "seen").rglob("*unseen*"))
