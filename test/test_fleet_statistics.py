@@ -259,7 +259,7 @@ def of_recordings(effects: list[str], count: int) -> list[dict]:
 
 def test_a_weak_effect_of_simulated_recordings_is_named_jointly_with_its_size() -> None:
     """A thirtieth of a typical asymmetry, which the diagnosis of one such recording calls consistent."""
-    leader = next(claim for claim in claims(of_recordings(["direction_asymmetry:asymmetry=0.0005"], 10)) if claim.leads)
+    leader = next(claim for claim in claims(of_recordings(["direction_asymmetry:asymmetry=0.0005"], 8)) if claim.leads)
     assert leader.effect == "direction_asymmetry"
     assert leader.low < 0.0005 < leader.high
     assert leader.high < 0.001

@@ -27,13 +27,18 @@ FOLDERS = sorted({".".join(file.relative_to(ROOT).parent.parts) for file in MODU
 
 def imports(file: Path) -> Iterator[str]:
     """Modules of the package that a file imports, at its top or within functions; those for the type checker too."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(file)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(PACKAGE.name):
             for alias in node.names:
                 whole = f"{node.module}.{alias.name}"
                 yield whole if whole in MODULES else str(node.module)
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in MODULES)
+
+
+@cache
+def tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
 
 
 @cache
@@ -91,10 +96,9 @@ def test_the_chain_knows_no_vehicle_file_and_the_report_no_program() -> None:
 @cache
 def strings() -> dict[Path, set[str]]:
     """Every string in the code of each file of the package."""
-    trees = {file: ast.parse(file.read_text(encoding="utf-8")) for file in MODULES.values()}
     return {
-        file.relative_to(PACKAGE): {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
-        for file, tree in trees.items()
+        file.relative_to(PACKAGE): {n.value for n in ast.walk(tree(file)) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+        for file in MODULES.values()
     }
 
 
@@ -102,7 +106,7 @@ def strings() -> dict[Path, set[str]]:
 def test_an_effect_is_named_in_its_own_file_only(effect: str) -> None:
     """No string outside is its id, one of its fields or it with values; the proof's simulators hide effects by name on purpose."""
     own = re.compile(rf"{effect}(_[a-z0-9_]+)?(:.*)?")
-    named = {file for file, texts in strings().items() if any(map(own.fullmatch, texts))}
+    named = {file for file, texts in strings().items() if any(text.startswith(effect) and own.fullmatch(text) for text in texts)}
     assert {file for file in named if file.parts[0] not in ("proof", "effects")} == set()
     assert CATALOGUE[effect].id == effect
     assert (PACKAGE / "effects" / f"{effect}.py").exists()
