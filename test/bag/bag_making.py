@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,6 +78,11 @@ def angle(t_s: float) -> float:
 
 def steering(duration_s: float = 20.0, rate_Hz: int = 100) -> list[Message]:
     """All five quantities: different rates, jittered log times, temperature starting late. Synthetic."""
+    return list(_steering(duration_s, rate_Hz))
+
+
+@cache
+def _steering(duration_s: float, rate_Hz: int) -> tuple[Message, ...]:
     rng = np.random.default_rng(7)
     messages: list[Message] = []
     for i in range(int(duration_s * rate_Hz)):
@@ -90,7 +96,7 @@ def steering(duration_s: float = 20.0, rate_Hz: int = 100) -> list[Message]:
             messages.append(("/" + SENSOR.topic, WRENCH, t + late[3], wrench(t, 1e4 * x)))
         if i % rate_Hz == 0 and i >= 5 * rate_Hz:
             messages.append(("/" + AIR.topic, TEMPERATURE, t + late[4], temperature(t, 20.0 + x)))
-    return messages
+    return tuple(messages)
 
 
 def write(

@@ -131,7 +131,7 @@ def test_without_matplotlib_the_numbers_are_written_all_the_same(tmp_path: Path,
         (("{tmp}/bad.csv", "--out", "{tmp}"), "bad.csv"),
         (("{tmp}/bad.yaml", "--out", "{tmp}"), "bad.yaml"),
         (("{tmp}/empty", "--out", "{tmp}/x"), "empty"),
-        (("paper-rate", "--out", "{tmp}/file"), "file"),
+        (("paper-pavements", "--out", "{tmp}/file"), "file"),
         (("paper-rate", "--out", "{tmp}", "--seed", "3"), "paper-rate"),
         (("paper-rate", "--out", "{tmp}", "--storage", "sqlite3"), "paper-rate"),
         (("{tmp}/bad.folder.yaml", "--out", "{tmp}"), "bad.folder.yaml"),
@@ -171,15 +171,15 @@ def test_an_interrupted_recording_can_be_repeated(tmp_path: Path, monkeypatch: p
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    vehicle = command.load_vehicle(None)
+    vehicle, slower = command.load_vehicle(None), {"angle_rate_Hz": 20.0, "pressure_rate_Hz": 20.0}
     with monkeypatch.context() as patch:
         patch.setattr(f"lugre_steering.simulate.{moment}", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
+            command.run_manoeuvre("small-loops", vehicle, tmp_path, slower)
     assert not [path for path in tmp_path.iterdir() if path.suffix != ".png"]
-    command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
+    command.run_manoeuvre("small-loops", vehicle, tmp_path, slower)
     with pytest.raises(DataError, match="exists already"):
-        command.run_manoeuvre("small-loops", vehicle, tmp_path, {})
+        command.run_manoeuvre("small-loops", vehicle, tmp_path, slower)
 
 
 def test_the_examples_are_written_with_equal_bytes(tmp_path: Path) -> None:
