@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +12,24 @@ import numpy as np
 from lugre_steering.chain.step import Records, new_state, run_side
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle, load
-from lugre_steering.vehicle.model import build_model
+from lugre_steering.vehicle.model import Model, build_model
 
 VEHICLE_FILE = Path(__file__).resolve().parents[2] / "config" / "test_vehicle.yaml"
 
 
+@cache
 def vehicle() -> Vehicle:
     return load(VEHICLE_FILE)
 
 
+@cache
+def model() -> Model:
+    return build_model(vehicle())
+
+
 def baseline() -> tuple[Records, Array]:
     """Parameter record and rubber table of one track of the test vehicle."""
-    model = build_model(vehicle())
-    return model.parameters[0].copy(), model.rubber
+    return model().parameters[0].copy(), model().rubber.copy()
 
 
 def frozen() -> tuple[Records, Array]:

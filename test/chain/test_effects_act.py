@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import io
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ CHAIN_EFFECTS = sorted(e.id for e in CATALOGUE.values() if e.hooks.keys() & STEP
 CHAIN_FIELDS = [f for f in EFFECT_FIELDS if any(f.startswith(f"{effect}_") for effect in CHAIN_EFFECTS)]
 
 
+@cache
 def cycle() -> tuple[Array, Array, Array, Array]:
     """Double cycle with a dwell at every limit, then small reversals."""
     time, theta = double_cycle(100.0)

@@ -174,7 +174,7 @@ def motion_of(pieces: list[tuple[float, float]], split: int = 1) -> tuple[Array,
     return np.cumsum(dt), np.cumsum(rate * dt), rate, np.zeros(rate.size)
 
 
-@settings(max_examples=75)
+@settings(max_examples=150)
 @given(steps, st.integers(2, 7))
 def test_step_size_does_not_matter_at_constant_rate(pieces: list[tuple[float, float]], split: int) -> None:
     p, rubber = frozen()
@@ -183,7 +183,7 @@ def test_step_size_does_not_matter_at_constant_rate(pieces: list[tuple[float, fl
     np.testing.assert_allclose(fine[::split], whole, rtol=1e-9, atol=1e-6)
 
 
-@settings(max_examples=50)
+@settings(max_examples=100)
 @given(steps)
 def test_sign_symmetry(pieces: list[tuple[float, float]]) -> None:
     p, rubber = baseline()
@@ -192,7 +192,7 @@ def test_sign_symmetry(pieces: list[tuple[float, float]]) -> None:
     np.testing.assert_allclose(one, -other, rtol=1e-12, atol=1e-7)
 
 
-@settings(max_examples=50)
+@settings(max_examples=100)
 @given(steps)
 def test_dissipation_is_never_negative_and_the_rest_is_booked(pieces: list[tuple[float, float]]) -> None:
     p, rubber = baseline()
@@ -208,7 +208,7 @@ def test_dissipation_is_never_negative_and_the_rest_is_booked(pieces: list[tuple
     assert final_state(p, rubber, *motion)[0]["non_passive"] > -1e-9
 
 
-@settings(max_examples=50)
+@settings(max_examples=100)
 @given(steps)
 def test_bristle_never_exceeds_static_friction(pieces: list[tuple[float, float]]) -> None:
     p, rubber = frozen()
