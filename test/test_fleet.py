@@ -80,17 +80,24 @@ def table(out: Path, name: str) -> list[dict]:
     return pq.read_table(out / f"{name}.parquet").to_pylist()
 
 
-@pytest.fixture(scope="module")
-def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("fleet") / "out"
-    run(bags_of(runs), VEHICLE, out, options=QUICK, jobs=2, version="1")
-    return out
+def without_processes(patch: pytest.MonkeyPatch) -> None:
+    """For what processes have no part in: each takes seconds to begin."""
+    patch.setattr("lugre_steering.fleet.run.in_processes", lambda function, tasks, _: enumerate(map(function, tasks)))
 
 
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For what processes have no part in: each takes seconds to begin."""
-    monkeypatch.setattr("lugre_steering.fleet.run.in_processes", lambda function, tasks, _: enumerate(map(function, tasks)))
+    without_processes(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """As one process does it: the tests that kill workers expect the same of several."""
+    out = tmp_path_factory.mktemp("fleet") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        without_processes(patch)
+        run(bags_of(runs), VEHICLE, out, options=QUICK, jobs=1, version="1")
+    return out
 
 
 def test_bad_bags_are_in_quarantine_and_stop_nobody(done: Path) -> None:
@@ -187,7 +194,9 @@ def waiting(condition: object, seconds: float = 120.0) -> Iterator[None]:
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are looked up in /proc")
-def test_workers_may_be_killed_and_then_the_whole_run(done: Path, runs: Path, tmp_path: Path) -> None:
+def test_workers_may_be_killed_and_then_the_whole_run(
+    done: Path, runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "out"
     command = [sys.executable, "-m", "lugre_steering.cli", "fleet", runs, "--vehicle", VEHICLE, "--out", out, "--no-diagnose", "-j", "2"]
     first = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE)
@@ -202,7 +211,9 @@ def test_workers_may_be_killed_and_then_the_whole_run(done: Path, runs: Path, tm
     for _ in waiting(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers)):
         pass  # none is left behind
     assert json.loads((out / "fleet.json").read_text())["finished"] is False
-    second = subprocess.run([*command, "--json"], env=ENVIRONMENT, capture_output=True, check=True)
+    without_processes(monkeypatch)
+    second = CliRunner().invoke(app, [*map(str, command[3:]), "--json"])
+    assert second.exit_code == 0, second.stderr
     result = json.loads(second.stdout)
     assert result["cached"] >= 2
     assert result["cached"] + result["examined"] == 6
@@ -210,6 +221,7 @@ def test_workers_may_be_killed_and_then_the_whole_run(done: Path, runs: Path, tm
     assert {Path(row["bag"]).name: (row["rmse_Nm"], row["quarantine"]) for row in table(out, "scores")} == whole
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_bag_that_grows_is_left_for_the_next_run(tmp_path: Path) -> None:
     """A recorder at work: the file gets longer while it is read."""
     write_cycle(tmp_path / "whole", 6.0)
