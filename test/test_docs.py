@@ -179,8 +179,8 @@ LOG = "time_s,angle_left_deg,angle_right_deg,main_a_bar,main_b_bar,aux_a_bar,aux
 
 
 def test_the_quick_commands_of_the_first_hour_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In their order; what the first diagnosis writes is a vehicle file in its place. They find what the page says, at 25 Hz too."""
-    (tmp_path / "defaults.yaml").write_text("simulate.rate: 25.0\n")
+    """In their order; what the first diagnosis writes is a vehicle file in its place. They find what the page says, at 12.5 Hz too."""
+    (tmp_path / "defaults.yaml").write_text("simulate.rate: 12.5\n")
     monkeypatch.setenv("LUGRE_STEERING_CONFIG", str(tmp_path / "defaults.yaml"))
     for name in ("bags", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
