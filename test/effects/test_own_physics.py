@@ -35,8 +35,6 @@ from lugre_steering.vehicle.model import build_model
 OWN = config_folder() / "own_physics"
 RIPPLE = OWN / "chain_ripple.yaml"
 SHEET = config_folder() / "test_vehicle.yaml"
-SLOW = 12.5
-"""Samples per second [Hz] as of the slowest field recordings, which are quicker to diagnose."""
 
 
 def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -71,7 +69,7 @@ def run_in_turn(*commands: Sequence[object], **environment: str) -> list[dict[st
 
 def test_an_effect_of_one_line_is_simulated_named_shared_and_run(tmp_path: Path) -> None:
     ripple = ("--effect", "chain_ripple:torque=1500,pitch=0.11", "--effects", RIPPLE)
-    made = run_here("simulate", "double-cycle", *ripple, "--rate", SLOW, "--out", tmp_path)
+    made = run_here("simulate", "double-cycle", *ripple, "--rate", "20", "--out", tmp_path)
     assert made.exit_code == 0, made.stderr
     bag = tmp_path / "synthetic_double_cycle"
     done = run_here("diagnose", bag, "--vehicle", SHEET, "--effects", RIPPLE, "--out", tmp_path / "d", "--no-report", "--json")
@@ -273,7 +271,7 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
     bag, augmented = tmp_path / "synthetic_double_cycle", tmp_path / "d" / "augmented.yaml"
     told, made, done = run_in_turn(
         ("effects", "centre_detent", "--check", "--json"),
-        ("simulate", "double-cycle", "--effect", "centre_detent:hold=4000,width=0.02", "--rate", SLOW, "--out", tmp_path),
+        ("simulate", "double-cycle", "--effect", "centre_detent:hold=4000,width=0.02", "--rate", "12.5", "--out", tmp_path),
         ("diagnose", bag, "--vehicle", SHEET, "--out", tmp_path / "d", "--no-report", "--json"),
         PYTHONPATH=path,
     )
