@@ -14,7 +14,18 @@ import yaml
 
 pytest.importorskip("rclpy")
 
-from live_harness import PACKAGE_ROOT, PATIENCE_S, START_TIMEOUT_S, STOP_S, VEHICLE, LiveNode, World, environment
+from live_harness import (
+    FRESH,
+    PACKAGE_ROOT,
+    PATIENCE_S,
+    START_TIMEOUT_S,
+    STOP_S,
+    VEHICLE,
+    Forked,
+    LiveNode,
+    World,
+    environment,
+)
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
@@ -24,12 +35,19 @@ FIXED = {"autostart", "effects_files", "executor", "frame_id", "input_depth", "p
 CONFIG = PACKAGE_ROOT / "config" / "estimator_parameters.yaml"
 
 
-def start_refused(*ros_args: str) -> str:
-    command = [sys.executable, "-m", "lugre_steering.node", "--ros-args", *ros_args]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S, env=environment(), check=False)
-    assert done.returncode == 2, done.stderr
-    lines = [line for line in done.stderr.splitlines() if not line.startswith(("[ERROR]", "[INFO]"))]  # of the log
-    assert len(lines) == 1, done.stderr
+def start_refused(folder: Path, *ros_args: str, fresh: bool = False) -> str:
+    """What a node says that does not start; ``fresh``: in an interpreter of its own."""
+    if fresh:
+        command = [sys.executable, *FRESH, "--ros-args", *ros_args]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S, env=environment(), check=False)
+        code, said = done.returncode, done.stderr
+    else:
+        (log := folder / "node.log").write_text("")
+        code = Forked(["estimator", "--ros-args", *ros_args], log, environment()).wait(START_TIMEOUT_S)
+        said = log.read_text()
+    assert code == 2, said
+    lines = [line for line in said.splitlines() if not line.startswith(("[ERROR]", "[INFO]"))]  # of the log
+    assert len(lines) == 1, said
     assert lines[0].startswith("estimator: ")
     return lines[0]
 
@@ -44,8 +62,8 @@ def start_refused(*ros_args: str) -> str:
         ("watch_folder:=/nowhere", ("watch_folder", "/nowhere", "a folder that is there")),
     ],
 )
-def test_bad_parameters_are_refused(argument: str, said: tuple[str, ...]) -> None:
-    message = start_refused("-p", f"vehicle_file:={VEHICLE}", "-p", argument)
+def test_bad_parameters_are_refused(tmp_path: Path, argument: str, said: tuple[str, ...]) -> None:
+    message = start_refused(tmp_path, "-p", f"vehicle_file:={VEHICLE}", "-p", argument)
     assert all(text in message for text in said), message
 
 
@@ -76,23 +94,23 @@ def test_a_middleware_that_only_fails_ends_the_node(tmp_path: Path) -> None:
 
 
 def test_bad_vehicle_files_are_refused(tmp_path: Path) -> None:
-    assert "vehicle_file" in start_refused()
+    assert "vehicle_file" in start_refused(tmp_path, fresh=True)
     missing = tmp_path / "none.yaml"
-    assert str(missing) in start_refused("-p", f"vehicle_file:={missing}")
+    assert str(missing) in start_refused(tmp_path, "-p", f"vehicle_file:={missing}")
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text(VEHICLE.read_text().replace("width_m: 0.45", "width_m: -0.45"))
     wrong.with_name("rubber_dma_10hz.csv").write_text(VEHICLE.with_name("rubber_dma_10hz.csv").read_text())
-    message = start_refused("-p", f"vehicle_file:={wrong}")
+    message = start_refused(tmp_path, "-p", f"vehicle_file:={wrong}")
     assert all(text in message for text in (str(wrong), "track.width_m", "-0.45"))
     wrong.write_text(VEHICLE.read_text() + 'topics: {left: "steering/left angle"}\n')
-    assert "topic" in start_refused("-p", f"vehicle_file:={wrong}")
+    assert "topic" in start_refused(tmp_path, "-p", f"vehicle_file:={wrong}")
 
 
 @pytest.mark.parametrize(
     ("executor", "number"), [("events", signal.SIGINT), ("events", signal.SIGTERM), ("single", signal.SIGTERM)]
 )
 def test_stops_cleanly(executor: str, number: int) -> None:
-    with LiveNode("-p", f"executor:={executor}") as node:
+    with LiveNode("-p", f"executor:={executor}", command=FRESH) as node:
         code, seconds = node.stop(number)
         assert code == 0, node.output
         assert seconds < STOP_S
