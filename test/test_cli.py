@@ -64,9 +64,9 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_replay_writes_what_the_contract_promises(bag: Path, tmp_path: Path) -> None:
-    done = run("replay", bag, "--vehicle", VEHICLE, "--out", tmp_path / "out", "--json", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+def test_replay_writes_what_the_contract_promises(bag: Path, tmp_path: Path, here: Callable[..., Result]) -> None:
+    done = here("replay", bag, "--vehicle", VEHICLE, "--out", tmp_path / "out", "--json")
+    assert (done.exit_code, done.stderr) == (0, "")
     assert json.loads(done.stdout) == json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (tmp_path / "out" / bag.name / "metadata.yaml").is_file()
     assert (tmp_path / "out" / f"{bag.name}.png").is_file()
@@ -102,7 +102,7 @@ def test_brackets_in_names_are_names(tmp_path: Path, here: Callable[..., Result]
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminal")
 def test_progress_is_shown_on_a_terminal(bag: Path, tmp_path: Path) -> None:
     ours, its = os.openpty()
-    command = [sys.executable, "-m", "lugre_steering.cli", "replay", bag, "--vehicle", VEHICLE, "--out", tmp_path / "o"]
+    command = [sys.executable, "-m", "lugre_steering.cli", "replay", bag, "--vehicle", VEHICLE, "--out", tmp_path / "o", "--json"]
     with subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=its) as process:
         os.close(its)
         shown = b""
@@ -113,6 +113,8 @@ def test_progress_is_shown_on_a_terminal(bag: Path, tmp_path: Path) -> None:
             pass
         finally:
             os.close(ours)
+        assert process.stdout is not None
+        assert json.loads(process.stdout.read()) == json.loads((tmp_path / "o" / "summary.json").read_text())  # and nothing else
         assert process.wait() == 0
     assert b"100%" in shown
 
@@ -297,12 +299,16 @@ def test_saved_defaults_stand_in_for_options(
         ("diagnose --without end", ["end_stop"]),
     ],
 )
-def test_completion_is_offered(tmp_path: Path, typed: str, offered: list[str]) -> None:
-    words = {"COMP_WORDS": f"lugre-steering {typed}", "COMP_CWORD": str(len(typed.split()))}
-    environment = {**ENVIRONMENT, "_LUGRE_STEERING_COMPLETE": "complete_bash", **words}
+def test_completion_is_offered(typed: str, offered: list[str]) -> None:
+    asked = {"_LUGRE_STEERING_COMPLETE": "complete_bash", "COMP_WORDS": f"lugre-steering {typed}", "COMP_CWORD": str(len(typed.split()))}
+    assert CliRunner().invoke(cli.app, [], env=asked, prog_name="lugre-steering").stdout.split() == offered
+
+
+def test_completion_is_offered_by_the_program(tmp_path: Path) -> None:
+    asked = {"_LUGRE_STEERING_COMPLETE": "complete_bash", "COMP_WORDS": "lugre-steering diag", "COMP_CWORD": "1"}
     command = [sys.executable, "-m", "lugre_steering"]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == offered
+    done = subprocess.run(command, cwd=tmp_path, env={**ENVIRONMENT, **asked}, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["diagnose"]
 
 
 def test_names_of_parameters_are_never_cut() -> None:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import inspect
 import json
@@ -444,9 +445,15 @@ CONTRACT = {
 """The example of the interface contract, key by key."""
 
 
+@functools.cache
+def validator(schema: str) -> jsonschema.Draft202012Validator:
+    """Of a schema that is one itself."""
+    jsonschema.Draft202012Validator.check_schema(json.loads(schema))
+    return jsonschema.Draft202012Validator(json.loads(schema))
+
+
 def refusals(schema: dict, document: object) -> list[str]:
-    jsonschema.Draft202012Validator.check_schema(schema)
-    return [error.message for error in jsonschema.Draft202012Validator(schema).iter_errors(document)]
+    return [error.message for error in validator(json.dumps(schema)).iter_errors(document)]
 
 
 def test_the_schema_of_a_diagnosis_is_the_contract() -> None:

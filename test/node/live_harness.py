@@ -118,11 +118,12 @@ def end_template() -> None:
 class Forked:
     """A node forked from the template, with what is used here of a ``subprocess.Popen``."""
 
-    def __init__(self, arguments: Sequence[str], log: Path, env: Mapping[str, str]) -> None:
+    def __init__(self, arguments: Sequence[str], log: Path, env: Mapping[str, str], script: Path | None = None) -> None:
         begun, self._ended = template(), Path(f"{log}.ended")
         assert begun.stdin is not None
         assert begun.stdout is not None
-        begun.stdin.write(json.dumps({"arguments": [*arguments], "log": str(log), "environment": {**env}}) + "\n")
+        order = {"arguments": [*arguments], "script": script and str(script), "log": str(log), "environment": {**env}}
+        begun.stdin.write(json.dumps(order) + "\n")
         begun.stdin.flush()
         self.pid = int(begun.stdout.readline())
 
@@ -153,11 +154,11 @@ class Forked:
 class Live:
     """A process that brings the node up; use as a context manager."""
 
-    def __init__(self, command: Sequence[str], env: Mapping[str, str], *, forked: bool = False) -> None:
+    def __init__(self, command: Sequence[str], env: Mapping[str, str], *, forked: bool = False, script: Path | None = None) -> None:
         self.log = Path(tempfile.mkstemp(prefix="live_node_", suffix=".log")[1])
         self.process: subprocess.Popen[bytes] | Forked
         if forked:
-            self.process = Forked(command, self.log, env)
+            self.process = Forked(command, self.log, env, script)
         else:
             with self.log.open("w") as log:
                 self.process = subprocess.Popen([*command], stdout=log, stderr=subprocess.STDOUT, env=env)
@@ -193,12 +194,13 @@ FRESH = ("-m", "lugre_steering.node")
 
 
 class LiveNode(Live):
-    """The node of this source tree; without a ``command`` forked from the template, which saves the second that a start takes."""
+    """The node of this source tree, or a ``script`` that runs it; without a ``command`` forked from the template, which saves the second
+    that a start takes."""
 
-    def __init__(self, *ros_args: str, command: Sequence[str] = (), vehicle: Path = VEHICLE):
+    def __init__(self, *ros_args: str, command: Sequence[str] = (), script: Path | None = None, vehicle: Path = VEHICLE):
         arguments = ["--ros-args", "-p", f"vehicle_file:={vehicle}", *ros_args]
         first = [sys.executable, *command] if command else ["estimator"]
-        super().__init__([*first, *arguments], environment(), forked=not command)
+        super().__init__([*first, *arguments], environment(), forked=not command, script=script)
 
 
 class World:

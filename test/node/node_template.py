@@ -3,13 +3,14 @@
 """What each node would do again before it begins, done once: a process that has imported everything and loaded the compiled code.
 
 Each line that comes in orders a node: a process of its own, forked from here before there is any thread or anything of ROS but its
-modules. Its number is answered; its exit code is left beside its log.
+modules; of a script, which breaks something in it, if one is given. Its number is answered; its exit code is left beside its log.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import runpy
 import signal
 import sys
 from pathlib import Path
@@ -43,6 +44,9 @@ for line in iter(sys.stdin.readline, ""):
         os.environ.clear()
         os.environ.update(order["environment"])
         sys.argv = order["arguments"]
-        sys.exit(main(order["arguments"]))
+        if order["script"] is None:
+            sys.exit(main(sys.argv))
+        runpy.run_path(order["script"], run_name="__main__")
+        sys.exit()
     logs[process] = order["log"]
     print(process, flush=True)

@@ -181,7 +181,7 @@ def test_an_exception_in_a_callback_withholds_the_torque_and_passes(tmp_path: Pa
     script = tmp_path / "failing_node.py"
     script.write_text(FAILING_NODE)
     vehicle = load(VEHICLE)
-    with LiveNode(command=[str(script)]) as node, World(vehicle) as world:
+    with LiveNode(script=script) as node, World(vehicle) as world:
         driver = Driver(world)
         driver.steer_until(lambda: len(world.heard["torque"]) > 20, still)
         for channel in (0, 1, 0):
@@ -205,7 +205,7 @@ def test_a_node_that_cannot_keep_up_says_so_and_can_be_stopped(tmp_path: Path) -
     script = tmp_path / "slow_node.py"
     script.write_text(SLOW_NODE)
     vehicle = load(VEHICLE)
-    with LiveNode(command=[str(script)]) as node, World(vehicle) as world:
+    with LiveNode(script=script) as node, World(vehicle) as world:
         told, over = "more messages came than could be read", threading.Event()
 
         def flood() -> None:
@@ -321,7 +321,7 @@ def test_commands_do_not_jump_when_the_torque_does(tmp_path: Path, cause: str) -
     script.write_text(FAILING_NODE)
     arguments = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=2.0", "-p", "angle_timeout_s:=60.0")
     vehicle = load(VEHICLE)
-    with LiveNode(*arguments, command=[str(script)]) as node, World(vehicle) as world:
+    with LiveNode(*arguments, script=script) as node, World(vehicle) as world:
         commands, feed_forward = world.heard["feed_forward/commands"], world.heard["feed_forward"]
         steady = Steady(world)
         steady.steer(300, 0.1)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 from collections import Counter
@@ -188,11 +189,16 @@ def test_board_counts_and_serialises() -> None:
     assert "dirty_silent" not in status
 
 
-def refusals(board: Row) -> list[str]:
-    """What the schema of scoreboard.json has against it."""
+@functools.cache
+def validator() -> jsonschema.Draft202012Validator:
     schema = schema_of(Scoreboard)
     jsonschema.Draft202012Validator.check_schema(schema)
-    return [error.json_path for error in jsonschema.Draft202012Validator(schema).iter_errors(board)]
+    return jsonschema.Draft202012Validator(schema)
+
+
+def refusals(board: Row) -> list[str]:
+    """What the schema of scoreboard.json has against it."""
+    return [error.json_path for error in validator().iter_errors(board)]
 
 
 def test_the_record_keeps_to_its_schema() -> None:
