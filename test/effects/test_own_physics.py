@@ -229,8 +229,8 @@ def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, 
 def test_variants_that_fail_are_an_error_of_their_effect(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text(OWN_PYTHON.replace("tier=2", "tier=2, variants=lambda seen: 1 / 0"))
-    told = run_here("effects", "own_spring", "--effects", file)
-    assert told.exit_code == 2
+    told = run("effects", "own_spring", "--effects", file)
+    assert told.returncode == 2
     assert "effect 'own_spring': variants: ZeroDivisionError: division by zero; expected" in " ".join(told.stderr.split())
 
 
