@@ -87,7 +87,8 @@ def traces(effect: Effect) -> list[Trace]:
     """The effect in every built-in manoeuvre, the most telling first; empty if the standard topics cannot show it."""
     if not effect.observable:
         return []
-    problems = _problems()
+    vehicle, runs = _recorded()
+    problems = {name: Problem(vehicle, [run]) for name, run in runs.items()}  # of the catalogue as it is now
     others = [name for name in CATALOGUE if name != effect.id]
     variants = [variant for variant in candidates(problems[REFERENCE], others) if variant.bags is None]
     fewest = min(len(variant.shapes) for variant in variants)
@@ -98,9 +99,10 @@ def traces(effect: Effect) -> list[Trace]:
 
 
 @cache
-def _problems() -> dict[str, Problem]:
+def _recorded() -> tuple[Vehicle, dict[str, Run]]:
+    """The test vehicle, and every built-in manoeuvre of its baseline as a run."""
     vehicle = vehicle_file.load(config_folder() / "test_vehicle.yaml")
-    return {name: Problem(vehicle, [_ideal_run(vehicle, manoeuvre)]) for name, manoeuvre in BUILT_IN.items()}
+    return vehicle, {name: _ideal_run(vehicle, manoeuvre) for name, manoeuvre in BUILT_IN.items()}
 
 
 def _ideal_run(vehicle: Vehicle, manoeuvre: Manoeuvre) -> Run:

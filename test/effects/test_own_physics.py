@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 from lugre_steering.chain.step import torque_side
 from lugre_steering.cli import app
+from lugre_steering.diagnosis import effect_card
 from lugre_steering.effects import registry
 from lugre_steering.effects.entry import Seen
 from lugre_steering.effects.own import read_effects
@@ -103,6 +104,15 @@ def test_a_law_of_yaml_is_its_formula() -> None:
 def catalogue() -> Iterator[None]:
     with put_back():
         yield
+
+
+def test_cards_show_the_catalogue_as_it_is_now() -> None:
+    """An effect that comes after the first card has one too, and none when it is gone again."""
+    assert effect_card.traces(registry.CATALOGUE["end_stop"])
+    with put_back():
+        registry.add_files(RIPPLE)
+        assert effect_card.traces(registry.CATALOGUE["chain_ripple"])
+    assert effect_card.traces(registry.CATALOGUE["end_stop"])
 
 
 @pytest.mark.usefixtures("catalogue")
