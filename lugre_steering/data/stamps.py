@@ -70,11 +70,13 @@ def _grid(time: Array) -> Grid | None:
     while True:
         part = elapsed[elapsed <= reach]
         trial = about + np.linspace(-width, width, max(3, 2 * int(np.ceil(4.0 * width * reach)) + 1))
-        first, further = np.exp(2j * np.pi * np.outer([trial[0], trial[1] - trial[0]], part))
-        turns = np.broadcast_to(further, (trial.size - 1, part.size))
-        phases = np.cumprod(np.vstack([first, turns]), axis=0).mean(axis=1)  # one turn further per trial: no exponential of each
-        best = int(np.abs(phases).argmax())
-        about, coherence = float(trial[best]), float(np.abs(phases[best]))
+        turned, further = np.exp(2j * np.pi * np.outer([trial[0], trial[1] - trial[0]], part))
+        coherences = np.empty(trial.size)
+        for i in range(trial.size):
+            coherences[i] = abs(np.add.reduce(turned)) / part.size
+            turned *= further  # one turn further per trial: no exponential of each, and no more memory than that of one
+        best = int(coherences.argmax())
+        about, coherence = float(trial[best]), float(coherences[best])
         if reach >= elapsed[-1]:
             break
         width, reach = 0.5 / reach, min(reach * GROWTH, float(elapsed[-1]))
