@@ -7,10 +7,15 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import pytest
+
+from lugre_steering.data import dataset, stamps
+from lugre_steering.proof import simulator
 
 KEPT = 64
 
@@ -32,3 +37,12 @@ def remembered(pure: Callable[..., Any]) -> Callable[..., Any]:
         return kept[key]
 
     return ask
+
+
+@contextmanager
+def same_signals_once() -> Iterator[None]:
+    """What is found out about single signals, and tracks of the second simulator, once: most tests change one channel of one recording."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in ((dataset, "smooth_angle"), (dataset, "sensed"), (stamps, "sampling_grid"), (simulator, "run_track")):
+            patch.setattr(module, name, remembered(getattr(module, name)))
+        yield

@@ -17,12 +17,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from outside import outside
-from remembering import remembered
+from remembering import same_signals_once
 
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
-from lugre_steering.data import dataset, stamps
 from lugre_steering.data.dataset import prepare
 from lugre_steering.data.offsets import SKEW_RANGE_S
 from lugre_steering.data.quality import inspect
@@ -32,7 +31,6 @@ from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.problem import Problem
-from lugre_steering.proof import simulator
 from lugre_steering.proof.simulator import BagData, Case, Concealed, load_sheet, simulate_case
 from lugre_steering.recording import Finding, Recording, Signal
 from lugre_steering.resources import config_folder
@@ -72,9 +70,7 @@ def recording_of(bag: BagData) -> Recording:
 @pytest.fixture(scope="module", autouse=True)
 def _same_signal_once() -> Iterator[None]:
     """Most faults touch one channel of the same recording: the others need no smoothing again."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module, name in ((dataset, "smooth_angle"), (dataset, "sensed"), (stamps, "sampling_grid"), (simulator, "run_track")):
-            patch.setattr(module, name, remembered(getattr(module, name)))
+    with same_signals_once():
         yield
 
 
