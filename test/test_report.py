@@ -345,7 +345,7 @@ def test_pictures_are_beside_the_page(written: Written) -> None:
 
 
 def test_bags_of_one_name_do_not_overwrite_each_others_pictures(vehicle: Vehicle, tmp_path: Path) -> None:
-    one = missing(vehicle)
+    one = consistent(vehicle)
     same = dataclasses.replace(one, traces=tuple(dataclasses.replace(t, name="run/../x") for t in one.traces))
     pictures = [file for file in write_report(same, tmp_path).files if file.name.startswith("before_after")]
     assert len(set(pictures)) == 2
