@@ -75,7 +75,7 @@ def long_runs():
         rubber=dataclasses.replace(truth.rubber, heat_transfer_W_m2K=22.0),
     )
     runs = [BUILT_IN[name] for name in ("varied-rates", "slow-sweeps", "heat-and-rest")]
-    return truth, calibrate_recordings(coverage.record(truth, runs, 3, 50.0), SHEET)
+    return truth, calibrate_recordings(coverage.record(truth, runs, 3), SHEET)
 
 
 def test_known_truth_is_recovered(long_runs):
