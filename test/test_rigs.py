@@ -386,7 +386,7 @@ def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pas
 def test_intervals_of_what_joints_have_hold_the_truth() -> None:
     """Two joints at random with four values each: with 95 % held, fewer than six of eight are in a draw of 170. 63 % were, and inertias
     were off by 2.5 %, when the acceleration was that of the smoothed angle."""
-    told = [each for seed in (113, 106) for each in joints.judged(seed)[0] if each.value is not None]
+    told = [each for seed in (103, 104) for each in joints.judged(seed)[0] if each.value is not None]
     rows = joints.table(told)
     assert rows["all"]["told"] == 8
     assert rows["all"]["held"] >= 0.75
@@ -395,7 +395,7 @@ def test_intervals_of_what_joints_have_hold_the_truth() -> None:
 
 
 def test_what_is_not_considered_needs_no_average() -> None:
-    joint = joints.drawn(113)
+    joint = joints.drawn(103)
     problem = Problem(joint.sheet, [prepare(joint.recording, joint.sheet)])
     assert as_joint(problem).runs[0].average_s > 0.0
     with leaving_out(["yaw_inertia"]):
