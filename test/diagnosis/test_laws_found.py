@@ -51,8 +51,9 @@ from lugre_steering.recording import Array
 from lugre_steering.simulate.command import load_vehicle
 from lugre_steering.vehicle import save
 
-NOTHING = small_problem(40.0)
-"""At 40 Hz, quick enough for whole searches."""
+RATE_HZ = 25.0
+"""Quick enough for whole searches."""
+NOTHING = small_problem(RATE_HZ)
 QUIET = 0.4
 """Size of something hidden, in noise standard deviations, that does not stand out of the noise."""
 
@@ -86,6 +87,11 @@ def by_run(part: object) -> Array:
     return np.concatenate([part(run) for run in NOTHING.runs])  # type: ignore[operator]
 
 
+def beyond_an_angle() -> Array:
+    """A loss that begins beyond an angle: what many of these tests look at, and is searched once."""
+    return by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0))
+
+
 def test_a_closed_form_is_fitted_as_the_vehicle_file_runs_it() -> None:
     """Also where the vehicle goes beyond the range that the law was seen on: there a straight line goes on."""
     cell = Cell("conservative_torque", Axis("angle"), -0.05, 0.05)
@@ -98,7 +104,7 @@ def test_a_closed_form_is_fitted_as_the_vehicle_file_runs_it() -> None:
 
 
 def test_a_loss_beyond_an_angle_is_found_with_its_place_and_size_and_runs_from_the_vehicle_file() -> None:
-    beyond = by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0))
+    beyond = beyond_an_angle()
     problem, found = searched(beyond)
     assert found is not None
     (entry,) = entries(found)
@@ -190,7 +196,7 @@ def test_a_law_below_the_noise_is_told_by_its_evidence_alone(share: float, verdi
 @pytest.mark.parametrize(("known", "stands"), [("angle", False), ("abs_rate", True)])
 def test_friction_along_what_its_own_law_depends_on_is_no_law_where_nothing_is_loud(known: str, stands: bool) -> None:
     """A loss beyond an angle, however evident: it is the form of the friction law, where that may be another along the angle."""
-    problem, found = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
+    problem, found = searched(beyond_an_angle())
     assert found is not None
     assert entries(found)[0].coordinate == "angle"
     freedom = Freedom("its level along the ground", "friction_level", known, -0.3, 0.3, np.zeros((1, 2)))
@@ -200,11 +206,10 @@ def test_friction_along_what_its_own_law_depends_on_is_no_law_where_nothing_is_l
 @pytest.mark.parametrize(("range_bar", "stands"), [(10.0, True), (400.0, False)])
 def test_what_zeros_of_sensors_may_be_is_no_law(range_bar: float, stands: bool) -> None:
     """A torque that fades within the first seconds, which a function of the power resembles."""
-    sheet = NOTHING.vehicle.replace(sensors=replace(NOTHING.vehicle.sensors, pressure_range_Pa=1e5 * range_bar))
-    fading = by_run(lambda run: 200.0 * np.exp(-(run.time - run.time[0]) / 12.0))
-    problem = Problem(sheet, with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + fading).runs)
-    found = in_what_is_left(problem, fitted(problem))
+    seen, found = searched(by_run(lambda run: 200.0 * np.exp(-(run.time - run.time[0]) / 12.0)))
     assert found is not None
+    sheet = seen.vehicle.replace(sensors=replace(seen.vehicle.sensors, pressure_range_Pa=1e5 * range_bar))
+    problem = Problem(sheet, seen.runs)
     assert evident(named(problem, fitted(problem)), found) == stands
 
 
@@ -245,7 +250,7 @@ def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling(
 
 def wandering_for_seconds(size: int, seed: int) -> Array:
     """Errors (size,) of unit deviation that last two seconds."""
-    slow = lfilter([1.0], [1.0, -np.exp(-1.0 / (2.0 * 40.0))], np.random.default_rng(seed).standard_normal(size))
+    slow = lfilter([1.0], [1.0, -np.exp(-1.0 / (2.0 * RATE_HZ))], np.random.default_rng(seed).standard_normal(size))
     return np.asarray(slow / np.std(slow))
 
 
@@ -274,7 +279,7 @@ def test_a_law_takes_more_than_one_more_of_the_errors_that_are_left(wandering: f
 
 def test_laws_that_tie_are_separated_by_the_next_experiment() -> None:
     """A loss beyond an angle against one at every angle: each differs from the other by the whole of it where the tracks turn fastest."""
-    problem, found = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
+    problem, found = searched(beyond_an_angle())
     assert found is not None
     cell = Cell("viscous_loss", Axis("none"), -1.0, 1.0, 1)
     rival = with_law(found.problem, weight(problem), fitted(problem), free_law(found.problem, cell, 0, np.array([1e3])))
@@ -292,20 +297,19 @@ def test_laws_that_tie_are_separated_by_the_next_experiment() -> None:
     assert "dependence on rate" in alone.separates
 
 
-@pytest.mark.parametrize("beyond", [0.1, None])
-def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(beyond: float | None) -> None:
+@pytest.mark.parametrize("everywhere", [False, True])
+def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(everywhere: bool) -> None:
     """Viscous friction is that name where a loss begins beyond an angle, and is right where it acts everywhere."""
-    where = (lambda theta: theta > beyond) if beyond is not None else np.ones_like
-    problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * where(run.theta), axis=0)))
+    problem, found = searched(by_run(lambda run: 4e3 * np.sum(run.omega, axis=0)) if everywhere else beyond_an_angle())
     assert found is not None
     viscous = named(problem, fitted(problem, effect("viscous_friction", sigma_2=1e3)))
-    assert in_place(viscous, found, None) == (beyond is not None)
+    assert in_place(viscous, found, None) == (not everywhere)
 
 
 @pytest.mark.parametrize(("count", "stands"), [(1, False), (2, False), (12, True)])
 def test_names_win_a_draw_unless_they_are_more_and_have_more_values(count: int, stands: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A law of a few values that takes a twentieth more than names does not stand in the place of two of one value each, but of many."""
-    problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * (run.theta > 0.1), axis=0)))
+    problem, found = searched(beyond_an_angle())
     assert found is not None
     assert len(found.gains) == 1
     assert 2 < len(found.fitted.effects[-1][0].free) <= 12
@@ -319,7 +323,7 @@ def test_names_win_a_draw_unless_they_are_more_and_have_more_values(count: int, 
 @pytest.mark.parametrize("bent", [False, True])
 def test_what_a_name_may_bend_by_is_free_beside_laws_only_where_it_is_asked(bent: bool) -> None:
     """Laws alone have no names that could bend; a name in the place of one of them may, as where it was found."""
-    problem, found = searched(by_run(lambda run: np.sum(run.omega * 4e3 * (run.theta > 0.1), axis=0)))
+    problem, found = searched(beyond_an_angle())
     assert found is not None
     wave = 50.0 * SIGMA * np.sin(np.arange(problem.measured.size) / 300.0)
     waving = with_torque(problem, problem.measured + wave).bent([wave[:, None]])
@@ -366,7 +370,7 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
 
 def test_a_name_that_the_law_makes_superfluous_does_not_stand_beside_it() -> None:
     """A loss beyond an angle, and an offset of one pressure sensor that is not there: fitted beside the law, it is not needed."""
-    problem, alone = searched(by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0)))
+    problem, alone = searched(beyond_an_angle())
     assert alone is not None
     line = fitted(problem, (Candidate(CATALOGUE["pressure_offset"], line="main_a", free=("offset",)), {"offset": 2e4}))
     room = Problem(problem.vehicle, problem.runs, more_laws=2, beside_names=True)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts of the search on small problems whose answer is known: noise, split, late effects, freer shapes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from lugre_steering.diagnosis.conclude import effects, experiment, limits
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import recalibrate
 from lugre_steering.diagnosis.search import compare, propose, search, surely
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE, leaving_out
 from lugre_steering.effects.relief_saturation import CEILINGS
 from lugre_steering.fitting import entries, fingerprint, noise, onset, sheet, split, trial
 from lugre_steering.fitting.doubt import doubt
@@ -28,13 +28,22 @@ from lugre_steering.vehicle import EffectEntry
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
-    return small_problem()
+    return small_problem(50.0)
 
 
 @pytest.fixture(scope="module")
 def slower() -> Problem:
     """The same drive at 40 Hz, for whole searches."""
     return small_problem(40.0)
+
+
+@pytest.fixture
+def few_sought() -> Iterator[None]:
+    """Only what is hidden and what may be taken for it: rounds of them take a fraction of those of the whole catalogue."""
+    like_it = {"line_loss_linear", "viscous_friction", "angle_offset", "moment_arm_error"}
+    few = {"slope_bias", "line_loss_quadratic", "kingpin_jacking", *like_it}
+    with leaving_out(sorted(CATALOGUE.keys() - few)):
+        yield
 
 
 @pytest.mark.parametrize("correlation", [[1.0], [1.0, 0.6, 0.3, 0.1], [1.0, 0.99, -0.99, 0.9]])
@@ -444,6 +453,7 @@ def test_what_stands_is_named_though_as_much_again_is_unlisted(slower: Problem) 
         assert {item.score.candidate.effect.id for item in found.found} == names
 
 
+@pytest.mark.usefixtures("few_sought")
 @pytest.mark.parametrize(("uneven", "names"), [(0.2, ["line_loss_quadratic"]), (0.9, [])])
 def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem, uneven: float, names: list[str]) -> None:
     """Freedoms that can be the loss of each stretch of time by itself: nearly of one law in all, and by far not."""
@@ -457,6 +467,7 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
     assert all(item.in_place for item in found.found)
 
 
+@pytest.mark.usefixtures("few_sought")
 @pytest.mark.parametrize(
     ("uneven", "names", "instead"), [(0.2, ["line_loss_quadratic"], []), (0.3, [], ["line_loss_quadratic"]), (0.5, [], [])]
 )
@@ -800,7 +811,7 @@ def test_two_parts_of_a_law_that_do_the_same_work_are_not_both_dropped(problem: 
     score = Score(plain[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
     result = fit(hidden, weight(hidden), [plain])
     refined = trial.refine(hidden, weight(hidden), trial.Trial(score, result, trial.cost(hidden, result, weight(hidden))))
-    assert refined.cost < 1.02 * hidden.valid.sum()  # without either 1.07
+    assert refined.cost < 1.02 * hidden.valid.sum()  # without either 1.09
     # Where the law is plain, nothing is added to it.
     hidden = with_torque(problem, problem.predict_all(problem.start(), [plain]))
     result = fit(hidden, weight(hidden), [plain])
