@@ -453,16 +453,21 @@ def test_what_stands_is_named_though_as_much_again_is_unlisted(slower: Problem) 
         assert {item.score.candidate.effect.id for item in found.found} == names
 
 
-@pytest.mark.usefixtures("few_sought")
-@pytest.mark.parametrize(("uneven", "names"), [(0.2, ["line_loss_quadratic"]), (0.9, [])])
-def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem, uneven: float, names: list[str]) -> None:
-    """Freedoms that can be the loss of each stretch of time by itself: nearly of one law in all, and by far not."""
+def uneven_loss(slower: Problem, size: float, uneven: float) -> Problem:
+    """A loss that is stronger or weaker by stretches of time, beside freedoms that can be that of each stretch by itself."""
     base = slower.predict_all(slower.start())
-    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=1e5)]) - base
+    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=size)]) - base
     stretch = np.arange(loss.size) * 16 // loss.size
     pieces = np.where(stretch[:, None] == np.arange(16), loss[:, None], 0.0)
     torque = pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))
-    found = searched(replace_bends(with_torque(slower, base + torque), 3.0 * pieces))
+    return replace_bends(with_torque(slower, base + torque), 3.0 * pieces)
+
+
+@pytest.mark.usefixtures("few_sought")
+@pytest.mark.parametrize(("uneven", "names"), [(0.2, ["line_loss_quadratic"]), (0.9, [])])
+def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem, uneven: float, names: list[str]) -> None:
+    """Where it is nearly of one law in all, and by far not."""
+    found = searched(uneven_loss(slower, 1e5, uneven))
     assert [item.score.candidate.effect.id for item in found.found] == names
     assert all(item.in_place for item in found.found)
 
@@ -474,13 +479,8 @@ def test_one_name_stands_for_freedoms_that_it_does_nearly_all_of(slower: Problem
 def test_a_name_that_ties_with_freedoms_is_told_in_their_place(
     slower: Problem, uneven: float, names: list[str], instead: list[str]
 ) -> None:
-    """Of a weak loss that is uneven by stretches: it stands, the data cannot tell it from the freedoms, or these do clearly better."""
-    base = slower.predict_all(slower.start())
-    loss = slower.predict_all(slower.start(), [effect("line_loss_quadratic", c=3e3)]) - base
-    stretch = np.arange(loss.size) * 16 // loss.size
-    pieces = np.where(stretch[:, None] == np.arange(16), loss[:, None], 0.0)
-    torque = pieces @ (1.0 + uneven * np.random.default_rng(7).choice([-1.0, 1.0], 16))
-    found = searched(replace_bends(with_torque(slower, base + torque), 3.0 * pieces))
+    """Of a weak loss: it stands, the data cannot tell it from the freedoms, or these do clearly better."""
+    found = searched(uneven_loss(slower, 3e3, uneven))
     assert [item.score.candidate.effect.id for item in found.found] == names
     assert [trial.candidate.effect.id for trial in found.instead] == instead
 
