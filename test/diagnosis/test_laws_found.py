@@ -92,6 +92,11 @@ def beyond_an_angle() -> Array:
     return by_run(lambda run: np.sum(run.omega * 2e4 * np.maximum(run.theta - 0.1, 0.0), axis=0))
 
 
+def fading() -> Array:
+    """A torque that fades within the first seconds, which a function of the power resembles."""
+    return by_run(lambda run: 200.0 * np.exp(-(run.time - run.time[0]) / 12.0))
+
+
 def test_a_closed_form_is_fitted_as_the_vehicle_file_runs_it() -> None:
     """Also where the vehicle goes beyond the range that the law was seen on: there a straight line goes on."""
     cell = Cell("conservative_torque", Axis("angle"), -0.05, 0.05)
@@ -205,8 +210,8 @@ def test_friction_along_what_its_own_law_depends_on_is_no_law_where_nothing_is_l
 
 @pytest.mark.parametrize(("range_bar", "stands"), [(10.0, True), (400.0, False)])
 def test_what_zeros_of_sensors_may_be_is_no_law(range_bar: float, stands: bool) -> None:
-    """A torque that fades within the first seconds, which a function of the power resembles."""
-    seen, found = searched(by_run(lambda run: 200.0 * np.exp(-(run.time - run.time[0]) / 12.0)))
+    """A torque that fades after the start, as zeros that settle do."""
+    seen, found = searched(fading())
     assert found is not None
     sheet = seen.vehicle.replace(sensors=replace(seen.vehicle.sensors, pressure_range_Pa=1e5 * range_bar))
     problem = Problem(sheet, seen.runs)
@@ -309,7 +314,7 @@ def test_a_law_stands_in_place_of_a_name_that_only_resembles_it(everywhere: bool
 @pytest.mark.parametrize(("count", "stands"), [(1, False), (2, False), (12, True)])
 def test_names_win_a_draw_unless_they_are_more_and_have_more_values(count: int, stands: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A law of a few values that takes a twentieth more than names does not stand in the place of two of one value each, but of many."""
-    problem, found = searched(beyond_an_angle())
+    problem, found = searched(fading())
     assert found is not None
     assert len(found.gains) == 1
     assert 2 < len(found.fitted.effects[-1][0].free) <= 12
