@@ -33,7 +33,7 @@ from lugre_steering.recording import Array
 from lugre_steering.simulate.manoeuvres import Manoeuvre, Sweep
 from lugre_steering.vehicle import Vehicle
 
-NOTHING = small_problem(33.0)
+NOTHING = small_problem(25.0)
 RECORD = NOTHING.model.parameters[0][0]
 
 
@@ -84,7 +84,7 @@ def test_friction_of_another_form_is_explained_by_the_freedoms_and_a_stop_is_not
 @pytest.mark.parametrize("sharpness", [0.6, 1.5])
 def test_presliding_that_yields_by_another_power_is_explained_in_part_strokes_too(sharpness: float) -> None:
     angles = np.cumsum([4.0, -1.5, 3.0, -6.0, 2.0, -4.0, 8.0, -2.0, 5.0, -12.0, 3.0])
-    strokes = small_problem(33.0, Manoeuvre("strokes", "", tuple(Sweep(angle, 3.0, 0.5) for angle in angles)))
+    strokes = small_problem(25.0, Manoeuvre("strokes", "", tuple(Sweep(angle, 3.0, 0.5) for angle in angles)))
     other = np.concatenate([friction(run, sharpness, 0.0, 0.0) - friction(run, 1.0, 0.0, 0.0) for run in strokes.runs])
     assert left_beside_freedoms(strokes, strokes.predict_all(strokes.start()) + other) < 0.2 * FORM_LEFT
 
@@ -142,7 +142,7 @@ def test_what_a_name_must_take_is_what_is_left_until_all_of_it_may_be_the_form()
 
 def error_elsewhere(vehicle: Vehicle) -> float:
     """RMSE [N m] of a vehicle file on strokes that were not recorded, of tracks whose friction has the other form; without noise."""
-    strokes = small_problem(33.0, Manoeuvre("strokes", "", tuple(Sweep(angle, 5.0, 1.0) for angle in (9.0, -3.0, 14.0, -10.0, 12.0, 0.0))))
+    strokes = small_problem(25.0, Manoeuvre("strokes", "", tuple(Sweep(angle, 5.0, 1.0) for angle in (9.0, -3.0, 14.0, -10.0, 12.0, 0.0))))
     other = np.concatenate([friction(run, 1.4, 0.02, 0.02) - friction(run, 1.0, 0.0, 0.0) for run in strokes.runs])
     known = Problem(vehicle, strokes.runs)
     error = strokes.predict_all(strokes.start()) + other - known.predict_all(known.start())
