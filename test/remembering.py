@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lugre_steering.data import dataset, stamps
+from lugre_steering.data import dataset, quality, stamps
 from lugre_steering.proof import simulator
 
 KEPT = 64
@@ -24,10 +24,10 @@ def remembered(pure: Callable[..., Any]) -> Callable[..., Any]:
     """The function with its last results kept by the content of its arguments, arrays included; nobody may write to a result."""
     kept: OrderedDict[bytes, Any] = OrderedDict()
 
-    def ask(*arguments: Any) -> Any:
-        key = hashlib.blake2b(pickle.dumps(arguments, protocol=5), digest_size=16).digest()
+    def ask(*arguments: Any, **named: Any) -> Any:
+        key = hashlib.blake2b(pickle.dumps((arguments, named), protocol=5), digest_size=16).digest()
         if key not in kept:
-            kept[key] = pure(*arguments)
+            kept[key] = pure(*arguments, **named)
             for part in kept[key] if isinstance(kept[key], tuple) else (kept[key],):
                 if isinstance(part, np.ndarray):
                     part.flags.writeable = False
@@ -42,7 +42,8 @@ def remembered(pure: Callable[..., Any]) -> Callable[..., Any]:
 @contextmanager
 def same_signals_once() -> Iterator[None]:
     """What is found out about single signals, and tracks of the second simulator, once: most tests change one channel of one recording."""
+    of_signals = (dataset, "smooth_angle"), (dataset, "sensed"), (dataset, "louder"), (stamps, "sampling_grid"), (quality, "_examine")
     with pytest.MonkeyPatch.context() as patch:
-        for module, name in ((dataset, "smooth_angle"), (dataset, "sensed"), (stamps, "sampling_grid"), (simulator, "run_track")):
+        for module, name in (*of_signals, (simulator, "run_track")):
             patch.setattr(module, name, remembered(getattr(module, name)))
         yield

@@ -14,7 +14,7 @@ import pytest
 
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude import headline
-from lugre_steering.diagnosis.result import Experiment, FittedValue, NamedEffect, Place
+from lugre_steering.diagnosis.result import Experiment, FittedValue, NamedEffect, Place, Unexplained
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.report import words
 from lugre_steering.vehicle import load
@@ -148,10 +148,11 @@ def test_nothing_is_told_to_begin_with_the_first_motion() -> None:
 
 
 def test_other_verdicts_say_the_error_and_what_to_do() -> None:
-    assert headline.consistent(finished(), 100.0, "what is left is noise") == (
-        "No missing physics is seen: recalibrated, the model explains the torque to 100 N m (0.2 % of the torque). "
-        "Use augmented.yaml, the recalibrated vehicle file."
-    )
+    for instead, more in (((), ""), (("backlash",), "What is left is noise. ")):
+        assert headline.consistent(finished(), 100.0, Unexplained(False, "what is left is noise", indistinguishable_from=instead)) == (
+            "No missing physics is seen: recalibrated, the model explains the torque to 100 N m (0.2 % of the torque). "
+            f"{more}Use augmented.yaml, the recalibrated vehicle file."
+        )
     assert "misses 500 N m (1.0 % of the torque)" in headline.unlisted(finished(), 500.0, "it follows the angle")
     assert headline.lawful("a loss (up to 5 N m)", ()).endswith("catalogue is that. Use augmented.yaml, which has it under 'laws'.")
     assert "(nearest: end_stop, which explains less)" in headline.lawful("a loss (up to 5 N m)", ["end_stop"])

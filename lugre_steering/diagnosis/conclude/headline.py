@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.counted import counted
 from lugre_steering.data.dataset import Run
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.result import Experiment, NamedEffect, Place
+from lugre_steering.diagnosis.result import Experiment, NamedEffect, Place, Unexplained
 from lugre_steering.diagnosis.search import locate
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Mask
@@ -76,9 +76,9 @@ def unlisted(done: Finished, error: float, said: str) -> str:
     )
 
 
-def consistent(done: Finished, error: float, left: str) -> str:
+def consistent(done: Finished, error: float, left: Unexplained) -> str:
     """For a model that leaves no physics: ``error`` [N m] on held-out data, and what is ``left``."""
-    more = f" {sentence(left)}" if done.needs_form or done.compared.found.instead else ""
+    more = f" {sentence(left.description)}" if done.needs_form or left.indistinguishable_from else ""
     return (
         f"No missing physics is seen: recalibrated, the model explains the torque to {done.torque(error)} "
         f"({_share(error / done.amplitude)}).{more} Use augmented.yaml, the recalibrated vehicle file."

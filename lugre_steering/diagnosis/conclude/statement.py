@@ -55,7 +55,7 @@ def statement(
     floor = f"Noise alone makes {done.torque(done.noise.floor)}."
     if verdict == "consistent":
         unseen = "From what size on an effect would have shown: detection_limits of diagnosis.json."
-        return headline.consistent(done, judged.before, left.entry.description), " ".join([*_formed(done, form), floor, unseen])
+        return headline.consistent(done, judged.before, left.entry), " ".join([*_formed(done, form), floor, unseen])
     if verdict == "unlisted_physics":
         if law:
             rest = f"{left.text[:1].upper()}{left.text[1:]}."
