@@ -177,8 +177,10 @@ class _Vector:
         return np.concatenate([self.scale, slopes])
 
     def known(self, earlier: Fit, weight: Array) -> int:
-        """How many of the values, from the first on, an earlier fit with the same weight has a linearisation of."""
-        if earlier.x.size != self.nuisances or not np.array_equal(earlier.weight, weight):
+        """How many of the values, from the first on, an earlier fit with the same weight has a linearisation of; none if bends that it
+        knows nothing of have joined its nuisances since."""
+        linearised = earlier.natural.size - sum(len(candidate.free) for candidate, _ in earlier.effects)
+        if not earlier.x.size == linearised == self.nuisances or not np.array_equal(earlier.weight, weight):
             return 0
         shared = self.nuisances
         for (old, _), (new, _) in zip(earlier.effects, self.effects, strict=False):

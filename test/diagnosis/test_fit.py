@@ -79,6 +79,16 @@ def test_a_fit_gone_on_with_ends_where_one_from_the_start_does(problem: Problem)
     assert fit(hidden, weight(hidden), start=stuck).cost == pytest.approx(before.cost, rel=1e-3)
 
 
+def test_a_fit_that_bends_have_joined_since_is_gone_on_with(problem: Problem) -> None:
+    """As where a name was given up whose law could bend: the fit has a place for these bends, and no slope."""
+    wave = 50.0 * np.sin(np.arange(problem.measured.size) / 40.0)
+    earlier, freer = fit(problem, weight(problem)), problem.bent([wave[:, None]])
+    known = replace(earlier, x=np.append(earlier.x, 0.0))
+    gone_on, anew = (fit(freer, weight(problem), start=start) for start in (known, known.x))
+    assert gone_on.cost == pytest.approx(anew.cost, rel=1e-9)
+    assert gone_on.slope.shape[1] == gone_on.x.size
+
+
 def test_the_jacobian_at_the_end_is_that_of_the_end(problem: Problem) -> None:
     """However small the last step was: intervals, screens and onsets are computed from it."""
     trial = [effect("end_stop", engage_angle=0.25, stiffness=5e4)]
