@@ -165,12 +165,12 @@ def tied(
             continue
         if sound and gone_too_far(problem, other.fit.x):
             continue
-        if alike(problem, weight, split, best.fit, other, before, exact=exact):
+        if ties(problem, weight, split, best.fit, other, before, exact=exact):
             found.append(other)
     return found
 
 
-def alike(
+def ties(
     problem: Problem, weight: Array, split: Split, best: Fit, other: Trial, before: float, *, exact: bool = False
 ) -> bool:
     """Whether this data cannot tell another model from the best fit; ``before``: energy without either.

@@ -20,7 +20,6 @@ from lugre_steering.diagnosis.search.compare import (
     SIZES,
     SURE,
     TIE,
-    alike,
     as_far_as_it_may,
     clearest,
     left,
@@ -29,6 +28,7 @@ from lugre_steering.diagnosis.search.compare import (
     settled,
     simplest,
     tied,
+    ties,
     worlds,
 )
 from lugre_steering.diagnosis.search.locate import contribution
@@ -317,7 +317,7 @@ def _as_well_as_form(seen: Sequence[Proposal], weight: Array, split: Split) -> t
     if free is exact or not exact.problem.bends.shape[1]:
         return ()
     believed = [trial for trial in exact.trials if exact.before - trial.cost >= needed(exact.problem, trial.fit, weight)]
-    return tuple(trial for trial in believed if alike(free.problem, weight, split, free.current, trial, exact.before))
+    return tuple(trial for trial in believed if ties(free.problem, weight, split, free.current, trial, exact.before))
 
 
 def _in_place(
