@@ -27,13 +27,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lugre_steering.errors import DataError
+from lugre_steering.given_number import check_number
 from lugre_steering.result import html
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-RATE_LIMIT = 100.0  # rad/s, far beyond any steering: such a rate counts as not given
+RATE_LIMIT = 1000.0  # rad/s, far beyond any joint: such a rate counts as not given
 
 
 AIR_LIMIT_DEGC = 100.0  # no air is warmer or colder: kelvin, or no temperature at all
@@ -63,7 +64,7 @@ class Kind(IntEnum):
 class Channel:
     """One wanted quantity and the topic (relative name) that carries it; ``joint`` selects inside a JointState.
 
-    ``unit``: of an angle, "rad", or "m" of a linear axis. With ``ackermann`` (signed kingpin distance over wheelbase) the topic
+    ``farthest``: largest magnitude of an angle [rad] or position [m]. With ``ackermann`` (signed kingpin distance over wheelbase) the topic
     carries the other track, and this one's angle follows from the steering geometry.
     """
 
@@ -72,7 +73,7 @@ class Channel:
     topic: str
     joint: str = ""
     ackermann: float = 0.0
-    unit: str = "rad"
+    farthest: float = FARTHEST["rad"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +159,7 @@ class Recording:
         air: Samples | None = None,
         name: str = "recording",
         unit: str = "rad",
+        farthest: float | None = None,
     ) -> Recording:
         """A recording made of arrays, for everything that takes a bag.
 
@@ -166,10 +168,14 @@ class Recording:
         ``pressure`` [Pa] as {line: samples}, gauge or absolute as the vehicle file says; ``air`` [degC]. Samples are an array
         (n,), or a pair (time, array) where a sensor has a clock of its own. Samples that are no finite number are left out and
         counted in ``rejected``. ``unit``: "m" where ``angle`` holds positions [m] of a linear axis, ``rate`` speeds [m/s] and ``torque``
-        forces [N]. ``DataError`` for anything that cannot be meant.
+        forces [N]; ``farthest``: largest magnitude that an angle or position can have, where that is more than half a turn or 100 m.
+        ``DataError`` for anything that cannot be meant.
         """
         if unit not in FARTHEST:
             raise DataError(f"unit: got {unit!r}, expected {' or '.join(FARTHEST)}")
+        if farthest is not None:
+            check_number("farthest", farthest, 0.0)
+        angles = FARTHEST[unit] if farthest is None else farthest, unit
         given = {f"angle/{side}": samples for side, samples in _by_side(angle).items()}
         given |= {f"rate/{side}": samples for side, samples in _by_side({} if rate is None else rate).items()}
         lines = {} if pressure is None else pressure
@@ -180,7 +186,7 @@ class Recording:
         clock = _clock(time, "time")
         signals, rejected = {}, {}
         for label, samples in given.items():
-            signals[label], lost = _signal(label, samples, clock, unit)
+            signals[label], lost = _signal(label, samples, clock, angles)
             if lost:
                 rejected[label] = {"not_finite": lost}
         start = min(float(signal.time_s[0]) for signal in signals.values())
@@ -195,7 +201,7 @@ class Recording:
         )  # fmt: skip
 
 
-AXIS = "; unit='m' says that they are positions [m] of a linear axis"
+AXIS = "; unit='m' says that they are positions [m] of a linear axis, farthest= that a joint turns further"
 
 
 def _by_side(samples: BySide) -> Mapping[str, Samples]:
@@ -218,8 +224,8 @@ def _seconds(time: ArrayLike) -> ArrayLike:
     return np.asarray(time) / np.timedelta64(1, "s") if kind == "m" else time
 
 
-def _signal(label: str, samples: Samples, clock: Array, angles_in: str) -> tuple[Signal, int]:
-    """The finite samples of one channel, checked, and how many are left out."""
+def _signal(label: str, samples: Samples, clock: Array, angles: tuple[float, str]) -> tuple[Signal, int]:
+    """The finite samples of one channel, checked, and how many are left out; ``angles``: largest magnitude and unit of these."""
     if isinstance(samples, tuple):
         if len(samples) != 2:
             raise DataError(f"{label}: got {len(samples)} arrays, expected an array or a pair (time, array)")
@@ -230,7 +236,7 @@ def _signal(label: str, samples: Samples, clock: Array, angles_in: str) -> tuple
     finite = np.isfinite(value)
     if not finite.any():
         raise DataError(f"{label}: got no finite sample, expected some")
-    limits = {"angle/": (FARTHEST[angles_in], angles_in), **_LIMITS}
+    limits = {"angle/": angles, **_LIMITS}
     limit, unit = next(bound for kind, bound in limits.items() if label.startswith(kind))
     largest = float(np.abs(value[finite]).max())
     if largest > limit:

@@ -172,6 +172,15 @@ def test_degrees_labelled_as_radians_are_caught(tmp_path: Path) -> None:
     said = refused(tmp_path, table, "  angle/left: {column: a, unit: rad}\n")
     assert "channel angle/left: the unit 'rad' makes it -30 ... 29.99 rad, expected less than a turn" in said
     assert "is the column in deg?" in said
+    assert "'farthest: 40'" in said
+
+
+def test_a_joint_may_turn_as_far_as_its_map_says(tmp_path: Path) -> None:
+    table = csv_of(tmp_path, t=T, a=30.0 * np.sin(T))
+    text = HEAD + "time: {column: t}\nchannels:\n  angle/left: {column: a, unit: rad, farthest: %s}\n"
+    import_table(table, save(tmp_path, "map.yaml", text % 40), tmp_path / "bag")
+    assert "expected up to 20 rad" in refused(tmp_path, table, "  angle/left: {column: a, unit: rad, farthest: 20}\n")
+    assert "farthest': got 7.0, expected an angle in rad or mrad" in refused(tmp_path, table, "  angle/left: {column: a, unit: deg, farthest: 7}\n")
 
 
 @pytest.mark.parametrize(("angle", "rate"), [("rad", "rad/s"), ("deg", "deg/s")])

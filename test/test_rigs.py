@@ -36,6 +36,7 @@ from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.estimator import Estimator
 from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Problem
+from lugre_steering.importing import import_table
 from lugre_steering.recording import Recording, Signal
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
@@ -538,3 +539,40 @@ def test_a_long_stiff_axis_is_read_replayed_and_planned_whole(tmp_path: Path) ->
     axis = Recording.from_arrays(time, angle=6.0 - 6.0 * np.cos(0.5 * time), torque=50.0 * np.sign(np.sin(0.5 * time)), unit="m")
     replayed = replay([axis], vehicle)
     assert replayed.overall.rmse_Nm < 5.0
+
+
+def servo(tmp_path: Path, turns: float) -> tuple[Path, Vehicle]:
+    """Log of a joint that swings by ``turns`` at up to 45 rad/s, and its vehicle."""
+    vehicle = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)
+    far = 2.0 * np.pi * turns
+    time = np.arange(0.0, 12.0, 0.005)
+    angle, rate = far * np.sin(45.0 / far * time), 45.0 * np.cos(45.0 / far * time)
+    rows = np.column_stack([time, angle, 35.0 * np.tanh(rate)])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="t,a,m", comments="")
+    columns = "{angle/left: {column: a, unit: rad, farthest: 40}, measured_torque: {column: m, unit: N m}}"
+    (tmp_path / "map.yaml").write_text(f"schema: lugre_steering/import/1\ntime: {{column: t}}\nchannels: {columns}\n")
+    import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag")
+    return tmp_path / "bag", vehicle
+
+
+def refused(bag: Path, vehicle: Vehicle) -> dict[str, int]:
+    samples = replay(bag, vehicle).json["bags"][0]["samples"]["angle/left"]
+    return {**samples["rejected"], **samples["noted"]}
+
+
+@pytest.mark.parametrize("turns", [0.8, 1.5])
+def test_a_joint_may_turn_as_fast_and_as_far_as_robots_do(tmp_path: Path, turns: float) -> None:
+    """What no track does, rates of 45 rad/s and more than half a turn, is motion of a joint and no fault of its sensor."""
+    bag, vehicle = servo(tmp_path, turns)
+    assert refused(bag, vehicle) == {}
+    assert read_recording(bag, vehicle.channels).rejected == {}
+
+
+def test_a_winch_turns_as_far_as_its_vehicle_file_says(tmp_path: Path) -> None:
+    bag, vehicle = servo(tmp_path, 4.0)
+    assert refused(bag, vehicle)["absurd"] > 500
+    (unit,) = (found for found in inspect(read_recording(bag, vehicle.channels), vehicle).findings if found.finding == "unit_suspect")
+    assert "unless it goes beyond 12.57 rad: then say so (coordinate.farthest)" in unit.statement
+    winch = vehicle.replace(coordinate=dataclasses.replace(vehicle.coordinate, farthest=30.0))
+    assert refused(bag, winch) == {}
+    assert not [found for found in inspect(read_recording(bag, winch.channels), winch).findings if found.finding == "unit_suspect"]

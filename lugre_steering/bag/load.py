@@ -18,7 +18,6 @@ from lugre_steering.counted import counted
 from lugre_steering.errors import BagError
 from lugre_steering.recording import (
     AIR_LIMIT_DEGC,
-    FARTHEST,
     RATE_LIMIT,
     Array,
     Channel,
@@ -229,7 +228,7 @@ def _usable(
             reasons[reason] += int(bad.sum())
             use = use[~bad]
 
-    low, high = (-FARTHEST[channel.unit], FARTHEST[channel.unit]) if channel.kind is Kind.ANGLE else LIMITS[channel.kind]
+    low, high = (-channel.farthest, channel.farthest) if channel.kind is Kind.ANGLE else LIMITS[channel.kind]
     reject("zero_stamp", stamp[use] <= 0)
     reject("not_finite", ~np.isfinite(value[use]))
     reject("absurd", (value[use] < low) | (value[use] > high))

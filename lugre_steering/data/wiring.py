@@ -167,8 +167,10 @@ def _angle_unit(recording: Recording, vehicle: Vehicle) -> Faults:
     wrong = list(dict.fromkeys(wrong))
     if not wrong:
         return ()
-    far = words(vehicle, "far beyond any steering angle")
+    far = words(vehicle, "far beyond any steering angle" if vehicle.contact is None else "beyond what the vehicle file allows")
     statement = f"{' and '.join(wrong)}: {far}; probably in {unit} (multiply by {factor:.6g})"
+    if vehicle.contact is not None:
+        statement += f", unless it goes beyond {vehicle.farthest:.4g} {vehicle.coordinate.unit}: then say so (coordinate.farthest)"
     return (_Fault("unit_suspect", tuple(wrong), statement),)
 
 

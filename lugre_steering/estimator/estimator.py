@@ -42,12 +42,13 @@ from lugre_steering.estimator.rate import TRUST
 from lugre_steering.estimator.residual import form_residuals
 from lugre_steering.estimator.torque import advance
 from lugre_steering.given_number import check_number
-from lugre_steering.recording import FARTHEST, Array, IntArray, Kind
+from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle, vehicle_of
 from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
 from lugre_steering.vehicle.model import Model, build_model
 from lugre_steering.vehicle.sensors import delay_s, lag_s
+from lugre_steering.vehicle.size import fastest
 
 RUBBER_DEGC = (-80.0, 150.0)
 LINE_RING = 8192
@@ -68,7 +69,7 @@ class Options:
     max_gap_s: float = quantity(0.001, 60.0, default=0.25)
     backward_jump_s: float = quantity(0.1, 1e6, default=2.0)
     forward_jump_s: float = quantity(0.1, 1e6, default=10.0)
-    max_rate_rad_s: float = quantity(0.01, 1e3, default=10.0)
+    max_rate_rad_s: float = quantity(0.0, 1e3, default=0.0)  # 0: what no machine of its kind reaches (``vehicle.size.fastest``)
     feed_forward_horizon_s: float = quantity(0.0, 5.0, default=0.0)
     feed_forward_limit_Nm: float = quantity(0.0, 1e9, default=0.0)  # of each side; 0: LIMIT_STATIC times static friction
     feed_forward_rate_limit_Nm_s: float = quantity(0.0, 1e12, default=0.0)  # 0: what the bristle's stiffness makes of LIMIT_RATE
@@ -202,15 +203,14 @@ class Estimator:
             raise DataError(f"{stamp_ns.size} times and angles of shape {theta.shape}; expected an angle of each side at each time")
         if stamp_ns.size > PLAN_POINTS:
             raise DataError(f"more than {PLAN_POINTS} points")
-        farthest = FARTHEST[self.vehicle.coordinate.unit]
+        farthest = self.vehicle.farthest
         if not (np.abs(theta) <= farthest).all():  # nan is refused too
             bounds = "-pi to pi" if farthest == math.pi else f"{-farthest:g} to {farthest:g}"
             raise DataError(f"an angle that is not a number from {bounds}")
         if (np.diff(stamp_ns) <= 0).any():
             raise DataError("points that are not in order of time")
-        faster = np.abs(np.diff(theta)) > self.options.max_rate_rad_s * np.diff(stamp_ns) * 1e-9
-        if faster.any():
-            raise DataError(f"faster than {self.options.max_rate_rad_s:g} rad/s")
+        if (np.abs(np.diff(theta)) > self._fastest * np.diff(stamp_ns) * 1e-9).any():
+            raise DataError(f"faster than {self._fastest:g} rad/s")
         if stamp_ns.size and self._away(stamp_ns, theta):
             raise DataError(f"more than {self.options.plan_tolerance_rad:g} rad from the present angle")
         self._core.plan_ns[: stamp_ns.size] = stamp_ns
@@ -225,12 +225,17 @@ class Estimator:
         newest_ns = max(int(self._core.channels[i]["last_ns"]) for i in range(len(self.vehicle.sides)))
         self._core.config[0]["plan_refused_ns"] = max(1, newest_ns)
 
+    @property
+    def _fastest(self) -> float:
+        """Rate [rad/s] beyond which a change of an angle is a spike."""
+        return float(self._core.config[0]["max_rate"])
+
     def _away(self, stamp_ns: IntArray, theta: Array) -> bool:
         """Whether a plan, at the newest angle's stamp or where it begins later, cannot be gone to from there."""
         for channel, angles in zip(self._core.channels, theta, strict=False):
             now_ns = int(channel["last_ns"])
             if now_ns and now_ns <= stamp_ns[-1]:
-                reach = self.options.plan_tolerance_rad + self.options.max_rate_rad_s * max(0.0, (stamp_ns[0] - now_ns) * 1e-9)
+                reach = self.options.plan_tolerance_rad + self._fastest * max(0.0, (stamp_ns[0] - now_ns) * 1e-9)
                 since = (stamp_ns - stamp_ns[0]) * 1e-9
                 planned = np.interp((now_ns - stamp_ns[0]) * 1e-9, since, angles)
                 if abs(planned - channel["last_value"]) > reach:
@@ -309,7 +314,7 @@ class Estimator:
 
     def set_options(self, options: Options) -> None:
         """Go on with other options."""
-        _set_options(self._core.config, self._parameters, options)
+        _set_options(self._core.config, self._parameters, options, self.vehicle)
         self.options = options
 
     @property
@@ -364,11 +369,11 @@ def _label(kind: Kind, name: str) -> str:
     return {Kind.ANGLE: f"angle/{name}", Kind.PRESSURE: f"pressure/{name}"}.get(kind, kind.name.lower())
 
 
-def _set_options(config: Records, parameters: Records, options: Options) -> None:
+def _set_options(config: Records, parameters: Records, options: Options, vehicle: Vehicle) -> None:
     """Write the options as the compiled loop reads them."""
     for name in ("pair_tolerance", "max_gap", "backward_jump", "forward_jump"):
         config[f"{name}_ns"] = round(getattr(options, f"{name}_s") * 1e9)
-    config["max_rate"] = options.max_rate_rad_s
+    config["max_rate"] = options.max_rate_rad_s or fastest(vehicle)
     config["horizon"] = options.feed_forward_horizon_s
     config["limit"] = options.feed_forward_limit_Nm or LIMIT_STATIC * parameters["static_torque"].max()
     config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * parameters["sigma_0"].max()
@@ -387,7 +392,7 @@ def _side_ratio(vehicle: Vehicle) -> float:
 def _config(vehicle: Vehicle, model: Model) -> Records:
     """What the compiled loop needs to know of the vehicle, but for the options."""
     config = np.zeros(1, CONFIG)
-    config["max_angle"] = FARTHEST[vehicle.coordinate.unit]
+    config["max_angle"] = vehicle.farthest
     config["pressure_range"], config["max_pressure"] = vehicle.sensors.pressure_range_Pa, 4.0 * vehicle.sensors.pressure_range_Pa
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
@@ -439,7 +444,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
     composition = model.composition
     sides = len(vehicle.sides)
     config, parameters = _config(vehicle, model), np.concatenate(model.parameters)
-    _set_options(config, parameters, options)
+    _set_options(config, parameters, options, vehicle)
     channels, lines = _channel_rows(vehicle)
     geometry, areas, line_index = _cylinders(vehicle)
     line_parameters = model.lines if vehicle.hydraulics is not None else np.zeros(lines, composition.lines)

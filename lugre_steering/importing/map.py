@@ -39,6 +39,9 @@ READABLE_UNITS: Mapping[str, tuple[str, float, float]] = {
 }  # fmt: skip
 """Unit -> dimension, factor and constant that give SI (temperatures: degC)."""
 
+RADIANS = ("rad", "mrad")
+"""Units of angles that would hide degrees: these must not turn further than a turn, or than the map says."""
+
 WAYS = ("column", "polynomial", "expression", "cylinder", "pivots")
 """How a channel may come from the table."""
 CLOCK_WAYS = ("column", "expression", "rate_Hz")
@@ -132,7 +135,8 @@ class Source:
     column: value = scale * (scalar named by scale_by) * column + offset, in ``unit``;
     polynomial: value = c0 + c1 x + c2 x**2 + ... in ``unit``, x the column ``of`` as recorded;
     expression: a formula of columns and single numbers as recorded, in ``unit``;
-    cylinder: torque from pressures; pivots: angle from a stroke.
+    cylinder: torque from pressures; pivots: angle from a stroke. ``farthest``: largest magnitude of an angle [rad] in rad or mrad whose
+    joint turns further than a turn.
     """
 
     unit: str | None = None
@@ -145,6 +149,7 @@ class Source:
     expression: str | None = None
     cylinder: CylinderForce | None = None
     pivots: Pivots | None = None
+    farthest: float | None = positive(1e6, default=None)
     time: Clock | None = None
 
 
@@ -279,6 +284,8 @@ def _check_channel(found: ImportMap, reader: Reader, name: str, source: Source) 
         raise reader.fail(f"{key}.polynomial", [], "at least one coefficient")
     if source.column is None and (source.scale, source.scale_by, source.offset) != (1.0, None, 0.0):
         raise reader.fail(f"{key}.scale", source.scale, "scale, scale_by and offset beside 'column' only")
+    if source.farthest is not None and (kind != "angle" or source.unit not in RADIANS):
+        raise reader.fail(f"{key}.farthest", source.farthest, f"an angle in {' or '.join(RADIANS)}")
     if source.time is not None:
         _check_clock(reader, f"{key}.time", source.time)
     if kind == "rate":

@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.channels import Imported
-from lugre_steering.importing.map import ImportMap
+from lugre_steering.importing.map import RADIANS, ImportMap
 from lugre_steering.recording import Array
 
 DEGREES = 180.0 / math.pi
@@ -33,11 +33,14 @@ def check_units(file: Path, mapping: ImportMap, channels: Mapping[str, Imported]
     angles = {name: channel for name, channel in channels.items() if channel.unit == "rad"}
     for name, channel in angles.items():
         low, high = _range(channel.value)
-        unit = mapping.channels[name].unit
-        if unit in ("rad", "mrad") and (high - low > 2.0 * math.pi or max(-low, high) > 2.0 * math.pi):
+        unit, farthest = mapping.channels[name].unit, mapping.channels[name].farthest
+        too_far = high - low > 2.0 * math.pi or max(-low, high) > 2.0 * math.pi if farthest is None else max(-low, high) > farthest
+        if unit in RADIANS and too_far:
+            expected = "less than a turn (6.28 rad)" if farthest is None else f"up to {farthest:g} rad"
             raise MapFileError(
                 f"{file}: channel {name}: the unit '{unit}' makes it {low:.4g} ... {high:.4g} rad, "
-                "expected less than a turn (6.28 rad); is the column in deg?"
+                f"expected {expected}; is the column in deg? A joint that turns further says so in its channel: "
+                f"'farthest: {_ceiling(low, high):g}'"
             )
         if channel.rate is not None and (ratio := _ratio(*_moved(channel))) is not None:
             _refuse_degrees(file, name, f"rate/{name.removeprefix('angle/')}", ratio)
@@ -69,6 +72,13 @@ def doubts(mapping: ImportMap, channel: Imported, others: Iterable[Imported]) ->
     elif channel.unit == "degC" and not _AIR_DEGC[0] <= low <= high <= _AIR_DEGC[1]:
         found.append(f"{low:.3g} ... {high:.3g} degC: is the unit {unit}?")
     return found
+
+
+def _ceiling(low: float, high: float) -> float:
+    """A round number above both magnitudes."""
+    most = max(-low, high)
+    unit = 10.0 ** math.floor(math.log10(most))
+    return unit * math.ceil(1.1 * most / unit)
 
 
 def _range(value: Array) -> tuple[float, float]:

@@ -5,19 +5,22 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
-from lugre_steering.effects.entry import Effect
+from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
+from lugre_steering.vehicle.size import Size
 
 OF_CYLINDERS = frozenset({"arm", "line"})
 """Hooks that nothing reads where the torque itself is measured."""
-
+_OTHER = {"rad": Size(torque=10.0), "m": Size(torque=10.0, angle=7.0)}
+"""Sizes unlike a vehicle's, by the unit of the coordinate: what they change has a size."""
 
 Fail = Callable[[str, object, str], LugreSteeringError]
 """Makes the error of a key, its value and what was expected."""
@@ -65,9 +68,18 @@ def _check_machine(vehicle: Vehicle, effect: Effect, fail: Fail) -> None:
         raise fail("id", effect.id, "a vehicle with the section 'hydraulics', whose cylinders have arms and lines")
 
 
+def _range(vehicle: Vehicle, parameter: Parameter) -> tuple[float, float]:
+    """What a value may be. Of what has the size of a machine that is no vehicle only the sign is known beforehand."""
+    low, high = parameter.low, parameter.high
+    if vehicle.contact is None or _OTHER[vehicle.coordinate.unit].of(parameter.unit) == 1.0:
+        return low, high
+    least = -math.inf if low < 0.0 else 0.0 if low == 0.0 else sys.float_info.min
+    return least, math.inf if high > 0.0 else 0.0
+
+
 def _check_values(vehicle: Vehicle, effect: Effect, values: Mapping[str, float], fail: Fail) -> None:
     """Whether parameters, or values by line, are those of the effect, inside their ranges, and all that it needs."""
-    ranges = {p.name: (p.low, p.high) for p in effect.parameters}
+    ranges = {p.name: _range(vehicle, p) for p in effect.parameters}
     if effect.per_line:
         ranges = dict.fromkeys(vehicle.hydraulics.lines if vehicle.hydraulics else (), next(iter(ranges.values())))
     for name, value in values.items():

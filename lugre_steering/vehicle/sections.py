@@ -16,11 +16,13 @@ from typing import Any
 
 from lugre_steering.chain.rates import RATE_TIME_CONSTANT_S
 from lugre_steering.effects.law_entry import LawEntry
-from lugre_steering.recording import Channel, Kind
+from lugre_steering.recording import FARTHEST, Channel, Kind
 from lugre_steering.result import html
 from lugre_steering.schema import positive, quantity
 
 SIDES = ("left", "right")
+FARTHEST_OF_JOINT = 4.0 * math.pi
+"""Largest magnitude [rad] that the angle of a single joint can have: two turns either way, as of most robots."""
 
 
 @dataclass(frozen=True)
@@ -287,6 +289,8 @@ class Coordinate:
     """`rad`, or `m` for a linear axis."""
     force_unit: str = "N m"
     """`N m`, or `N` for a linear axis."""
+    farthest: float | None = positive(1e6, default=None)
+    """Largest magnitude of angle [rad] or position [m]; left out: half a turn of a track, two of a joint, 100 m."""
 
 
 @dataclass(frozen=True)
@@ -362,6 +366,12 @@ class Vehicle:
     provenance: dict[str, Any] = field(default_factory=dict)
     """Where a written file comes from; not read."""
 
+    @property
+    def farthest(self) -> float:
+        """Largest magnitude of an angle [rad] or position [m]: what is beyond comes in another unit."""
+        usual = FARTHEST_OF_JOINT if self.contact is not None and self.coordinate.unit == "rad" else FARTHEST[self.coordinate.unit]
+        return usual if self.coordinate.farthest is None else self.coordinate.farthest
+
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """Every input this vehicle listens to, in the order the compiled loop numbers them."""
@@ -380,7 +390,7 @@ class Vehicle:
         if sensor != side:
             assert self.axle is not None  # checked when the file was read
             ratio = self.axle.kingpin_distance_m / self.axle.wheelbase_m * (1.0 if sensor == "left" else -1.0)
-        return Channel(Kind.ANGLE, side, getattr(self.topics, sensor), getattr(self.topics, f"{sensor}_joint"), ratio, self.coordinate.unit)
+        return Channel(Kind.ANGLE, side, getattr(self.topics, sensor), getattr(self.topics, f"{sensor}_joint"), ratio, self.farthest)
 
     def __repr__(self) -> str:
         about = "; ".join(f"{row['what']}: {row['is']}" for row in self._rows())

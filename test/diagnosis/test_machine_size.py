@@ -59,7 +59,10 @@ def measured() -> dict[str, Signal]:
 def answer(measured: dict[str, Signal], torque: float, length: float) -> dict[str, Any]:
     position = Signal(measured["left"].time_s, measured["left"].value * length)
     force = Signal(measured["torque"].time_s, measured["torque"].value * torque)
-    done = diagnose_recordings([Recording("axis", 0, {"left": position}, {}, measured_torque=force)], axis(torque, length)).json
+    diagnosis = diagnose_recordings([Recording("axis", 0, {"left": position}, {}, measured_torque=force)], axis(torque, length))
+    reread = vehicle_file.from_mapping(vehicle_file.to_mapping(diagnosis.augmented.vehicle), Path("augmented.yaml"))
+    assert reread.effects == diagnosis.augmented.vehicle.effects
+    done = diagnosis.json
     relative = {
         f"{effect['id']}.{name}": number["value"] / (torque ** POWERS[p.unit][0] * length ** POWERS[p.unit][1])
         for effect in done["effects"]
