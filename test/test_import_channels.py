@@ -180,7 +180,8 @@ def test_a_joint_may_turn_as_far_as_its_map_says(tmp_path: Path) -> None:
     text = HEAD + "time: {column: t}\nchannels:\n  angle/left: {column: a, unit: rad, farthest: %s}\n"
     import_table(table, save(tmp_path, "map.yaml", text % 40), tmp_path / "bag")
     assert "expected up to 20 rad" in refused(tmp_path, table, "  angle/left: {column: a, unit: rad, farthest: 20}\n")
-    assert "farthest': got 7.0, expected an angle in rad or mrad" in refused(tmp_path, table, "  angle/left: {column: a, unit: deg, farthest: 7}\n")
+    said = refused(tmp_path, table, "  angle/left: {column: a, unit: deg, farthest: 7}\n")
+    assert "farthest': got 7.0, expected an angle in rad or mrad" in said
 
 
 @pytest.mark.parametrize(("angle", "rate"), [("rad", "rad/s"), ("deg", "deg/s")])
