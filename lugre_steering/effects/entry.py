@@ -42,6 +42,8 @@ class Parameter:
     relative_to: str = ""
     optional: bool = False
     """Refinement of the shape: zero (or as the vehicle sheet has it) in the screen, fitted only once the effect is accepted."""
+    far_turning: bool = False
+    """Sought on a single joint that turns so far that it is something else than a constant torque; otherwise it is none."""
     example: float | None = None
     """A value at which it acts in an ordinary double cycle, where ``scale`` would leave it idle."""
     pull: float = 0.0

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy import stats
@@ -24,6 +25,8 @@ from lugre_steering.fitting.problem import Candidate, Problem, Values, in_thread
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
+FAR = 0.05
+"""What sine and cosine of the angles must leave of a constant, root mean square, for gravity to be something else than one."""
 LATE = (0.3, 0.45, 0.6)
 """Shares of the longest recording at which an effect that begins late is tried."""
 
@@ -80,10 +83,11 @@ def possible(vehicle: Vehicle, effect: Effect) -> bool:
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
+    far = _turns_far(problem)
     for effect in CATALOGUE.values():
         if not effect.observable or effect.id in without or not possible(problem.vehicle, effect):
             continue
-        effect = resized(effect, problem.size)
+        effect = resized(effect if far else _near(effect), problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
             for shapes in _suggested(effect, effect.variants, _seen(problem)):
@@ -101,6 +105,23 @@ def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]
             ]
             found += [Candidate(effect, shapes, free=free) for shapes in itertools.product(*grids)]
     return found
+
+
+def _turns_far(problem: Problem) -> bool:
+    """Whether a joint turns so far that the sine and the cosine of its angle do not make up for a constant."""
+    if not is_rig(problem.vehicle) or problem.vehicle.coordinate.unit != "rad":
+        return False
+    theta = np.concatenate([run.theta[0] for run in problem.runs])
+    both = np.column_stack([np.sin(theta), np.cos(theta)])
+    rest = 1.0 - both @ np.linalg.lstsq(both, np.ones(theta.size), rcond=None)[0]
+    return bool(np.sqrt(np.mean(rest**2)) > FAR)
+
+
+@cache  # candidates are compared by their entries
+def _near(effect: Effect) -> Effect:
+    """An entry without what only joints that turn far show."""
+    kept = tuple(p for p in effect.parameters if not p.far_turning)
+    return effect if len(kept) == len(effect.parameters) else replace(effect, parameters=kept)
 
 
 def _suggested(effect: Effect, variants: Callable[[Seen], Sequence[Variant]], seen: Seen) -> list[Variant]:

@@ -68,7 +68,8 @@ def placed(problem: Problem, weight: Array, result: Fit, index: int, ends: Mappi
         best, step = min([*places, values[name]], key=here), float(np.max(np.diff(places)))
         grid, step = np.linspace(best - step, best + step, INSTANTS + 1, retstep=True)
         best = min([best, *grid], key=here)
-        near = minimize_scalar(here, bounds=(best - step, best + step), method="bounded", options={"xatol": 0.1 * step})
+        with np.errstate(invalid="ignore"):  # past the other end it is infinite, and no parabola goes through that
+            near = minimize_scalar(here, bounds=(best - step, best + step), method="bounded", options={"xatol": 0.1 * step})
         values[name] = min([best, float(near.x)], key=here)
     return values
 

@@ -16,8 +16,8 @@ from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fingerprint import Score, candidates, screen
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
-from lugre_steering.fitting.problem import Candidate, Problem, Values
-from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, cost, refine
+from lugre_steering.fitting.problem import Candidate, Effects, Problem, Values
+from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, cost, refine, without_part
 from lugre_steering.recording import Array
 
 LEAST, SHARE, SURE = 0.05, 0.02, 0.3
@@ -33,14 +33,18 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> lis
     least, terms = _least(problem, baseline, weight), _terms(problem, baseline)
     full = fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
     problem = problem.doubted(doubt(problem, full, weight), problem.typical)
+    while full.effects:
+        rests = [*_fewer(full.effects).values(), *_less(full.effects)]
+        leaner = min((fitted(problem, weight, rest, full) for rest in rests), key=lambda each: cost(problem, each, weight))
+        if cost(problem, leaner, weight) - cost(problem, full, weight) > least:
+            break
+        full = leaner
     order: list[Candidate] = []  # what can be spared first comes last
     while full.effects:
-        rests = [[e for i, e in enumerate(full.effects) if i != index] for index in range(len(full.effects))]
-        leaner = [fitted(problem, weight, rest, full) for rest in rests]
-        index = min(range(len(leaner)), key=lambda i: cost(problem, leaner[i], weight))
-        if order or cost(problem, leaner[index], weight) - cost(problem, full, weight) > least:
-            order.insert(0, full.effects[index][0])
-        full = leaner[index]
+        rest = {index: fitted(problem, weight, others, full) for index, others in _fewer(full.effects).items()}
+        index = min(rest, key=lambda i: cost(problem, rest[i], weight))
+        order.insert(0, full.effects[index][0])
+        full = rest[index]
     found: list[tuple[Fit, Score]] = []
     current = baseline
     for candidate in order:
@@ -71,6 +75,18 @@ def wanted(problem: Problem, noise: Noise, weight: Array, current: Fit) -> Itera
         if cost(problem, current, weight) - cost(problem, richer, weight) > least:
             current = richer
             yield richer, score
+
+
+def _fewer(effects: Effects) -> dict[int, Effects]:
+    """The effects without one of them, by which that is."""
+    return {index: [effect for i, effect in enumerate(effects) if i != index] for index in range(len(effects))}
+
+
+def _less(effects: Effects) -> Iterator[Effects]:
+    """The effects, one of which lacks one of several parts: a constant torque does for the cosine of angles that hardly change it."""
+    for index, (candidate, _) in enumerate(effects):
+        parts = [name for name in candidate.free if name in candidate.effect.amplitudes]
+        yield from (without_part(effects, index, part) for part in parts if len(parts) > 1)
 
 
 def _terms(problem: Problem, current: Fit) -> list[Candidate]:

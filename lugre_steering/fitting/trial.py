@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.fitting import onset
 from lugre_steering.fitting.fingerprint import Score
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Candidate, Problem, Values
+from lugre_steering.fitting.problem import Candidate, Effects, Problem, Values
 from lugre_steering.recording import Array
 
 RETIMED = 2
@@ -251,6 +251,14 @@ def _weak(result: Fit, values: Values, optional: Sequence[str], doubt: float) ->
     fitted = result.effects[-1][1]
     moved = {n: abs(fitted[n] - values.get(n, 0.0)) / max(float(sd), 1e-300) for n, sd in zip(optional, deviation, strict=True)}
     return sorted((name for name in optional if moved[name] < SURE_SIGMA), key=moved.__getitem__)
+
+
+def without_part(effects: Effects, index: int, part: str) -> Effects:
+    """The effects, one of which lacks a part."""
+    candidate, values = effects[index]
+    free = tuple(name for name in candidate.free if name != part)
+    leaner = replace(candidate, free=free), {name: value for name, value in values.items() if name != part}
+    return [*effects[:index], leaner, *effects[index + 1 :]]
 
 
 def _without(problem: Problem, weight: Array, result: Fit, values: Values, dropped: Sequence[str]) -> Fit:

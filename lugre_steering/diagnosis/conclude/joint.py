@@ -15,7 +15,7 @@ from lugre_steering.diagnosis.investigate import NULL_DRAWS
 from lugre_steering.diagnosis.laws.find import FoundLaws
 from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.diagnosis.search.search import Found
-from lugre_steering.diagnosis.search.surely import least_sure_name, least_sure_part, without_part
+from lugre_steering.diagnosis.search.surely import least_sure_name, least_sure_part
 from lugre_steering.diagnosis.verify import Judged, verify
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.doubt import in_doubt
@@ -24,6 +24,7 @@ from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import Split
+from lugre_steering.fitting.trial import without_part
 from lugre_steering.recording import Array
 
 ROUNDS = 2

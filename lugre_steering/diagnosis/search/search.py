@@ -33,7 +33,7 @@ from lugre_steering.diagnosis.search.compare import (
 )
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal, closer, in_its_place, proposed
-from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviations, least_sure_part, without_part
+from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviations, least_sure_part
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
@@ -44,7 +44,7 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine, without_part
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3

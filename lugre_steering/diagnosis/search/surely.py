@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from lugre_steering.diagnosis.search.compare import END, NAME_TAKEN
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.fitting.doubt import NORMAL
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Effects, Problem
+from lugre_steering.fitting.problem import Problem
 from lugre_steering.fitting.split import BLOCK_S, CLUSTER_S, Split
 from lugre_steering.fitting.trial import SURE_SIGMA
 from lugre_steering.recording import Array
@@ -61,14 +60,10 @@ def in_deviations(problem: Problem, weight: Array, roles: Split, fitted: Fit, in
 
 
 def least_sure_part(problem: Problem, weight: Array, roles: Split, fitted: Fit, terms: Iterable[int]) -> tuple[int, str] | None:
-    """Which of these ``terms`` of a fit has which optional part that may as well be nothing: the least sure. What is kept by chance takes
-    as much from the term itself."""
-    unsure = [
-        (size, i, name)
-        for i in terms
-        for name, size in in_deviations(problem, weight, roles, fitted, i).items()
-        if size < SURE_SIGMA and fitted.effects[i][0].parameter(name).optional
-    ]
+    """Which of these ``terms`` of a fit has which part, one of several, that may as well be nothing: the least sure. What is kept by chance
+    takes as much from the term itself."""
+    parts = [(i, in_deviations(problem, weight, roles, fitted, i)) for i in terms]
+    unsure = [(size, i, name) for i, own in parts for name, size in own.items() if size < SURE_SIGMA and len(own) > 1]
     return min(unsure)[1:] if unsure else None
 
 
@@ -77,14 +72,6 @@ def least_sure_name(problem: Problem, weight: Array, roles: Split, fitted: Fit, 
     sizes = [max(in_deviations(problem, weight, roles, fitted, i).values(), default=np.inf) for i in range(names)]
     least = int(np.argmin(sizes)) if names > 1 else 0
     return least if names > 1 and sizes[least] < SURE_OF_SIZE else None
-
-
-def without_part(effects: Effects, index: int, part: str) -> Effects:
-    """The effects, one of which lacks an optional part."""
-    candidate, values = effects[index]
-    free = tuple(name for name in candidate.free if name != part)
-    leaner = replace(candidate, free=free), {name: value for name, value in values.items() if name != part}
-    return [*effects[:index], leaner, *effects[index + 1 :]]
 
 
 def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> bool:
