@@ -23,6 +23,8 @@ RATE_TIME_CONSTANT_S = 0.04
 USUAL_ACCELERATION_RAD_S2 = 0.11
 """Noise of the rate falls with the filter time, its lag grows with the acceleration: cleaner sensors get a faster filter,
 sqrt(sigma / acceleration), up to RATE_TIME_CONSTANT_S."""
+SETTLING, STANDING = 4.0, 10.0
+"""Time constants of that filter after which the rate is known, and for how many motion is remembered."""
 NO_RATE_RAD_S = 1e-7
 """Rate that counts as none."""
 PROGRESS_TIME_CONSTANT_S = 0.05
@@ -31,13 +33,15 @@ GIVE_BACK = 0.5
 
 MOTION = np.dtype(
     [
-        ("started", np.float64),
+        ("age", np.float64),  # time since the first sample, and a second more [s]; 0: there was none
         ("center", np.float64),  # output of the plain play operator [rad]
         ("lead", np.float64),  # lag compensation in use [rad]
         ("progress", np.float64),  # low-passed speed of the play output [rad/s]
         ("theta", np.float64),  # estimated angle [rad]
         ("omega", np.float64),  # estimated rate [rad/s]
         ("alpha", np.float64),  # estimated acceleration [rad/s2]
+        ("held", np.float64, 3),  # angle, rate and acceleration of the filter that holds the acceleration [rad, rad/s, rad/s2]
+        ("way", np.float64),  # of the play of late, in the memory of that filter [rad]
     ]
 )
 
@@ -52,16 +56,15 @@ def running_maximum_excess(kappa):
 
 
 @inner
-def follow(s, dt, measured, measured_rate, sigma, acceleration_unit):
+def follow(s, dt, measured, measured_rate, sigma, acceleration_unit, accelerates):
     """Advance the motion state ``s`` by one sample: angle [rad] after ``dt`` [s], its noise ``sigma`` [rad] (0: none).
 
     ``measured_rate`` [rad/s] is used instead of the differentiated angle when it is a number; ``acceleration_unit`` is the size of
-    its accelerations.
+    its accelerations. Where it ``accelerates``, the rate comes from a filter that is not late for that.
     """
-    if s.started == 0.0:
-        s.started = 1.0
-        s.center = measured
-        s.theta = measured
+    if s.age == 0.0:
+        s.age = 1.0
+        s.center = s.theta = s.held[0] = measured
         return
     half_width = WIDTH_SIGMA * sigma
     offset = measured - s.center
@@ -82,10 +85,36 @@ def follow(s, dt, measured, measured_rate, sigma, acceleration_unit):
         step = moved + lead
     s.theta += step
 
+    s.age += dt
+    seen = s.age - 1.0
     rate = step / dt if math.isnan(measured_rate) else measured_rate
-    gain = dt / (min(RATE_TIME_CONSTANT_S, math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * acceleration_unit))) + dt)
-    change = (rate - s.omega) * gain
+    chosen = math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * acceleration_unit))
+    smoothing = min(RATE_TIME_CONSTANT_S, chosen)
+    s.way = s.way * math.exp(-dt / (STANDING * (chosen + dt))) + abs(moved)
+    if accelerates and math.isnan(measured_rate) and seen > SETTLING * (chosen + dt):
+        _hold_acceleration(s.held, dt, measured, chosen)
+        s.omega, s.alpha = s.held[1], s.held[2]
+        if s.way <= half_width:  # chance may move the play, but not so far
+            s.omega, s.alpha = s.progress if abs(s.progress) >= NO_RATE_RAD_S * acceleration_unit else 0.0, 0.0
+        return
+    gain = dt / (smoothing + dt)
+    # It may have moved before the first sample: the rate begins as the mean of what there is, and to find it is no acceleration.
+    change = (rate - s.omega) * max(gain, min(1.0, dt / seen))
     s.omega += change
     if abs(s.omega) < NO_RATE_RAD_S * acceleration_unit and step == 0.0:
         s.omega = 0.0
-    s.alpha += (change / dt - s.alpha) * gain
+    s.held[0], s.held[1] = measured, s.omega
+    if seen > SETTLING * (smoothing + dt):
+        s.alpha += (change / dt - s.alpha) * gain
+
+
+@inner
+def _hold_acceleration(held, dt, measured, time_constant):
+    """Critically damped g-h-k filter of the measured angle (Brookner, Tracking and Kalman Filtering Made Easy (1998), 1.3)."""
+    keep = math.exp(-dt / time_constant)
+    lost = 1.0 - keep
+    ahead = held[0] + dt * (held[1] + 0.5 * dt * held[2])
+    apart = measured - ahead
+    held[0] = ahead + (1.0 - keep**3) * apart
+    held[1] += dt * held[2] + 1.5 * lost**2 * (1.0 + keep) * apart / dt
+    held[2] += 2.0 * lost**3 * apart / dt**2

@@ -203,7 +203,7 @@ def _watch_other(core, side, dt, stamp_ns):
     """
     g, other = core.guard[side], 1 - side
     seen_ns = core.channels[other].last_ns
-    if core.motion[other].started == 0.0 or seen_ns < g.still_ns or seen_ns > stamp_ns:
+    if core.motion[other].age == 0.0 or seen_ns < g.still_ns or seen_ns > stamp_ns:
         return
     theta = core.motion[other].theta
     if math.isnan(g.still_other):
@@ -329,6 +329,7 @@ def _stand_at(motion, value):
     """The motion estimate at a standstill there."""
     motion.center, motion.lead, motion.progress = value, 0.0, 0.0
     motion.theta, motion.omega, motion.alpha = value, 0.0, 0.0
+    motion.held[0], motion.held[1], motion.held[2] = value, 0.0, 0.0
 
 
 @inner
@@ -453,7 +454,7 @@ def _apart(core):
     A linkage is something between parallel and Ackermann's.
     """
     c = core.config[0]
-    if math.isnan(c.side_ratio) or core.motion[0].started == 0.0 or core.motion[1].started == 0.0:
+    if math.isnan(c.side_ratio) or core.motion[0].age == 0.0 or core.motion[1].age == 0.0:
         return False
     first, second = core.motion[0].theta, core.motion[1].theta
     tangent = math.tan(first)

@@ -397,6 +397,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["angle_noise"] = model.parameters[0]["angle_noise"][0]
     config["gauge_offset"] = gauge_offset(vehicle) if vehicle.hydraulics is not None else 0.0
     config["pressure_gain"] = vehicle.sensors.pressure_gain
+    config["accelerates"] = vehicle.sensors.rate_filter_s is not None
     config["delay_ns"] = round(delay_s(vehicle) * 1e9)
     config["lag"] = lag_s(vehicle)
     config["effects"] = any(has_effects(p) for p in model.parameters)

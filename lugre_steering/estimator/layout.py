@@ -45,6 +45,7 @@ CONFIG = np.dtype(
         ("forward_jump_ns", np.int64),
         ("max_angle", np.float64),
         ("max_rate", np.float64),
+        ("accelerates", np.bool_),  # its rates come from a filter that holds the acceleration
         ("pressure_range", np.float64),
         ("max_pressure", np.float64),
         ("angle_noise", np.float64),

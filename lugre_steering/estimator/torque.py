@@ -188,8 +188,8 @@ def advance(core, k, stamp_ns, value, rate, verdict, estimates, count):
         watch(core, side, ch, stamp_ns, dt, value)
         if dt * 1e9 > c.max_gap_ns:
             end_silence(core, side, ch, stamp_ns, value)
-        before = motion.theta if motion.started != 0.0 else value
-        follow(motion, dt, value, rate, noise_of(core, side), p.acceleration_unit)
+        before = motion.theta if motion.age != 0.0 else value
+        follow(motion, dt, value, rate, noise_of(core, side), p.acceleration_unit, c.accelerates)
         rates.travel += abs(motion.theta - before)
         call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)

@@ -12,21 +12,21 @@ import numpy as np
 
 from lugre_steering.chain.compiled import njit
 from lugre_steering.chain.rates import MOTION, RATE_TIME_CONSTANT_S, follow
-from lugre_steering.data.dataset import Run, _at, as_recorded
+from lugre_steering.data.dataset import Run, as_recorded
 from lugre_steering.fitting.problem import Problem, is_rig
-from lugre_steering.recording import Array, Recording, Signal
+from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.size import acceleration_unit
 
-FILTERS_S = tuple(RATE_TIME_CONSTANT_S * 0.5 ** (0.5 * k) for k in range(16))
+FILTERS_S = tuple(RATE_TIME_CONSTANT_S * 0.5 ** (0.5 * k) for k in range(-4, 16))
 """Filters of the motion that are tried."""
 
 
 @njit(cache=True)
-def _follow_all(s: Any, time: Array, angle: Array, rate: Array, sigma: float, unit: float, out: Array) -> None:
+def _follow_all(s: Any, time: Array, angle: Array, rate: Array, sigma: float, unit: float, accelerates: bool, out: Array) -> None:
     """Angle, rate and acceleration (3, n) after each sample."""
     for i in range(time.size):
-        follow(s, time[i] - time[max(i - 1, 0)], angle[i], rate[i], sigma, unit)
+        follow(s, time[i] - time[max(i - 1, 0)], angle[i], rate[i], sigma, unit, accelerates)
         out[0, i], out[1, i], out[2, i] = s.theta, s.omega, s.alpha
 
 
@@ -61,5 +61,6 @@ def _causal(vehicle: Vehicle, recording: Recording, side: str, time: Array) -> A
     angle, rate = recording.angle[side], recording.rate.get(side)
     given = np.full(angle.time_s.size, np.nan) if rate is None else np.interp(angle.time_s, rate.time_s, rate.value)
     state, motion = np.zeros(1, MOTION), np.zeros((3, angle.time_s.size))
-    _follow_all(state[0], angle.time_s, angle.value, given, vehicle.sensors.angle_sigma, acceleration_unit(vehicle), motion)
-    return np.array([_at(time, Signal(angle.time_s, row)) for row in motion])
+    sigma, accelerates = vehicle.sensors.angle_sigma, vehicle.sensors.rate_filter_s is not None
+    _follow_all(state[0], angle.time_s, angle.value, given, sigma, acceleration_unit(vehicle), accelerates, motion)
+    return np.array([np.interp(time, angle.time_s, row) for row in motion])  # an average of several samples would look ahead

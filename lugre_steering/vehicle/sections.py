@@ -249,7 +249,7 @@ class Sensors:
     """Resolution: one step of the angle sensors."""
     angle_noise_deg: float = quantity(0.0, 10.0, default=0.01)
     """Noise of the angle sensors, one standard deviation."""
-    rate_filter_s: float | None = quantity(1e-5, RATE_TIME_CONSTANT_S, default=None)
+    rate_filter_s: float | None = quantity(1e-5, 4.0 * RATE_TIME_CONSTANT_S, default=None)
     """Time constant of the causal filter of rate and acceleration [s], where the angle has noise; left out: by that noise. `diagnose` and
     `calibrate` write what suits the inertia of a joint or axis."""
     pressure_reference: str = "gauge"

@@ -13,8 +13,8 @@ from lugre_steering.vehicle.sections import Vehicle
 
 FRICTION_NM, STRIBECK_RAD_S, TRAVEL_RAD = 25e3, 0.026, 0.8
 """Friction torque and Stribeck speed of one track, and travel, of the vehicle whose size counts as one."""
-FASTEST_TRACK_RAD_S, FASTEST_JOINT_RAD_S = 10.0, 100.0
-"""Beyond any steering; and beyond what servos and robots turn at, or an axis for its size."""
+FASTEST_RAD_S, FASTEST_JOINT_RAD_S = 10.0, 100.0
+"""Beyond any steering, or an axis [m/s] that is not of unusual size; and beyond what servos and robots turn at."""
 AXIS_ACCELERATION = 10.0
 """Acceleration of an axis for its size, against that of the vehicle."""
 SPARE = 5.0
@@ -65,7 +65,9 @@ def acceleration_unit(vehicle: Vehicle) -> float:
 
 def fastest(vehicle: Vehicle) -> float:
     """Rate [rad/s] that no angle of such a machine has: a faster change is a spike."""
-    return FASTEST_TRACK_RAD_S if vehicle.contact is None else FASTEST_JOINT_RAD_S * angle_unit(vehicle)
+    if vehicle.contact is None or vehicle.coordinate.unit == "m":
+        return FASTEST_RAD_S * max(1.0, angle_unit(vehicle))
+    return FASTEST_JOINT_RAD_S
 
 
 def angle_unit(vehicle: Vehicle) -> float:
