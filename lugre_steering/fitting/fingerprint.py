@@ -120,8 +120,11 @@ def _turns_far(problem: Problem) -> bool:
 @cache  # candidates are compared by their entries
 def _near(effect: Effect) -> Effect:
     """An entry without what only joints that turn far show."""
-    kept = tuple(p for p in effect.parameters if not p.far_turning)
-    return effect if len(kept) == len(effect.parameters) else replace(effect, parameters=kept)
+    far = {p.name for p in effect.parameters if p.far_turning}
+    if not far:
+        return effect
+    kept, acts_by = (p for p in effect.parameters if p.name not in far), (name for name in effect.acts_by if name not in far)
+    return replace(effect, parameters=tuple(kept), acts_by=tuple(acts_by))
 
 
 def _suggested(effect: Effect, variants: Callable[[Seen], Sequence[Variant]], seen: Seen) -> list[Variant]:

@@ -546,6 +546,15 @@ def test_names_are_doubted_by_what_they_took_as_far_as_their_laws_bend(problem: 
         assert 0.0 < much <= 20.0 * 0.15**2 * does
 
 
+def test_a_track_is_asked_for_nothing_that_only_joints_show(problem: Problem) -> None:
+    """Each candidate has all parameters by which its entry says that it acts: their bounds are looked up."""
+    offered = fingerprint.candidates(problem)
+    (jacking,) = (candidate for candidate in offered if candidate.effect.id == "kingpin_jacking")
+    assert jacking.free == ("amplitude",)
+    assert "cosine" not in jacking.effect.amplitudes
+    assert all(candidate.parameter(name) for candidate in offered for name in candidate.effect.amplitudes)
+
+
 def test_the_error_of_an_arm_counts_in_the_torque_as_measured(problem: Problem) -> None:
     """With both tracks at one angle the true torque is the measured one times the factor; its error is divided by it again."""
     alike = replace(problem.runs[0], theta=np.repeat(problem.runs[0].theta[:1], 2, axis=0))
