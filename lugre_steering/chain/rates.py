@@ -90,7 +90,8 @@ def follow(s, dt, measured, measured_rate, sigma, acceleration_unit, accelerates
     rate = step / dt if math.isnan(measured_rate) else measured_rate
     chosen = math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * acceleration_unit))
     smoothing = min(RATE_TIME_CONSTANT_S, chosen)
-    s.way = s.way * math.exp(-dt / (STANDING * (chosen + dt))) + abs(moved)
+    if accelerates:
+        s.way = s.way * math.exp(-dt / (STANDING * (chosen + dt))) + abs(moved)
     if accelerates and math.isnan(measured_rate) and seen > SETTLING * (chosen + dt):
         _hold_acceleration(s.held, dt, measured, chosen)
         s.omega, s.alpha = s.held[1], s.held[2]

@@ -413,6 +413,6 @@ def test_an_axis_in_metres_may_be_longer_than_half_a_turn(tmp_path: Path) -> Non
     stamped = ((T0 + 10**7, 0.1), (T0 + 2 * 10**7, 12.0))
     messages = [("/axis/joint_state", make.JOINT_STATE, at, make.joint_state(at, ["any"], [x])) for at, x in stamped]
     bag = make.write(tmp_path / "run", messages)
-    metres, radians = (Channel(Kind.ANGLE, "left", "axis/joint_state", unit=unit) for unit in ("m", "rad"))
+    metres, radians = (Channel(Kind.ANGLE, "left", "axis/joint_state", farthest=farthest) for farthest in (100.0, 3.1))
     assert read_recording(bag, [metres]).angle["left"].value.tolist() == [0.1, 12.0]
     assert read_recording(bag, [radians]).angle["left"].value.tolist() == [0.1]

@@ -60,11 +60,14 @@ def in_deviations(problem: Problem, weight: Array, roles: Split, fitted: Fit, in
 
 
 def least_sure_part(problem: Problem, weight: Array, roles: Split, fitted: Fit, terms: Iterable[int]) -> tuple[int, str] | None:
-    """Which of these ``terms`` of a fit has which part, one of several, that may as well be nothing: the least sure. What is kept by chance
-    takes as much from the term itself."""
+    """Which of these ``terms`` of a fit has which part, one of several, that may as well be nothing: the least sure, an optional one before
+    any other. What is kept by chance takes as much from the term itself."""
     parts = [(i, in_deviations(problem, weight, roles, fitted, i)) for i in terms]
-    unsure = [(size, i, name) for i, own in parts for name, size in own.items() if size < SURE_SIGMA and len(own) > 1]
-    return min(unsure)[1:] if unsure else None
+    unsure = [
+        (not fitted.effects[i][0].parameter(name).optional, size, i, name)
+        for i, own in parts for name, size in own.items() if size < SURE_SIGMA and len(own) > 1
+    ]
+    return min(unsure)[2:] if unsure else None
 
 
 def least_sure_name(problem: Problem, weight: Array, roles: Split, fitted: Fit, names: int) -> int | None:
