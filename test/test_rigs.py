@@ -370,17 +370,31 @@ def test_the_weight_of_an_arm_is_found_wherever_its_zero_is(gravity: Gravity) ->
     """An arm that is level at zero, or slants, swings by 80 deg either way: a constant and a sine would leave 30 N m, a hundred times
     the noise."""
     base = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)
-    real = base.replace(gravity=gravity, effects=(EffectEntry("viscous_friction", {"sigma_2": 30.0}),))
+    found = found_on_an_arm(base, base.replace(gravity=gravity, effects=(EffectEntry("viscous_friction", {"sigma_2": 30.0}),)))
+    assert set(found) == {"kingpin_jacking", "viscous_friction"}
+    assert found["kingpin_jacking"].get("cosine", 0.0) == pytest.approx(gravity.cos_Nm, abs=0.5)
+    assert found["kingpin_jacking"].get("amplitude", 0.0) == pytest.approx(gravity.sin_Nm, abs=0.5)
+
+
+def test_a_loss_that_grows_faster_than_the_rate_is_viscous_friction_of_a_joint() -> None:
+    """As of air or churned oil: at 120 deg/s 42 N m + 53 N m."""
+    base = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)
+    real = base.replace(effects=(EffectEntry("viscous_friction", {"sigma_2": 20.0, "thinning": -0.6}),))
+    found = found_on_an_arm(base, real)
+    assert set(found) == {"viscous_friction"}
+    assert found["viscous_friction"]["sigma_2"] == pytest.approx(20.0, rel=0.05)
+    assert found["viscous_friction"]["thinning"] == pytest.approx(-0.6, rel=0.05)
+
+
+def found_on_an_arm(sheet: Vehicle, real: Vehicle) -> dict[str, dict[str, float]]:
+    """The values of what is named of an arm that swings by 80 deg either way."""
     slower = dataclasses.replace(sensing_of(real), angle_rate_Hz=40.0, pressure_rate_Hz=40.0)
     strokes = ((80.0, 60.0), (-80.0, 90.0), (50.0, 30.0), (-60.0, 120.0), (75.0, 45.0), (0.0, 80.0))
     sweeps = tuple(Sweep(end, rate, 1.0) for end, rate in strokes)
     run = simulate(real, motion_of(Manoeuvre("arm", "", (Hold(1.0), *sweeps, Hold(1.0))), real), slower)
     signals = {channel.name: signal for channel, signal in run.signals.items()}
     recording = Recording("arm", 0, {"left": signals["left"]}, {}, measured_torque=signals["torque"])
-    found = {e.id: {key: each.value for key, each in e.parameters.items()} for e in diagnose_recordings([recording], base).effects}
-    assert set(found) == {"kingpin_jacking", "viscous_friction"}
-    assert found["kingpin_jacking"].get("cosine", 0.0) == pytest.approx(gravity.cos_Nm, abs=0.5)
-    assert found["kingpin_jacking"].get("amplitude", 0.0) == pytest.approx(gravity.sin_Nm, abs=0.5)
+    return {e.id: {key: each.value for key, each in e.parameters.items()} for e in diagnose_recordings([recording], sheet).effects}
 
 
 def test_what_a_pendulum_has_is_found_though_a_soft_spring_of_friction_would_pass_for_its_gravity(tmp_path: Path) -> None:

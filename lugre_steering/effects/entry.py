@@ -42,6 +42,8 @@ class Parameter:
     relative_to: str = ""
     optional: bool = False
     """Refinement of the shape: zero (or as the vehicle sheet has it) in the screen, fitted only once the effect is accepted."""
+    signed_on_joints: bool = False
+    """Sought below zero on a single joint or axis only; on tracks other entries are there for that."""
     far_turning: bool = False
     """Sought on a single joint that turns so far that it is something else than a constant torque; otherwise it is none."""
     example: float | None = None

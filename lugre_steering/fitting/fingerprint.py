@@ -83,11 +83,11 @@ def possible(vehicle: Vehicle, effect: Effect) -> bool:
 def candidates(problem: Problem, without: Sequence[str] = ()) -> list[Candidate]:
     """Every variant of every observable effect for this data set: shapes over their grids, one per line where that matters."""
     found: list[Candidate] = []
-    far = _turns_far(problem)
+    joint, far = is_rig(problem.vehicle), _turns_far(problem)
     for effect in CATALOGUE.values():
         if not effect.observable or effect.id in without or not possible(problem.vehicle, effect):
             continue
-        effect = resized(effect if far else _near(effect), problem.size)
+        effect = resized(_shown(effect, joint, far), problem.size)
         free = tuple(p.name for p in effect.parameters if not p.is_shape and not p.optional)
         if effect.variants is not None:
             for shapes in _suggested(effect, effect.variants, _seen(problem)):
@@ -118,13 +118,14 @@ def _turns_far(problem: Problem) -> bool:
 
 
 @cache  # candidates are compared by their entries
-def _near(effect: Effect) -> Effect:
-    """An entry without what only joints that turn far show."""
-    far = {p.name for p in effect.parameters if p.far_turning}
-    if not far:
+def _shown(effect: Effect, joint: bool, far: bool) -> Effect:
+    """An entry without what only joints, or joints that turn far, show."""
+    if (joint or not any(p.signed_on_joints for p in effect.parameters)) and (far or not any(p.far_turning for p in effect.parameters)):
         return effect
-    kept, acts_by = (p for p in effect.parameters if p.name not in far), (name for name in effect.acts_by if name not in far)
-    return replace(effect, parameters=tuple(kept), acts_by=tuple(acts_by))
+    kept = [p for p in effect.parameters if far or not p.far_turning]
+    gone = {p.name for p in effect.parameters} - {p.name for p in kept}
+    bound = (replace(p, low=0.0) if p.signed_on_joints and not joint else p for p in kept)
+    return replace(effect, parameters=tuple(bound), acts_by=tuple(name for name in effect.acts_by if name not in gone))
 
 
 def _suggested(effect: Effect, variants: Callable[[Seen], Sequence[Variant]], seen: Seen) -> list[Variant]:

@@ -552,6 +552,8 @@ def test_a_track_is_asked_for_nothing_that_only_joints_show(problem: Problem) ->
     (jacking,) = (candidate for candidate in offered if candidate.effect.id == "kingpin_jacking")
     assert jacking.free == ("amplitude",)
     assert "cosine" not in jacking.effect.amplitudes
+    (viscous,) = (candidate for candidate in offered if candidate.effect.id == "viscous_friction")
+    assert viscous.parameter("thinning").low == 0.0
     assert all(candidate.parameter(name) for candidate in offered for name in candidate.effect.amplitudes)
 
 
