@@ -41,11 +41,12 @@ def filtered(vehicle: Vehicle, recordings: Sequence[Recording], runs: Sequence[R
     """A joint or axis with the filter of its motion with which it errs least live, and that error [N m]; any other as it is.
 
     How fast its accelerations change no sheet says: a long filter comes late to them, a short one shows the noise of the angle as inertia.
-    One that is shorter than the way from sample to sample filters nothing, and the next recording may be noisier.
+    One that is shorter than the way from sample to sample filters nothing, unless rates are recorded; the next recording may be noisier.
     """
     tried = [vehicle]
     if is_rig(vehicle) and vehicle.sensors.angle_sigma > 0.0:
-        spacing = max(float(np.median(np.diff(angle.time_s))) for each in recordings for angle in each.angle.values())
+        differenced = [angle.time_s for each in recordings for side, angle in each.angle.items() if side not in each.rate]
+        spacing = max((float(np.median(np.diff(time))) for time in differenced), default=0.0)
         filters = [each for each in FILTERS_S if each >= spacing]
         tried += [vehicle.replace(sensors=replace(vehicle.sensors, rate_filter_s=each)) for each in filters]
     errors = [causal_rmse(each, recordings, runs) for each in tried]
