@@ -23,8 +23,8 @@ RATE_TIME_CONSTANT_S = 0.04
 USUAL_ACCELERATION_RAD_S2 = 0.11
 """Noise of the rate falls with the filter time, its lag grows with the acceleration: cleaner sensors get a faster filter,
 sqrt(sigma / acceleration), up to RATE_TIME_CONSTANT_S."""
-SETTLING, STANDING = 4.0, 10.0
-"""Time constants of that filter after which the rate is known, and for how many motion is remembered."""
+SETTLING, REMEMBERED = 4.0, 10.0
+"""Time constants of that filter after which the rate is known, and for how many the way is remembered by which a joint moves."""
 NO_RATE_RAD_S = 1e-7
 """Rate that counts as none."""
 PROGRESS_TIME_CONSTANT_S = 0.05
@@ -91,7 +91,7 @@ def follow(s, dt, measured, measured_rate, sigma, acceleration_unit, accelerates
     chosen = math.sqrt(sigma / (USUAL_ACCELERATION_RAD_S2 * acceleration_unit))
     smoothing = min(RATE_TIME_CONSTANT_S, chosen)
     if accelerates:
-        s.way = s.way * math.exp(-dt / (STANDING * (chosen + dt))) + abs(moved)
+        s.way = s.way * math.exp(-dt / (REMEMBERED * (chosen + dt))) + abs(moved)
     if accelerates and math.isnan(measured_rate) and seen > SETTLING * (chosen + dt):
         _hold_acceleration(s.held, dt, measured, chosen)
         s.omega, s.alpha = s.held[1], s.held[2]
