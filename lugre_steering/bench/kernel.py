@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from lugre_steering.bench.kernel_c import CLoop
 from lugre_steering.chain.lanes import torque_sets
-from lugre_steering.chain.step import Records, torque_side
+from lugre_steering.chain.step import Records, torque_in_phases, torque_side
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
@@ -187,12 +187,17 @@ def _kernels(vehicle: Vehicle, p: Records, rubber: Array, truth: Array) -> list[
     def kernel(parameters: Records) -> Callable[[], Array]:
         return lambda: torque_side(parameters, rubber, *long, still)
 
+    def in_place(parameters: Records) -> Callable[[], Array]:
+        name = next(f"{effect.id}_{effect.amplitudes[0]}" for effect in CATALOGUE.values() if effect.hooks and not effect.per_line)
+        never = [(-math.inf, parameters), (math.inf, _with(parameters, {name: 1.0}))]  # keeps the stages, of which none acts
+        return lambda: torque_in_phases(never, rubber, *long, still)
+
     stopped = vehicle.replace(effects=(limit_device(),))
     loop = CLoop.build()
     tasks = {
         BASELINE: kernel(p),
         "C loop, gcc -O3": kernel(p) if loop is None else lambda: loop.torque_side(p, rubber, *long),
-        "Numba kernel, effect stages in place, neutral": kernel(_neutral(p)),
+        "Numba kernel, effect stages in place, neutral": in_place(p),
         "Numba kernel, one effect on (end stop)": kernel(build_model(stopped).parameters[0]),
         "Numba kernel composed for a file with the end stop": kernel(build_model(stopped, lean=True).parameters[0]),
         "Numba kernel, all effects on at once": kernel(_with(p, every_effect())),
@@ -226,12 +231,6 @@ def each_effect() -> list[Row]:
     best = by_turns(tasks, 40)
     order = [BASELINE, *sorted(best.keys() - {BASELINE}, key=lambda name: -best[name])]
     return [_row(name, best[name], time.size, None, np.zeros(2)) for name in order]
-
-
-def _neutral(p: Records) -> Records:
-    """Parameters with a shape but no amplitude: the effect does nothing, but the stages are passed."""
-    shape = next(f"{effect.id}_{p.name}" for effect in CATALOGUE.values() for p in effect.parameters if p.is_shape)
-    return _with(p, {shape: 1.0})
 
 
 def _with(p: Records, values: Mapping[str, float]) -> Records:

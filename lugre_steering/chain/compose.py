@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lugre_steering.chain import baseline, bristle, heat
 from lugre_steering.chain.compiled import law
@@ -104,6 +105,7 @@ HOOKS = {
 }  # fmt: skip
 """Every place where an effect may act, in the order of the step; the last five belong to the sensors."""
 
+_BITS = {name: 1 << i for i, name in enumerate(HOOKS)}
 _STEPWISE = tuple(name for name in HOOKS if name not in ("angle", "wind_up", "arm", "line", "delay", "lag"))
 SENSOR_HOOKS = ("angle", "arm", "line", "delay", "lag")
 
@@ -117,6 +119,8 @@ class Composition:
     parameters: np.dtype[np.void]
     state: np.dtype[np.void]
     lines: np.dtype[np.void]
+    bits: NDArray[np.int64]
+    """The hooks of the step where the effect acts whose amplitude a number of the parameter record is (0: none), one bit each."""
     starts: Mapping[str, float | str]
     """Memory that does not begin at zero: its field of the state, and a number or the baseline parameter that it begins with."""
     step: LawFunction
@@ -165,18 +169,20 @@ def _compose(effects: Sequence[Physics]) -> Composition:
         "LEAST_LEVEL": 0.05, "WIND_UP_ITERATIONS": 12, "law": law, **laws,
     }  # fmt: skip
     file = f"<{name}>"
+    parameters = np.dtype([
+        *((field, np.float64) for field in (*BASELINE_FIELDS, *_parameter_fields(effects, per_line=False))),
+        *((f"{effect.id}_{table}", np.float64, (size,)) for effect in effects for table, size in effect.tables.items()),
+        (name, np.float64),
+    ])
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # so that tracebacks and tools can show it
     exec(compile(text, file, "exec"), scope)
     _made[name] = Composition(
         name,
         text,
-        np.dtype([
-            *((field, np.float64) for field in (*BASELINE_FIELDS, *_parameter_fields(effects, per_line=False))),
-            *((f"{effect.id}_{table}", np.float64, (size,)) for effect in effects for table, size in effect.tables.items()),
-            (name, np.float64),
-        ]),
+        parameters,
         np.dtype([*((field, np.float64) for field in STATE_FIELDS), *_memory_fields(effects)]),
         np.dtype([(field, np.float64) for field in (*_parameter_fields(effects, per_line=True), name)]),
+        _bits(effects, parameters),
         _starts(effects),
         scope["step"],
         scope["arm_factor"],
@@ -273,7 +279,7 @@ def _slot(effects: Sequence[Physics], hook: str) -> Iterator[str]:
             yield f"if {_guard(effect)}:"
             yield from (f"    {line}" for line in _call(effect, hook))
     elif acting:
-        yield "if effects:"
+        yield f"if effects & {_BITS[hook]}:"
         for effect in acting:
             yield f"    if {_guard(effect)}:"
             yield from (f"        {line}" for line in _call(effect, hook))
@@ -282,14 +288,13 @@ def _slot(effects: Sequence[Physics], hook: str) -> Iterator[str]:
 def _instead(effects: Sequence[Physics], hook: str) -> list[str]:
     """Branches in place of a block of the step, each with its condition."""
     if hook == "wind_up":
-        guards = [_guard(effect) for effect in _acting(effects, hook)]
-        if not guards:
+        if not _acting(effects, hook):
             return []
         solved = ["d_theta = wound_increment(p, s, theta, stiffness, length)", "s.contact_angle += d_theta"]
-        return [f"if effects and ({' or '.join(guards)}):", *(f"    {line}" for line in solved)]
+        return [f"if effects & {_BITS[hook]}:", *(f"    {line}" for line in solved)]
     lines = []
     for i, effect in enumerate(_acting(effects, hook)):
-        lines.append(f"{'elif' if i else 'if'} effects and ({_guard(effect)}):")
+        lines.append(f"{'elif' if i else 'if'} effects & {_BITS[hook]} and ({_guard(effect)}):")
         work = "work = (work + 0.5 * stiffness * (z_next * z_next - z * z)) / faster"
         lines += [f"    {line}" for line in (*_call(effect, hook), work)]
     return lines
@@ -305,6 +310,16 @@ def _text(effects: Sequence[Physics]) -> str:
     text = _filled(STEP, slots) + "\n\n" + _filled(SENSED, slots)
     header = '"""One step of one track, composed of: ' + (", ".join(effect.id for effect in effects) or "the baseline alone") + '."""\n\n'
     return header + re.sub(r"^def (?!step\(|arm_factor\(|line_error\()", "@law\ndef ", text, flags=re.MULTILINE)
+
+
+def _bits(effects: Sequence[Physics], parameters: np.dtype[np.void]) -> NDArray[np.int64]:
+    """See ``Composition.bits``: (numbers of the parameter record,)."""
+    assert parameters.fields is not None
+    bits = np.zeros(parameters.itemsize // 8, np.int64)
+    for effect in effects:
+        for name in () if effect.per_line else effect.amplitudes:
+            bits[parameters.fields[f"{effect.id}_{name}"][1] // 8] |= sum(_BITS[hook] for hook in effect.hooks)
+    return bits
 
 
 def _starts(effects: Sequence[Physics]) -> dict[str, float | str]:

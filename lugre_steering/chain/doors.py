@@ -59,7 +59,7 @@ def doors(composition: Composition) -> Doors:
 
 def _step_door(p, s, rubber, rows, out, dt, theta, omega, alpha, effects):
     table = carray(rubber, (rows, 2))
-    step(carray(p, 1)[0], carray(s, 1)[0], table, carray(out, 1)[0], dt, theta, omega, alpha, effects != 0)
+    step(carray(p, 1)[0], carray(s, 1)[0], table, carray(out, 1)[0], dt, theta, omega, alpha, effects)
 
 
 def _arm_factor_door(p, theta):
@@ -96,11 +96,11 @@ def _call_step(
         p, s, table_data, out = (builder.bitcast(pointer, _POINTER) for pointer in (p, s, table.data, out))
         kind = ir.FunctionType(ir.VoidType(), [_POINTER, _POINTER, _POINTER, _INTEGER, _POINTER, *4 * [_DOUBLE], _INTEGER])
         rows = builder.extract_value(table.shape, 0)
-        arguments = [p, s, table_data, rows, out, *numbers, builder.zext(effects, _INTEGER)]
+        arguments = [p, s, table_data, rows, out, *numbers, effects]
         builder.call(builder.inttoptr(door, kind.as_pointer()), arguments)
         return context.get_dummy_value()
 
-    return types.void(types.int64, p, s, rubber, out, *4 * (_NUMBER,), types.boolean), codegen
+    return types.void(types.int64, p, s, rubber, out, *4 * (_NUMBER,), types.int64), codegen
 
 
 def _call_number(typing_context: Any, door: Any, record: Any, number: Any) -> Any:  # noqa: ARG001

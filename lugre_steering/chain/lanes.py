@@ -13,7 +13,7 @@ from numba import njit
 
 from lugre_steering.chain.bristle import bristle, bristle_work, stribeck
 from lugre_steering.chain.heat import LONG, short_heat
-from lugre_steering.chain.step import Records, has_effects, torque_side
+from lugre_steering.chain.step import Records, acting, torque_side
 from lugre_steering.recording import Array
 
 LANES = 64
@@ -82,7 +82,7 @@ def torque_sets(parameters: Records, rubber: Array, time: Array, theta: Array, o
     sets = parameters.size
     tables = rubber[np.newaxis] if rubber.ndim == 2 else rubber
     torque = np.empty((time.size, sets))
-    with_effects = np.array([has_effects(parameters[k : k + 1]) for k in range(sets)])
+    with_effects = np.array([acting(parameters[k : k + 1]) != 0 for k in range(sets)])
     gap = float(np.diff(time).max(initial=0.0))
     ordinary = 0.5 * parameters["cooling"] * gap / parameters["heat_capacity"] <= LONG
     plain = (parameters["stribeck_exponent"] == 2.0) & ~with_effects & ordinary

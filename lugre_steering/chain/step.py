@@ -95,9 +95,11 @@ def records_of(numbers: Array, kind: np.dtype[np.void]) -> Records:
     return np.ndarray(numbers.nbytes // kind.itemsize, kind, numbers)
 
 
-def has_effects(p: Records) -> bool:
-    """Whether any effect parameter of a record (1,) differs from neutral."""
-    return bool(np.count_nonzero(p.view(np.float64)[len(BASELINE_FIELDS) :]))
+def acting(p: Records) -> int:
+    """Hooks of the step where an effect of a record (1,) acts, one bit each; see ``Composition.bits``."""
+    assert p.dtype.names is not None
+    bits = composition_of(name_of(p.dtype.names)).bits
+    return int(np.bitwise_or.reduce(bits[p.view(np.float64) != 0.0]))
 
 
 def _bare(p: Records) -> Records:
@@ -125,7 +127,7 @@ def run_side(
     out = np.zeros(time.size, OUTPUT)
     previous = float(time[0]) if previous_time is None else previous_time
     time, theta, omega, alpha = (np.ascontiguousarray(values) for values in (time, theta, omega, alpha))  # one compiled form
-    _run(p, new_state(p) if state is None else state, rubber, time, theta, omega, alpha, out, previous, has_effects(p))
+    _run(p, new_state(p) if state is None else state, rubber, time, theta, omega, alpha, out, previous, acting(p))
     return out
 
 
@@ -137,7 +139,7 @@ def torque_side(p: Records, rubber: Array, time: Array, theta: Array, omega: Arr
 def _read_otherwise(p: Records, states: Records, rubber: Array, scratch: Records, time: Array, *motion: Array) -> None:
     """Turn the angles at which tracks stand to what parameters ``p`` read of the last sample, without turning any contact."""
     read, (theta, omega, alpha) = states.copy(), motion
-    _torques(p, read, rubber, scratch, time, theta, omega, alpha, np.empty(theta.shape), 0, 1, True)
+    _torques(p, read, rubber, scratch, time, theta, omega, alpha, np.empty(theta.shape), 0, 1, acting(p))
     turned = read["theta"] - states["theta"]
     states["theta"] += turned
     states["contact_angle"] += turned
@@ -151,8 +153,8 @@ def torque_in_phases(
     Motions of several tracks (tracks, n) give the sum of their torques. The memory of an effect begins when the effect does; the
     air takes its new temperature at once. An angle that is read otherwise from then on turns no contact.
     """
-    acting = [has_effects(p) for _, p in phases]
-    if not any(acting):
+    effects = [acting(p) for _, p in phases]
+    if not any(effects):
         phases = [(start, _bare(p)) for start, p in phases]
     before = phases[0][1]
     if theta.ndim == 1:
@@ -161,14 +163,14 @@ def torque_in_phases(
     torques, states, scratch = np.empty(theta.shape), new_state(before, len(theta)), _empty(OUTPUT, len(theta))
     alone = len(phases) == 1 and phases[0][0] == -np.inf
     edges = [0, time.size] if alone else [*np.searchsorted(time, [start for start, _ in phases]), time.size]
-    for (_, p), effects, first, last in zip(phases, acting, edges, edges[1:], strict=False):
+    for (_, p), acts, first, last in zip(phases, effects, edges, edges[1:], strict=False):
         if first == last:
             continue
         if first > 0:
             states["air_temperature"] += p["air_temperature"] - before["air_temperature"]
-            if effects:
+            if acts:
                 motion = (np.ascontiguousarray(values[..., first - 1 : first]) for values in (time, theta, omega, alpha))
                 _read_otherwise(p, states, rubber, scratch, *motion)
         before = p
-        _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, effects)
+        _torques(p, states, rubber, scratch, time, theta, omega, alpha, torques, first, last, acts)
     return np.asarray(np.add.reduce(torques))

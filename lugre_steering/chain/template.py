@@ -25,9 +25,9 @@ def begin(p, s, theta):
 def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     """One sample of one track: angle [rad], rate [rad/s], acceleration [rad/s2] after ``dt`` [s] -> OUTPUT record.
 
-    Order: motion -> contact -> heat -> parallel torque -> losses. All effects are neutral at zero; ``effects`` False
-    skips them all. The angle increment, not omega dt, drives the bristle; omega only sets the level (Stribeck) and
-    the damping.
+    Order: motion -> contact -> heat -> parallel torque -> losses. All effects are neutral at zero; ``effects`` has a
+    bit for each hook where one acts (see ``step.acting``). The angle increment, not omega dt, drives the bristle; omega only
+    sets the level (Stribeck) and the damping.
     """
     theta = theta_measured
     <angle>

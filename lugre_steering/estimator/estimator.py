@@ -17,7 +17,7 @@ from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.doors import doors, row
 from lugre_steering.chain.layout import BASELINE, OUTPUT, STATE
 from lugre_steering.chain.rates import MOTION
-from lugre_steering.chain.step import Records, has_effects
+from lugre_steering.chain.step import Records, acting
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import REJECTED, admit
@@ -400,7 +400,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["accelerates"] = vehicle.sensors.rate_filter_s is not None
     config["delay_ns"] = round(delay_s(vehicle) * 1e9)
     config["lag"] = lag_s(vehicle)
-    config["effects"] = any(has_effects(p) for p in model.parameters)
+    config["effects"] = np.bitwise_or.reduce([acting(p) for p in model.parameters])
     config["message"] = -1
     config["step_door"], config["arm_door"], config["line_door"] = doors(model.composition)
     config["friction"] = sum(float(p["static_torque"][0]) for p in model.parameters)

@@ -62,7 +62,7 @@ CONFIG = np.dtype(
         ("pending_count", np.int64),
         ("plan_size", np.int64),
         ("plan_refused_ns", np.int64),  # newest angle's stamp when a command was refused; 0: the last one was none of those
-        ("effects", np.bool_),
+        ("effects", np.int64),  # see ``chain.step.acting``
         ("step_door", np.int64),  # see ``chain.doors``
         ("arm_door", np.int64),
         ("line_door", np.int64),
