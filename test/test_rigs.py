@@ -8,6 +8,7 @@ import dataclasses
 import html
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -37,7 +38,7 @@ from lugre_steering.estimator import Estimator
 from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.importing import import_table
-from lugre_steering.recording import Recording, Signal
+from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
 from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
@@ -537,24 +538,49 @@ def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path)
     assert clean.vehicle.effects == done.vehicle.effects  # what the file has is not looked for again
 
 
-def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_sheet_says_of_friction() -> None:
-    """Oracle: force = mass times acceleration and a loss times the rate, of a motion that is known exactly, with friction of none."""
-    time, mass, loss = np.arange(0.0, 60.0, 0.04), 40.0, 250.0
+def driven_axis(vehicle: Vehicle, mass: float, loss: float, friction: Callable[[Array], Array], step_s: float = 0.04) -> Recording:
+    """Force = mass times acceleration, a loss times the rate and a friction of the rate, of a motion that is known exactly."""
+    time = np.arange(0.0, 60.0, step_s)
     turns = [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
     position = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
     rate = sum(size * w * np.cos(w * time + phase) for size, w, phase in turns)
     acceleration = sum(-size * w**2 * np.sin(w * time + phase) for size, w, phase in turns)
-    vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
     assert vehicle.torque_sensor is not None
     rng = np.random.default_rng(4)
     noisy = position + vehicle.sensors.angle_sigma * rng.standard_normal(time.size)
-    force = mass * acceleration + loss * rate + vehicle.torque_sensor.noise_Nm * rng.standard_normal(time.size)
-    result = diagnose_recordings([Recording("axis", 0, {"left": Signal(time, noisy)}, {}, measured_torque=Signal(time, force))], vehicle)
+    force = mass * acceleration + loss * rate + friction(rate) + vehicle.torque_sensor.noise_Nm * rng.standard_normal(time.size)
+    return Recording("axis", 0, {"left": Signal(time, noisy)}, {}, measured_torque=Signal(time, force))
+
+
+def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_sheet_says_of_friction() -> None:
+    vehicle, mass, loss = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0
+    assert vehicle.torque_sensor is not None
+    result = diagnose_recordings([driven_axis(vehicle, mass, loss, np.zeros_like)], vehicle)
     found = {effect["id"]: effect["parameters"] for effect in result.json["effects"]}
     assert set(found) == {"yaw_inertia", "viscous_friction"}
     assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.02)
     assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
     assert result.json["augmented"]["heldout_rmse_Nm"] < 1.5 * vehicle.torque_sensor.noise_Nm
+
+
+def test_friction_that_rises_smoothly_from_standstill_is_none_that_sticks(tmp_path: Path) -> None:
+    """Nothing beside mass and loss, in particular no clock that is late; another recording is foretold by the file that is written."""
+    vehicle, mass, loss = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0
+    assert vehicle.torque_sensor is not None
+    recording = driven_axis(vehicle, mass, loss, lambda rate: 50.0 * np.tanh(rate / 0.02), 0.01)
+    result = diagnose_recordings([recording], vehicle)
+    found = {effect["id"]: effect["parameters"] for effect in result.json["effects"]}
+    assert set(found) == {"yaw_inertia", "viscous_friction"}
+    assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.05)
+    assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
+    assert result.json["augmented"]["heldout_rmse_Nm"] < 3.0 * vehicle.torque_sensor.noise_Nm
+    vehicle_file.save(result.augmented.vehicle, tmp_path / "found.yaml")
+    written = vehicle_file.load(tmp_path / "found.yaml")
+    assert written.contact is not None
+    assert written.contact.static_torque_Nm < 0.5 * written.contact.coulomb_torque_Nm
+    again = diagnose_recordings([recording], written)
+    assert again.verdict == "consistent"
+    assert not calibrate_recordings([recording], written).vehicle.replace(contact=None, effects=()).effects
 
 
 def test_a_long_stiff_axis_is_read_replayed_and_planned_whole(tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def chosen(
             raise DataError(f"--prior {calibration.name}: got {width:g}, expected a relative deviation above 0 up to 1")
         low = calibration.low
         if calibration.name == STATIC.name:
-            low = max(low, 1.0 - _static_ratio(vehicle))  # static friction stays at or above the sliding one
+            low = max(low, min(1.0 - _static_ratio(vehicle), 0.0))  # static friction stays at or above the sliding one, if it is
         changed.append(replace(calibration, prior=width, low=low))
     return tuple(changed)
 

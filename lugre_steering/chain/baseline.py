@@ -29,6 +29,12 @@ def ratios(rubber, low, step, temperature):
 
 
 @law
+def most_friction(p):
+    """The larger of static and sliding friction torque at the reference temperature [N m]."""
+    return max(p.static_torque, p.coulomb_torque)
+
+
+@law
 def aligning(theta: float, amplitude: float, gravity_cos: float) -> float:
     """Conservative torque of the angle [N m]: M_a = F_z e sin(theta_k) sin(theta) (Reimpell; R), plus gravity."""
     return amplitude * math.sin(theta) + gravity_cos * math.cos(theta)

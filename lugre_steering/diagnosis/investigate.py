@@ -16,12 +16,14 @@ from lugre_steering.diagnosis.form import Bent, bent
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
-from lugre_steering.fitting.problem import Problem, is_rig
+from lugre_steering.fitting.problem import SMOOTH, Problem, is_rig
 from lugre_steering.fitting.split import Split, balanced, split
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array
 
 NULL_DRAWS = 16
+MUCH_LESS = 2.0 / 3.0
+"""Share of what is left, at most, with which another friction law takes the place of that of the vehicle file."""
 SAMPLES, FASTEST_HZ, ALONE = 3000, 200.0, 10
 """Samples on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
 times as many are as quick without freedoms."""
@@ -30,6 +32,22 @@ NOISE_ROUNDS, QUIETER = 2, 0.8
 
 
 def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = lambda _: None) -> Finished:
+    """Recalibrate and search; on joints and axes also for a friction that rises smoothly from standstill, where that of the vehicle file
+    leaves much more."""
+    done = _investigated(problem, seed, progress)
+    if not is_rig(problem.vehicle) or problem.calibrations == SMOOTH:
+        return done
+    progress("searching beside a friction that rises smoothly from standstill")
+    smooth = _investigated(Problem(problem.vehicle, problem.runs, SMOOTH), seed, progress)
+    return smooth if _left(smooth) < MUCH_LESS * _left(done) else done
+
+
+def _left(done: Finished) -> float:
+    """Mean square of what is left on samples held out [N2 m2]."""
+    return float(np.mean(np.square((done.problem.measured - done.found.final.prediction)[done.roles.held])))
+
+
+def _investigated(problem: Problem, seed: int, progress: Callable[[str], None]) -> Finished:
     """Recalibrate and search beside the friction law's own freedoms; a vehicle file can hold names, not the freedoms."""
     repeated = repeated_motion(problem, NULL_DRAWS, seed)
     noise, roles, baseline = recalibrate(problem, repeated, seed)

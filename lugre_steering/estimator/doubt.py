@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from lugre_steering.chain.baseline import most_friction
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
@@ -190,9 +191,9 @@ def _unseen(core):
 
 @inner
 def _length(core, side):
-    """Way [rad] over which the bristle of a side comes to the static friction."""
+    """Way [rad] over which the bristle of a side comes to the friction that holds it."""
     p = row(core.parameters, side, BASELINE)
-    return p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else math.inf
+    return most_friction(p) / p.sigma_0 if p.sigma_0 > 0.0 else math.inf
 
 
 @inner

@@ -46,7 +46,7 @@ from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle, vehicle_of
 from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
-from lugre_steering.vehicle.model import Model, build_model
+from lugre_steering.vehicle.model import Model, build_model, most_friction
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 from lugre_steering.vehicle.size import fastest
 
@@ -55,7 +55,7 @@ LINE_RING = 8192
 PENDING_RING = 8192
 WAITING_RING = 1024  # one side may come two seconds later than the other, at 500 Hz
 PLAN_POINTS = 1024
-LIMIT_STATIC = 3.0
+LIMIT_FRICTION = 3.0
 LIMIT_RATE_RAD_S = 1.0
 BOUND_RMSE = 5.0
 """A residual this many times as large as the held-out one of the calibration is implausible."""
@@ -71,7 +71,7 @@ class Options:
     forward_jump_s: float = quantity(0.1, 1e6, default=10.0)
     max_rate_rad_s: float = quantity(0.0, 1e3, default=0.0)  # 0: what no machine of its kind reaches (``vehicle.size.fastest``)
     feed_forward_horizon_s: float = quantity(0.0, 5.0, default=0.0)
-    feed_forward_limit_Nm: float = quantity(0.0, 1e9, default=0.0)  # of each side; 0: LIMIT_STATIC times static friction
+    feed_forward_limit_Nm: float = quantity(0.0, 1e9, default=0.0)  # of each side; 0: LIMIT_FRICTION times what its friction reaches
     feed_forward_rate_limit_Nm_s: float = quantity(0.0, 1e12, default=0.0)  # 0: what the bristle's stiffness makes of LIMIT_RATE
     withdrawal_ramp_s: float = quantity(0.0, 60.0, default=0.2)
     recovery_ramp_s: float = quantity(0.0, 60.0, default=1.0)
@@ -375,7 +375,7 @@ def _set_options(config: Records, parameters: Records, options: Options, vehicle
         config[f"{name}_ns"] = round(getattr(options, f"{name}_s") * 1e9)
     config["max_rate"] = options.max_rate_rad_s or fastest(vehicle)
     config["horizon"] = options.feed_forward_horizon_s
-    config["limit"] = options.feed_forward_limit_Nm or LIMIT_STATIC * parameters["static_torque"].max()
+    config["limit"] = options.feed_forward_limit_Nm or LIMIT_FRICTION * most_friction(vehicle) / len(vehicle.sides)
     config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * parameters["sigma_0"].max()
     config["withdrawal_ramp"], config["recovery_ramp"] = options.withdrawal_ramp_s, options.recovery_ramp_s
     config["plan_tolerance"], config["side_tolerance"] = options.plan_tolerance_rad, options.side_tolerance_rad
@@ -403,7 +403,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["effects"] = np.bitwise_or.reduce([acting(p) for p in model.parameters])
     config["message"] = -1
     config["step_door"], config["arm_door"], config["line_door"] = doors(model.composition)
-    config["friction"] = sum(float(p["static_torque"][0]) for p in model.parameters)
+    config["friction"] = most_friction(vehicle)
     config["weight"] = 1.0
     config["side_ratio"] = _side_ratio(vehicle)
     known = known_range(vehicle)

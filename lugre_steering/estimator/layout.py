@@ -83,7 +83,7 @@ CONFIG = np.dtype(
         ("exchange_count", np.int64),  # how often in a row the same was seen
         ("exchanged", np.int64),  # the pair that is taken for exchanged; 0: none
         ("residual_bound", np.float64),  # RMS [N m] beyond which a residual is implausible; 0: none is known
-        ("friction", np.float64),  # static torque of all sides [N m]
+        ("friction", np.float64),  # the larger of static and sliding friction of all sides [N m]
         ("seen_angle", np.float64),  # largest angle [rad] and rate [rad/s] that the calibration saw; inf: not told
         ("seen_rate", np.float64),
         ("released_ns", np.int64),  # stamp of the last feed-forward

@@ -70,7 +70,7 @@ def recall(core: Core, composition: Composition, sides: Sequence[str], memory: M
         if unseen:
             core.guard[i]["unseen_ns"] = stamp_ns
             bounds[2 * i : 2 * i + 2] = state
-            length = parameters[i]["static_torque"] / parameters[i]["sigma_0"]
+            length = max(parameters[i]["static_torque"], parameters[i]["coulomb_torque"]) / parameters[i]["sigma_0"]
             bounds["z"][2 * i : 2 * i + 2] = length, -length
         core.channels[i]["last_ns"], core.channels[i]["last_value"] = stamp_ns, angle
 

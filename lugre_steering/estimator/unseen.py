@@ -9,7 +9,7 @@ brings two starts closer to each other, whatever they were; until all agree, the
 
 from __future__ import annotations
 
-from lugre_steering.chain.baseline import REST_RATE_RAD_S
+from lugre_steering.chain.baseline import REST_RATE_RAD_S, most_friction
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
@@ -42,7 +42,7 @@ def lose_sight(core, side, stamp_ns, value, seconds):
 def part(core, side, stamp_ns, value, far):
     """The two ways to ``value`` [rad] of a joint that can have gone so far [rad], there and back, from where its state is."""
     c, g, p, state = core.config[0], core.guard[side], row(core.parameters, side, BASELINE), row(core.state, side, STATE)
-    length = p.static_torque / p.sigma_0 if p.sigma_0 > 0.0 else 0.0
+    length = most_friction(p) / p.sigma_0 if p.sigma_0 > 0.0 else 0.0
     aside = max(0.0, min(FORGOTTEN * length, 0.5 * (far - abs(value - state.theta))))
     for way in range(2):
         i = 2 * side + way
@@ -80,5 +80,5 @@ def drive_bounds(core, side, dt):
         bound = row(core.bounds, i, STATE)
         call_step(c.step_door, p, bound, core.rubber, out, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         apart = max(apart, abs(out.torque - core.output[side].torque))
-    if apart <= AGREED_SHARE * p.static_torque or _supported(c, g.unseen_ns):
+    if apart <= AGREED_SHARE * most_friction(p) or _supported(c, g.unseen_ns):
         g.unseen_ns, g.set_back = 0, False

@@ -40,7 +40,7 @@ def apply_calibration(vehicle: Vehicle, problem: Problem, x: Array) -> Vehicle:
         contact = replace(
             contact,
             coulomb_torque_Nm=coulomb * contact.coulomb_torque_Nm,
-            static_torque_Nm=max(static * contact.static_torque_Nm, coulomb * contact.coulomb_torque_Nm),
+            static_torque_Nm=static * contact.static_torque_Nm,
             stiffness_Nm_per_deg=stiffness * contact.stiffness_Nm_per_deg,
             stribeck_speed_deg_s=stribeck * contact.stribeck_speed_deg_s,
             # The chain keeps sigma_1 / sqrt(sigma_0).

@@ -86,6 +86,8 @@ EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 100.0
 hour of steering."""
 AIR_K, AIR_FAR_K, AIR_KNOWN_K = 15.0, 50.0, 1.0
 """Air against the vehicle file where none was recorded: standard deviation and range; standard deviation where it was."""
+LEAST_STATIC = 0.05
+"""Share of the sliding friction that static friction has at least."""
 TYPICAL = 1.0 / 3.0
 """Standard deviation of the size of a bend, in what it is at most, of real rubber."""
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
@@ -100,6 +102,15 @@ RIG = (
 """Of a single joint or axis, whose sheet holds rough numbers: it may have next to no friction."""
 
 
+SMOOTH = (
+    RIG[0],
+    replace(STATIC, low=-2.0),
+    replace(RIG[2], high=6.0),
+    RIG[3],
+)
+"""The same where friction rises smoothly from standstill, as that of lubricated contacts does: hardly any of it holds what stands."""
+
+
 def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:
     """The standard set; without rubber there is nothing thermal to calibrate."""
     if vehicle.rubber is not None:
@@ -108,6 +119,8 @@ def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:
         return STANDARD[:4]
     assert vehicle.contact is not None
     static, coulomb = vehicle.contact.static_torque_Nm, vehicle.contact.coulomb_torque_Nm
+    if static < coulomb:
+        return SMOOTH
     # Beside viscous friction of unknown size, a static level below the sliding one would be another viscous friction.
     return tuple(replace(c, low=-(static - coulomb) / coulomb) if c is STATIC else c for c in RIG)
 
@@ -364,7 +377,7 @@ class Problem:
                     values[field] = old * factor
         if "static_torque" in values:
             coulomb = values.get("coulomb_torque", sheet["coulomb_torque"])
-            values["static_torque"] = max(values["static_torque"], 0.3 * coulomb)
+            values["static_torque"] = max(values["static_torque"], LEAST_STATIC * coulomb)
         return values
 
     @cached_property

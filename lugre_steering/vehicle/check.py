@@ -42,8 +42,6 @@ def _check_friction(vehicle: Vehicle, reader: Reader) -> None:
         for section in ("axle", "track", "friction"):
             if getattr(vehicle, section) is not None:
                 raise fail(section, "a section", "no such section beside 'contact' (a single joint)")
-        if vehicle.contact.static_torque_Nm < vehicle.contact.coulomb_torque_Nm:
-            raise fail("contact.static_torque_Nm", vehicle.contact.static_torque_Nm, "at least coulomb_torque_Nm")
     else:
         for section in ("axle", "track", "friction"):
             if getattr(vehicle, section) is None:

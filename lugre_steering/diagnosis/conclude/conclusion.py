@@ -142,7 +142,7 @@ def _told(
     problem, found, judged = done.problem, done.found, stands.judged
     kept = {entry.id for entry in vehicle.effects}
     ended = [effect.id for effect in effects if effect.id not in kept]
-    advice = next_experiment(done, stands.verdict, model.whole, stands.lawful, stands.form)
+    advice = next_experiment(model.done, stands.verdict, model.whole, stands.lawful, stands.form)
     headline, statistics = statement(
         done, stands.verdict, effects, judged, causal, form, model.left, ended, model.law, stands.nearest, advice
     )
