@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.form import Bent, bent
 from lugre_steering.diagnosis.search.search import search
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise, noise_model, repeated_motion
-from lugre_steering.fitting.problem import SMOOTH, Problem, is_rig
+from lugre_steering.fitting.problem import SMOOTH, Problem, is_rig, smooth_calibrations
 from lugre_steering.fitting.split import Split, balanced, split
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array
@@ -38,7 +38,7 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
     if not is_rig(problem.vehicle) or problem.calibrations == SMOOTH:
         return done
     progress("searching beside a friction that rises smoothly from standstill")
-    smooth = _investigated(Problem(problem.vehicle, problem.runs, SMOOTH), seed, progress)
+    smooth = _investigated(Problem(problem.vehicle, problem.runs, smooth_calibrations(problem.vehicle, problem.runs)), seed, progress)
     return smooth if _left(smooth) < MUCH_LESS * _left(done) else done
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -101,14 +102,10 @@ RIG = (
 )
 """Of a single joint or axis, whose sheet holds rough numbers: it may have next to no friction."""
 
-
-SMOOTH = (
-    RIG[0],
-    replace(STATIC, low=-2.0),
-    replace(RIG[2], high=6.0),
-    RIG[3],
-)
+SMOOTH = (RIG[0], replace(STATIC, low=-2.0), replace(RIG[2], high=6.0), RIG[3])
 """The same where friction rises smoothly from standstill, as that of lubricated contacts does: hardly any of it holds what stands."""
+RISEN = 0.1
+"""Share of the fastest rate at which such a friction has risen; over all rates it would be a viscous friction."""
 
 
 def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:
@@ -123,6 +120,13 @@ def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:
         return SMOOTH
     # Beside viscous friction of unknown size, a static level below the sliding one would be another viscous friction.
     return tuple(replace(c, low=-(static - coulomb) / coulomb) if c is STATIC else c for c in RIG)
+
+
+def smooth_calibrations(vehicle: Vehicle, runs: Sequence[Run]) -> tuple[SheetValue, ...]:
+    """Those of a single joint or axis whose friction rises smoothly from standstill, whatever its sheet says."""
+    fastest = max(float(np.percentile(np.abs(run.omega), 99.0)) for run in runs)
+    most = max(math.log(RISEN * fastest / baseline_parameters(vehicle)["stribeck_speed"]), 0.0)
+    return (*SMOOTH[:3], replace(SMOOTH[3], high=min(most, SMOOTH[3].high)))
 
 
 @dataclass(frozen=True)
