@@ -25,6 +25,9 @@ USUAL_ACCELERATION_RAD_S2 = 0.11
 sqrt(sigma / acceleration), up to RATE_TIME_CONSTANT_S."""
 SETTLING, REMEMBERED = 4.0, 10.0
 """Time constants of that filter after which the rate is known, and for how many the way is remembered by which a joint moves."""
+LEVELS, SHORTEST, SURPRISED = 4, 1.2, 3.0
+"""Filters that hold the acceleration, each twice as quick as the one before, but for the samples that one takes at least; and standard
+deviations of the noise by which the forecasts of one may err in the mean, as they do where the motion changes faster than it follows."""
 NO_RATE_RAD_S = 1e-7
 """Rate that counts as none."""
 PROGRESS_TIME_CONSTANT_S = 0.05
@@ -40,8 +43,9 @@ MOTION = np.dtype(
         ("theta", np.float64),  # estimated angle [rad]
         ("omega", np.float64),  # estimated rate [rad/s]
         ("alpha", np.float64),  # estimated acceleration [rad/s2]
-        ("held", np.float64, 3),  # angle, rate and acceleration of the filter that holds the acceleration [rad, rad/s, rad/s2]
-        ("way", np.float64),  # of the play of late, in the memory of that filter [rad]
+        # Angle, rate, acceleration and mean error of the forecast of each filter that holds the acceleration [rad, rad/s, rad/s2, rad].
+        ("held", np.float64, (LEVELS, 4)),
+        ("way", np.float64),  # of the play of late, in the memory of the slowest of them [rad]
     ]
 )
 
@@ -64,7 +68,7 @@ def follow(s, dt, measured, measured_rate, sigma, acceleration_unit, accelerates
     """
     if s.age == 0.0:
         s.age = 1.0
-        s.center = s.theta = s.held[0] = measured
+        stand(s, measured)
         return
     half_width = WIDTH_SIGMA * sigma
     offset = measured - s.center
@@ -92,9 +96,7 @@ def follow(s, dt, measured, measured_rate, sigma, acceleration_unit, accelerates
     smoothing = min(RATE_TIME_CONSTANT_S, chosen)
     if accelerates:
         s.way = s.way * math.exp(-dt / (REMEMBERED * (chosen + dt))) + abs(moved)
-    if accelerates and math.isnan(measured_rate) and seen > SETTLING * (chosen + dt):
-        _hold_acceleration(s.held, dt, measured, chosen)
-        s.omega, s.alpha = s.held[1], s.held[2]
+    if accelerates and math.isnan(measured_rate) and _hold_acceleration(s, dt, seen, measured, chosen, sigma):
         if s.way <= half_width:  # chance may move the play, but not so far
             s.omega, s.alpha = s.progress if abs(s.progress) >= NO_RATE_RAD_S * acceleration_unit else 0.0, 0.0
         return
@@ -104,18 +106,44 @@ def follow(s, dt, measured, measured_rate, sigma, acceleration_unit, accelerates
     s.omega += change
     if abs(s.omega) < NO_RATE_RAD_S * acceleration_unit and step == 0.0:
         s.omega = 0.0
-    s.held[0], s.held[1] = measured, s.omega
     if seen > SETTLING * (smoothing + dt):
         s.alpha += (change / dt - s.alpha) * gain
 
 
 @inner
-def _hold_acceleration(held, dt, measured, time_constant):
-    """Critically damped g-h-k filter of the measured angle (Brookner, Tracking and Kalman Filtering Made Easy (1998), 1.3)."""
-    keep = math.exp(-dt / time_constant)
-    lost = 1.0 - keep
-    ahead = held[0] + dt * (held[1] + 0.5 * dt * held[2])
-    apart = measured - ahead
-    held[0] = ahead + (1.0 - keep**3) * apart
-    held[1] += dt * held[2] + 1.5 * lost**2 * (1.0 + keep) * apart / dt
-    held[2] += 2.0 * lost**3 * apart / dt**2
+def _hold_acceleration(s, dt, seen, measured, chosen, sigma):
+    """Rate and acceleration of the slowest filter that follows the motion; False while none of them has settled.
+
+    Critically damped g-h-k filters of the measured angle (Brookner, Tracking and Kalman Filtering Made Easy (1998), 1.3). One that
+    suits slow motion comes late to a fast one, and its forecasts then err to one side.
+    """
+    best = -1
+    for level in range(LEVELS - 1, -1, -1):
+        held, memory = s.held[level], max(chosen * 0.5**level, min(chosen, SHORTEST * dt))
+        if seen <= SETTLING * (memory + dt):
+            held[0], held[1], held[2], held[3] = measured, s.omega, s.alpha, 0.0
+            continue
+        keep = math.exp(-dt / memory)
+        lost = 1.0 - keep
+        ahead = held[0] + dt * (held[1] + 0.5 * dt * held[2])
+        apart = measured - ahead
+        held[0] = ahead + (1.0 - keep**3) * apart
+        held[1] += dt * held[2] + 1.5 * lost**2 * (1.0 + keep) * apart / dt
+        held[2] += 2.0 * lost**3 * apart / dt**2
+        share = dt / (memory + dt)
+        held[3] += (apart - held[3]) * share
+        if best < 0 or abs(held[3]) <= SURPRISED * sigma * math.sqrt(share / (2.0 - share)):
+            best = level
+    if best < 0:
+        return False
+    s.omega, s.alpha = s.held[best, 1], s.held[best, 2]
+    return True
+
+
+@inner
+def stand(s, angle):
+    """The motion state of a standstill at an angle [rad]."""
+    s.center, s.lead, s.progress = angle, 0.0, 0.0
+    s.theta, s.omega, s.alpha = angle, 0.0, 0.0
+    for level in range(LEVELS):
+        s.held[level, 0], s.held[level, 1], s.held[level, 2], s.held[level, 3] = angle, 0.0, 0.0, 0.0

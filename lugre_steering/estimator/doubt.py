@@ -22,6 +22,7 @@ from lugre_steering.chain.baseline import most_friction
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
+from lugre_steering.chain.rates import stand
 from lugre_steering.estimator.noise import learn_noise, noisy
 from lugre_steering.estimator.preview import departs
 from lugre_steering.estimator.unseen import AGREED_SHARE, FASTER, UNSEEN_SIGMA, farthest, lose_sight, part
@@ -326,14 +327,6 @@ def trust(core, side, dt):
 
 
 @inner
-def _stand_at(motion, value):
-    """The motion estimate at a standstill there."""
-    motion.center, motion.lead, motion.progress = value, 0.0, 0.0
-    motion.theta, motion.omega, motion.alpha = value, 0.0, 0.0
-    motion.held[0], motion.held[1], motion.held[2] = value, 0.0, 0.0
-
-
-@inner
 def reachable(core, side, since_ns, stamp_ns, change):
     """Whether a joint can have turned by ``change`` [rad] between two stamps, at the rates that it has shown."""
     return abs(change) <= farthest(core, side, (stamp_ns - since_ns) * 1e-9)
@@ -413,7 +406,7 @@ def re_anchor(core, side, ch, stamp_ns, value, running):
     for other in range(core.motion.size):  # a jump is no motion
         core.guard[other].still_other, core.guard[other].apart = math.nan, 0
     g.before = g.before_s = g.bend = 0.0
-    _stand_at(motion, value)
+    stand(motion, value)
 
 
 @inner
