@@ -83,7 +83,7 @@ _MEANINGS = {
     "backward_jump_s": "a confirmed jump of all angles back in time this long is a new beginning, with the heat and memories so far [s]",
     "forward_jump_s": "a jump ahead this long must be confirmed [s]",
     "max_rate_rad_s": "a faster change of an angle is a spike [rad/s]; 0: 10 of tracks and axes, 100 of a joint",
-    "feed_forward_limit_Nm": "largest feed-forward of each side [N m]; 0: three times its static friction",
+    "feed_forward_limit_Nm": "largest feed-forward of each side [N m]; 0: three times the friction of its file",
     "feed_forward_rate_limit_Nm_s": "fastest change of the feed-forward [N m/s]; 0: what its presliding stiffness makes of 1 rad/s",
     "withdrawal_ramp_s": "the feed-forward goes to zero over this time when anything speaks against it [s]",
     "recovery_ramp_s": "and comes back over this time, as commands do after silence [s]",
