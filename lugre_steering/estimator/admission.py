@@ -9,7 +9,7 @@ import math
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import copy_row, row
 from lugre_steering.chain.layout import STATE
-from lugre_steering.estimator.doubt import leapt, reachable, runs
+from lugre_steering.estimator.doubt import leapt, reachable, runs, strays
 from lugre_steering.estimator.layout import (
     ABSURD,
     BACKWARD,
@@ -284,6 +284,10 @@ def admit(core, k, stamp_ns, value):
         follows_suspect or core.guard[ch.index].absurd or core.guard[ch.index].leap_ns != 0 or abs(value - ch.last_value) > _reach(c, ahead)
     ):
         verdict = _jump_of_angle(core, ch, stamp_ns, value, follows_suspect)
+    # What an inertia makes of a stray angle is beyond any torque; a joint that has indeed set off loses one sample.
+    waits = verdict == _GOES_ON and ch.kind == Kind.ANGLE and c.accelerates and ch.suspect_ns == 0
+    if waits and strays(core, ch.index, ch, ahead * 1e-9, value):
+        return _suspect(ch, SPIKE, stamp_ns, value)
     if verdict == _GOES_ON and ch.kind == Kind.PRESSURE:
         verdict = _jump_of_line(c, ch, stamp_ns, value, follows_suspect)
     if verdict != _GOES_ON:

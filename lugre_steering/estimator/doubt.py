@@ -41,6 +41,9 @@ LEAP_SHARE = 0.1
 LEAP_SIGMA = 10.0
 LEAP_RATE_RAD_S = 1.0
 """No joint needs a sample to come to such a rate, or to leave it."""
+STRAY_TIMES, DEPARTED_MEMORY_S, STRAY_AFTER_S = 3.0, 10.0, 0.2
+"""Times as far as any reading of late departs one from the motion that is held back until the next; time for which late is, and after
+which the motion is known well enough to say so."""
 STANDING_SIGMA = 5.0
 """A reading this many times its noise from where it stood has moved: chance alone does that once in 200 000 samples."""
 STILL_NS = 100_000_000
@@ -93,6 +96,7 @@ GUARD = np.dtype(
         ("calm", np.float64),  # time without another jump since [s]
         ("returned", np.bool_),  # to where the shadow can have gone
         ("absurd", np.bool_),  # the readings since the last accepted one
+        ("departed", np.float64),  # how far readings of late have departed from the motion before them [rad]
         ("leap_ns", np.int64),  # stamp of the reading before one that departs from the motion so far; 0: none does
         ("leap_angle", np.float64),  # measured then [rad]
         ("leap_since_ns", np.int64),  # since when the joint may have been on its way
@@ -284,6 +288,20 @@ def _leap_limit(core, side, dt):
     g, p = core.guard[side], row(core.parameters, side, BASELINE)
     noise = LEAP_SIGMA * max(core.config[0].angle_noise, math.sqrt(g.noise))
     return max(LEAP_SHARE * _length(core, side), noise) + max(2.0 * FASTER * g.fastest, LEAP_RATE_RAD_S * p.angle_unit) * dt
+
+
+@inner
+def strays(core, side, ch, dt, value):
+    """Whether a reading [rad] departs from the motion so far by much more than any did of late."""
+    motion, usual = core.motion[side], max(STRAY_TIMES * core.guard[side].departed, core.config[0].angle_noise)
+    return motion.age > 1.0 + STRAY_AFTER_S and dt > 0.0 and abs(value - ch.last_value - motion.omega * dt) > usual
+
+
+@inner
+def depart(core, side, dt, apart):
+    """A reading was used that departed so far [rad] from the motion before it."""
+    g = core.guard[side]
+    g.departed = max(apart, g.departed * math.exp(-dt / DEPARTED_MEMORY_S))
 
 
 @inner

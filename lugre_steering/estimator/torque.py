@@ -20,6 +20,7 @@ from lugre_steering.estimator.doubt import (
     angle_doubts,
     begin_again,
     comes_back,
+    depart,
     re_anchor,
     runs,
     standing_doubts,
@@ -183,7 +184,10 @@ def advance(core, k, stamp_ns, value, rate, verdict, estimates, count):
         rate = believed(rates, ch, c, dt, value, rate)
         g.leap_ns = 0
         p = row(core.parameters, side, BASELINE)
-        if abs(value - ch.last_value - motion.omega * dt) > LEAP_RATE_RAD_S * p.angle_unit * dt:  # the call alone costs 0.1 us
+        apart = abs(value - ch.last_value - motion.omega * dt)
+        if c.accelerates and ch.head >= 2:
+            depart(core, side, dt, apart)
+        if apart > LEAP_RATE_RAD_S * p.angle_unit * dt:  # the call alone costs 0.1 us
             watch_leap(core, side, ch, dt, value)
         watch(core, side, ch, stamp_ns, dt, value)
         if dt * 1e9 > c.max_gap_ns:
