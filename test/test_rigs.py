@@ -26,6 +26,7 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.bench import joints
 from lugre_steering.calibration.calibrate import calibrate_recordings
+from lugre_steering.chain.step import torque_side
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import Run, as_recorded, averaged, ideal_run, in_parallel, prepare
 from lugre_steering.data.quality import inspect
@@ -44,6 +45,7 @@ from lugre_steering.simulate.run import Simulated, sensing_of, simulate
 from lugre_steering.simulate.write import write_bag
 from lugre_steering.units import label, law, title, words
 from lugre_steering.vehicle import EffectEntry, Vehicle
+from lugre_steering.vehicle.model import build_model
 from lugre_steering.vehicle.sections import Gravity
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -561,6 +563,21 @@ def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_s
     assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.02)
     assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
     assert result.json["augmented"]["heldout_rmse_Nm"] < 1.5 * vehicle.torque_sensor.noise_Nm
+
+
+def test_a_part_of_the_way_with_more_friction_is_found_as_far_as_a_joint_turns() -> None:
+    base = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)
+    there = {"change": 0.5, "angle_low": 1.0, "angle_high": 1.8}
+    model = build_model(base.replace(effects=(EffectEntry("surface_patch", there),)))
+    time, rng = np.arange(0.0, 60.0, 0.02), np.random.default_rng(5)
+    angle = 2.2 * np.sin(0.5 * time) * np.cos(0.11 * time)
+    rate = np.gradient(angle, time)
+    torque = torque_side(model.parameters[0], model.rubber, time, angle, rate, np.gradient(rate, time))
+    torque += 0.3 * rng.standard_normal(time.size)
+    noisy = angle + base.sensors.angle_sigma * rng.standard_normal(time.size)
+    result = diagnose_recordings([Recording("joint", 0, {"left": Signal(time, noisy)}, {}, measured_torque=Signal(time, torque))], base)
+    (patch,) = (effect for effect in result.effects if effect.id == "surface_patch")
+    assert {name: patch.parameters[name].value for name in there} == pytest.approx(there, rel=0.1)
 
 
 def test_friction_that_rises_smoothly_from_standstill_is_none_that_sticks(tmp_path: Path) -> None:

@@ -46,6 +46,8 @@ class Parameter:
     """Sought below zero on a single joint or axis only; on tracks other entries are there for that."""
     far_turning: bool = False
     """Sought on a single joint that turns so far that it is something else than a constant torque; otherwise it is none."""
+    place: bool = False
+    """A place on the way, or a distance between two: joints and axes may turn further than its bounds, which are those of tracks."""
     example: float | None = None
     """A value at which it acts in an ordinary double cycle, where ``scale`` would leave it idle."""
     pull: float = 0.0

@@ -60,8 +60,8 @@ EFFECT = Effect(
     coordinate="steering angle",
     parameters=(
         Parameter("change", "1", "relative change of the friction level", 0.05, -0.9, 2.0),
-        Parameter("angle_low", "rad", "start of the angle window of each track", 0.05, -1.2, 1.2, example=0.0),
-        Parameter("angle_high", "rad", "end of the angle window", 0.05, -1.2, 1.2, example=0.2),
+        Parameter("angle_low", "rad", "start of the angle window of each track", 0.05, -1.2, 1.2, example=0.0, place=True),
+        Parameter("angle_high", "rad", "end of the angle window", 0.05, -1.2, 1.2, example=0.2, place=True),
         Parameter("time_start", "s", "start of the time window", 2.0, -10.0, 1e5, example=5.0),
         Parameter("time_end", "s", "end of the time window", 2.0, -10.0, 1e5, example=30.0),
     ),

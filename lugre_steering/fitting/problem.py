@@ -125,7 +125,7 @@ def calibrations_for(vehicle: Vehicle) -> tuple[SheetValue, ...]:
 def smooth_calibrations(vehicle: Vehicle, runs: Sequence[Run]) -> tuple[SheetValue, ...]:
     """Those of a single joint or axis whose friction rises smoothly from standstill, whatever its sheet says."""
     fastest = max(float(np.percentile(np.abs(run.omega), 99.0)) for run in runs)
-    most = max(math.log(RISEN * fastest / baseline_parameters(vehicle)["stribeck_speed"]), 0.0)
+    most = math.log(max(RISEN * fastest / baseline_parameters(vehicle)["stribeck_speed"], 1.0))
     return (*SMOOTH[:3], replace(SMOOTH[3], high=min(most, SMOOTH[3].high)))
 
 
@@ -187,7 +187,8 @@ def size_of(vehicle: Vehicle, runs: Sequence[Run]) -> Size:
     travel = max(float(np.ptp(run.theta)) for run in runs)
     torque = max(float(np.percentile(np.abs(run.measured), 99.0)) for run in runs)
     angle = 1.0 if vehicle.coordinate.unit == "rad" else decade(travel, TRAVEL_RAD)
-    return Size(decade(SPARE * torque / len(vehicle.sides), FRICTION_NM), angle)
+    farthest = max(float(np.abs(run.theta).max()) for run in runs)
+    return Size(decade(SPARE * torque / len(vehicle.sides), FRICTION_NM), angle, farthest)
 
 
 def resized(effect: Effect, size: Size) -> Effect:
@@ -196,7 +197,10 @@ def resized(effect: Effect, size: Size) -> Effect:
     def of(p: Parameter) -> Parameter:
         worth = size.of(p.unit)
         grid = p.grid if p.relative_to else tuple(worth * value for value in p.grid)
-        return replace(p, scale=p.scale * worth, low=p.low * worth, high=p.high * worth, grid=grid)
+        low, high = p.low * worth, p.high * worth
+        if p.place:
+            low, high = min(low, -size.farthest) if low < 0.0 else low, max(high, size.farthest)
+        return replace(p, scale=p.scale * worth, low=low, high=high, grid=grid)
 
     return effect if size == VEHICLE else replace(effect, parameters=tuple(of(p) for p in effect.parameters))
 

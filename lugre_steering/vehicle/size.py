@@ -27,10 +27,12 @@ _UNIT = re.compile(r"(N m|kg m2|rad|W|J)(?![A-Za-z])(?:\^?(\d))?")
 
 @dataclass(frozen=True)
 class Size:
-    """Units of torque [N m] and angle [rad] of a machine; powers of ten, so that all vehicles alike share one."""
+    """Units of torque [N m] and angle [rad] of a machine, powers of ten, so that all vehicles alike share one; and how far from zero it
+    turns [rad], where that may be further than tracks do."""
 
     torque: float = 1.0
     angle: float = 1.0
+    farthest: float = 0.0
 
     def of(self, unit: str) -> float:
         """What a number in a unit of the catalogue, written for a vehicle, is worth on this machine."""
