@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.model import most_friction
+from lugre_steering.vehicle.model import most_friction_of_all
 
 BINS = 2048  # columns of a curve: more than a picture has pixels
 FIRST_BIN_S = 1e-3
@@ -144,7 +144,7 @@ class Comparison:
 
 def is_large(residual_rms: float, estimate_rms: float, measured_rms: float, vehicle: Vehicle) -> bool:
     """Whether a residual is so large beside the torque that wrong units, signs or plugs are likelier than missing physics."""
-    friction = most_friction(vehicle)
+    friction = most_friction_of_all(vehicle)
     return estimate_rms > NOTABLE_SHARE * friction and residual_rms > LARGE_SHARE * min(estimate_rms, measured_rms)
 
 
@@ -155,7 +155,7 @@ def sheet_words(residual_squares: float, estimate_squares: float, measured_squar
     The sum of products follows from them, residual = measured - estimate; the best factor on the estimate is that over the
     estimate's squares.
     """
-    friction = most_friction(vehicle)
+    friction = most_friction_of_all(vehicle)
     product = 0.5 * (measured_squares + estimate_squares - residual_squares)
     if not product > ALIKE * math.sqrt(estimate_squares * measured_squares) or friction <= 0.0:
         return None

@@ -46,7 +46,7 @@ from lugre_steering.recording import Array, IntArray, Kind
 from lugre_steering.schema import quantity
 from lugre_steering.vehicle import Vehicle, vehicle_of
 from lugre_steering.vehicle.cylinders import CylinderTable, gauge_offset
-from lugre_steering.vehicle.model import Model, build_model, most_friction
+from lugre_steering.vehicle.model import Model, build_model, most_friction_of_all
 from lugre_steering.vehicle.sensors import delay_s, lag_s
 from lugre_steering.vehicle.size import fastest
 
@@ -375,7 +375,7 @@ def _set_options(config: Records, parameters: Records, options: Options, vehicle
         config[f"{name}_ns"] = round(getattr(options, f"{name}_s") * 1e9)
     config["max_rate"] = options.max_rate_rad_s or fastest(vehicle)
     config["horizon"] = options.feed_forward_horizon_s
-    config["limit"] = options.feed_forward_limit_Nm or LIMIT_FRICTION * most_friction(vehicle) / len(vehicle.sides)
+    config["limit"] = options.feed_forward_limit_Nm or LIMIT_FRICTION * most_friction_of_all(vehicle) / len(vehicle.sides)
     config["rate_limit"] = options.feed_forward_rate_limit_Nm_s or LIMIT_RATE_RAD_S * parameters["sigma_0"].max()
     config["withdrawal_ramp"], config["recovery_ramp"] = options.withdrawal_ramp_s, options.recovery_ramp_s
     config["plan_tolerance"], config["side_tolerance"] = options.plan_tolerance_rad, options.side_tolerance_rad
@@ -403,7 +403,7 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["effects"] = np.bitwise_or.reduce([acting(p) for p in model.parameters])
     config["message"] = -1
     config["step_door"], config["arm_door"], config["line_door"] = doors(model.composition)
-    config["friction"] = most_friction(vehicle)
+    config["friction"] = most_friction_of_all(vehicle)
     config["weight"] = 1.0
     config["side_ratio"] = _side_ratio(vehicle)
     known = known_range(vehicle)

@@ -15,7 +15,7 @@ from lugre_steering.counted import counted
 from lugre_steering.online import NOTABLE_SHARE, is_large, sheet_words
 from lugre_steering.recording import NODE, IntArray, Kind
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.model import most_friction
+from lugre_steering.vehicle.model import most_friction_of_all
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 STALE = "stale"
@@ -303,7 +303,7 @@ class Health:
     def _wrong_sheet(self) -> str:
         """What to check in the vehicle file, where the measured torque has the shape of the estimate but another size."""
         residual, estimate, measured, count = self._sums(SHEET_SECONDS)
-        friction = most_friction(self._vehicle)
+        friction = most_friction_of_all(self._vehicle)
         if not count or estimate < (NOTABLE_SHARE * friction) ** 2 * count:
             return ""
         return sheet_words(residual, estimate, measured, self._vehicle) or ""

@@ -59,7 +59,7 @@ def build_model(vehicle: Vehicle, *, lean: bool = False, more_laws: int = 0) -> 
     return Model(composition, tuple(record.copy() for _ in vehicle.sides), lines, rubber)
 
 
-def most_friction(vehicle: Vehicle) -> float:
+def most_friction_of_all(vehicle: Vehicle) -> float:
     """The larger of static and sliding friction torque of all sides together, at the reference temperature [N m]."""
     values = baseline_parameters(vehicle)
     return len(vehicle.sides) * max(values["static_torque"], values["coulomb_torque"])

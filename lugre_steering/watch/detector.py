@@ -21,7 +21,7 @@ from numba import njit
 
 from lugre_steering.chain.step import Records
 from lugre_steering.vehicle import Vehicle
-from lugre_steering.vehicle.model import baseline_parameters, most_friction
+from lugre_steering.vehicle.model import baseline_parameters, most_friction_of_all
 
 MANOEUVRE = 2.0
 FLOOR_SHARE = 1e-3
@@ -97,7 +97,7 @@ class Watch:
     """The detector of one vehicle, fed with what the estimator returns."""
 
     def __init__(self, vehicle: Vehicle, threshold: float = THRESHOLD) -> None:
-        self._friction = most_friction(vehicle)
+        self._friction = most_friction_of_all(vehicle)
         self._travel = MANOEUVRE * self._friction / len(vehicle.sides) / baseline_parameters(vehicle)["sigma_0"]
         self._threshold = threshold
         self._state: Records = np.zeros(1, STATE)
