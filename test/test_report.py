@@ -315,6 +315,14 @@ def test_what_holds_at_the_times_of_a_recording_is_not_for_the_live_node(vehicle
     assert live in source[source.index('<section id="next">') : source.index('<section id="torque">')]
 
 
+def test_a_name_that_is_only_the_nearest_is_where_to_look(vehicle: Vehicle) -> None:
+    named = missing(vehicle)
+    nearest = dataclasses.replace(named, effects=(dataclasses.replace(named.effects[0], bends=True),))
+    told = "as where to look, not as the cause"
+    assert told in page_of(nearest).text
+    assert told not in page_of(named).text
+
+
 def test_sheet_values_stand_beside_fitted_ones(vehicle: Vehicle) -> None:
     assert vehicle.friction is not None
     fitted = vehicle.replace(friction=dataclasses.replace(vehicle.friction, coulomb=0.6))

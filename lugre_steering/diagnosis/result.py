@@ -156,6 +156,8 @@ class NamedEffect:
     """Largest torque it makes in the recordings [N m]."""
     largest_share: float | None = field(default=None, metadata=ADDED)
     """The same over the amplitude of the measured torque."""
+    bends: bool = field(default=False, metadata=ADDED)
+    """Whether it is only the nearest entry: what is left is structure, and more than its law may bend to."""
 
 
 @dataclass(frozen=True)

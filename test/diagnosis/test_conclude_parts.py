@@ -15,7 +15,9 @@ from lugre_steering.diagnosis.conclude.augmented import augmented_vehicle
 from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.statement import _gain, at_end, calibrations_at_bounds
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.result import FittedValue, NamedEffect
+from lugre_steering.diagnosis.freedom import Freedom
+from lugre_steering.diagnosis.loudness import excess
+from lugre_steering.diagnosis.result import FittedValue, NamedEffect, Unexplained
 from lugre_steering.diagnosis.search import locate, surely
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.diagnosis.verify import Judged, rmse
@@ -26,6 +28,7 @@ from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import Candidate, Problem
 
+FREEDOM = Freedom("level", "friction_level", "rate", -1.0, 1.0, np.ones((1, 2)))
 OFFSET = (Candidate(CATALOGUE["pressure_offset"], line="main_a", free=("offset",)), {"offset": 3e5})
 
 
@@ -118,6 +121,25 @@ def test_what_leaves_no_trace_has_no_limit_and_is_told(problem: Problem) -> None
     assert found["end_stop"][1] is None
     assert found["viscous_friction"][1] is not None
     assert not {"slope_bias", "relief_saturation"} & set(found)  # named; without an amplitude of its own
+
+
+@pytest.mark.parametrize(("beside", "bends"), [(0.0, False), (0.04, False), (0.2, True)])
+def test_a_name_that_leaves_more_than_its_law_may_bend_to_is_only_the_nearest(problem: Problem, beside: float, bends: bool) -> None:
+    """What no freedom and no name does here is a torque that alternates, with a share of the energy of what the name does."""
+    name = effect("end_stop", stiffness=4e4, engage_angle=0.2)
+    baseline = fit(problem, weight(problem))
+    done = finished(problem, baseline)
+    there = replace(done, problem=with_torque(problem, problem.predict_all(problem.start(), [name])), freedoms=(FREEDOM,))
+    plain = replace(there, found=Search(fit(there.problem, weight(problem)), fit(there.problem, weight(problem), [name]), (), (), ()))
+    took = excess(there.problem, plain.found.baseline, plain.fitted) - excess(there.problem, plain.found.final, plain.fitted)
+    assert took > 1.0
+    flicker = SIGMA * np.sqrt(beside * took) * np.where(np.arange(problem.valid.size) // 20 % 2, 1.0, -1.0)
+    final = replace(plain.found.final, prediction=plain.found.final.prediction - flicker)
+    structured = left_over.LeftOver(Unexplained(True, "", None), "left", True)
+    left = replace(plain, found=replace(plain.found, final=final))
+    assert left_over.only_nearest(left, structured) is bends
+    assert not left_over.only_nearest(left, structured._replace(structured=False))
+    assert not left_over.only_nearest(replace(left, freedoms=()), structured)  # of a single joint
 
 
 @pytest.mark.parametrize("count", [20, 45])

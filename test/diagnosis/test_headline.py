@@ -56,6 +56,12 @@ def test_what_where_how_much_and_what_to_do() -> None:
     )
 
 
+@pytest.mark.parametrize(("count", "told"), [(1, "that is only the nearest"), (2, "those are only the nearest")])
+def test_names_that_leave_much_are_told_as_the_nearest_of_the_catalogue(count: int, told: str) -> None:
+    said = headline.missing(finished(), [stop(bends=True)] * count, "", None, kept=True)
+    assert f"(25 % of the torque); {told} in the catalogue, and much is left that no entry is. Use" in said
+
+
 def test_sensors_are_to_be_checked_and_ties_to_be_told_apart_by_a_drive() -> None:
     drift = stop(id="pressure_offset", stage="measurement", where=(Place("a", ((0.0, 100.0),), "time", (0.0, 100.0), "s"),))
     advice = Experiment("slow-sweeps: half sweeps at 0.5, 1, 4 and 2 deg/s", ("a", "b"), "")

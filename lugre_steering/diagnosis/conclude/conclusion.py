@@ -16,7 +16,7 @@ from lugre_steering.diagnosis.conclude.evidence import evidence, traces
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.joint import in_parallel
 from lugre_steering.diagnosis.conclude.late import fitted_to_all
-from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws
+from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, only_nearest
 from lugre_steering.diagnosis.conclude.stands import CONTRADICTED, Stands, standing, without_laws
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
@@ -87,7 +87,8 @@ class _WithFile(NamedTuple):
 
 def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float, seed: int) -> _WithFile:
     model = _modelled(done, stands, seed)
-    effects = named_effects(model.done, model.whole, model.bent, material) if stands.named else []
+    nearest = stands.lawful is None and only_nearest(done, stands.left)
+    effects = named_effects(model.done, model.whole, model.bent, material, nearest) if stands.named else []
     vehicle, causal = filtered(_written(model, stands, effects), recordings, done.problem.runs)
     return _WithFile(model, effects, vehicle, causal)
 

@@ -30,9 +30,9 @@ BOTH_SIDES = 0.5
 IN_PLACE = "small changes of the form of the friction law, all of them together, would explain as much"
 
 
-def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> list[NamedEffect]:
+def named_effects(done: Finished, whole: Fit, bent: Fit, material: float, nearest: bool) -> list[NamedEffect]:
     """Entries of the named effects in ``whole`` (fitted to all data; laws come after them), largest share first; ``bent``: the same
-    beside all freedoms, which says how sure their values are; ``material``: see ``_statement``."""
+    beside all freedoms, which says how sure their values are; ``material``: see ``_statement``; ``nearest``: they are only that."""
     problem, found = done.problem, done.found
     intervals = _intervals(done, whole, bent)
     start = cost(problem, found.baseline, done.fitted)
@@ -49,7 +49,7 @@ def named_effects(done: Finished, whole: Fit, bent: Fit, material: float) -> lis
             p_value=item.score.p_value, parameters=intervals[index], where=tuple(_where(done, candidate, part)),
             energy_share=float(np.clip(removed / max(start, 1e-9) * item.gain / max(total, 1e-9), 0.0, 1.0)),
             masked_share=float(np.clip(item.score.masked_share, 0.0, 1.0)), indistinguishable_from=tuple(rivals),
-            largest_Nm=size, largest_share=size / done.amplitude,
+            largest_Nm=size, largest_share=size / done.amplitude, bends=nearest,
         ))  # fmt: skip
     return sorted(entries, key=lambda entry: -entry.energy_share)
 

@@ -43,6 +43,8 @@ def missing(done: Finished, effects: Sequence[NamedEffect], law: str, advice: Ex
     them = "it" if len(effects) == 1 and not law else "them"
     beside = [f"beside that {law}, which no entry of the catalogue is"] if law else []
     found = "; and ".join([*(_found(done, effect) for effect in effects), *beside])
+    if any(effect.bends for effect in effects):
+        found += f"; {'that is' if len(effects) == 1 else 'those are'} only the nearest in the catalogue, and much is left that no entry is"
     use = f"Use augmented.yaml, which has {them},"
     if any(bound_to_time(effect.id, effect.parameters) for effect in effects):
         only = f"{use} to replay these recordings, not in the live node"

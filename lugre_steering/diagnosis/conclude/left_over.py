@@ -12,9 +12,10 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.conclude.headline import inside
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.loudness import beyond_calibration, loudness
+from lugre_steering.diagnosis.loudness import beyond_calibration, excess, loudness
 from lugre_steering.diagnosis.result import Place, Unexplained
 from lugre_steering.diagnosis.search import locate
+from lugre_steering.diagnosis.search.search import BENT
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import Array
 from lugre_steering.report import words
@@ -64,6 +65,14 @@ def left_over(done: Finished, final: Fit, needs_form: bool = False) -> LeftOver:
     )
     where = _where(done, axes, axis, residual)
     return LeftOver(Unexplained(True, text, None, tuple(where)), text, True)
+
+
+def only_nearest(done: Finished, left: LeftOver) -> bool:
+    """Whether names leave so much structure beside all freedoms that their laws would have to bend by more than laws may. Of a single
+    joint or axis, which is compared without freedoms, it is not known."""
+    there, found = done.compared, done.compared.found
+    rest = excess(there.problem, found.final, there.fitted)
+    return left.structured and bool(there.freedoms) and rest > BENT**2 * (excess(there.problem, found.baseline, there.fitted) - rest)
 
 
 def _form(done: Finished, final: Fit) -> str:

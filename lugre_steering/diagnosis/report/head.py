@@ -76,6 +76,8 @@ def next_steps(diagnosis: Diagnosis) -> str:
                 f"Do not rely on the name alone: with these data {rivals} would explain the same as "
                 f"{called(diagnosis, effect['id'], within=True)}. The augmented model predicts well either way."
             )
+    if nearest := [called(diagnosis, effect["id"], within=True) for effect in result["effects"] if effect["bends"]]:
+        steps.append(f"Take {' and '.join(nearest)} as where to look, not as the cause: much is left that no entry of the catalogue is.")
     if {effect["id"] for effect in result["effects"]} & {entry.id for entry in diagnosis.vehicle.effects}:
         momentary = any(bound_to_time(effect["id"], effect["parameters"]) for effect in result["effects"])
         live = (
