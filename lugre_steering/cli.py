@@ -85,6 +85,9 @@ def replay(
     initial_temperature: Annotated[
         str | None, typer.Option(help="of the rubber at the start of each bag [degC], or 'air': the first recorded air")
     ] = None,
+    look_ahead: Annotated[
+        bool, typer.Option("--look-ahead", help="also tell the model's error with the motion known from all samples, as diagnose has it")
+    ] = False,
     jobs: Jobs = 1,
     fail_on: FailOn = None,
     as_json: Json = False,
@@ -105,7 +108,9 @@ def replay(
         options = replace(options, feed_forward_horizon_s=horizon)
     found = find(bags, out)
     with progress_bar() as progress:
-        result = run(found.bags, vehicle, out, options, progress, initial_temperature, jobs=jobs, skipped=found.skipped)
+        result = run(
+            found.bags, vehicle, out, options, progress, initial_temperature, jobs=jobs, look_ahead=look_ahead, skipped=found.skipped
+        )
     for note in {bag["picture_note"] for bag in result["bags"]} - {None}:
         print(f"lugre-steering: {note}", file=sys.stderr)
     if as_json:

@@ -87,7 +87,7 @@ def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
 
 
 def test_rooms_show_what_they_are_called_with() -> None:
-    assert list(inspect.signature(ls.replay).parameters) == ["data", "vehicle", "options"]
+    assert list(inspect.signature(ls.replay).parameters) == ["data", "vehicle", "options", "look_ahead"]
     assert list(inspect.signature(ls.simulate).parameters)[:3] == ["what", "vehicle", "effects"]
     assert "kept in memory" in str(inspect.getdoc(ls.replay))
     assert "a built-in manoeuvre" in str(inspect.getdoc(ls.simulate))

@@ -22,6 +22,7 @@ import bag_making as make
 import numpy as np
 import pytest
 from bag_making import Message
+from rich.console import Console
 from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner
 
@@ -35,6 +36,7 @@ from lugre_steering.estimator.node_parameters import ParameterError, read_option
 from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.recording import Kind
 from lugre_steering.replay.run import replay
+from lugre_steering.replay.table import show_replay
 from lugre_steering.vehicle import Vehicle, load
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -247,6 +249,22 @@ def test_fits_the_truth_of_the_recording(result: list[Message]) -> None:
     assert np.sqrt(np.mean(error**2)) < 0.01 * np.abs(truth).max()
 
 
+@pytest.mark.parametrize(("initial_temperature", "right"), [(None, True), ("60", False)])
+def test_the_error_looking_ahead_is_that_of_the_model_as_warm_as_it_began(
+    double_cycle: tuple[Path, dict[str, Any]], tmp_path: Path, initial_temperature: str | None, right: bool
+) -> None:
+    """The recording is of the model, so that only the noise of its pressures is left; not where the rubber is said to be hot."""
+    told = double_cycle[1]["bags"][0]
+    summary = replay([DOUBLE_CYCLE], VEHICLE, tmp_path, initial_temperature=initial_temperature, look_ahead=True)
+    (bag,) = summary["bags"]
+    assert told["look_ahead_rmse_Nm"] is None
+    assert (bag["look_ahead_rmse_Nm"] < 1.2 * told["fit"]["rmse_Nm"]) is right
+    assert "motion known from all samples" in (tmp_path / bag["page"]).read_text(encoding="utf-8")
+    screen = Console(width=120, record=True)
+    show_replay(screen, summary)
+    assert f"{bag['look_ahead_rmse_Nm']:.1f}" in screen.export_text()
+
+
 def test_picture_is_a_png(double_cycle: tuple[Path, dict[str, Any]]) -> None:
     out, summary = double_cycle
     assert summary["bags"][0]["picture"] == f"{DOUBLE_CYCLE.name}.png"
@@ -325,6 +343,7 @@ for name in ("rclpy", "trajectory_msgs", "sensor_msgs", "builtin_interfaces", "s
     sys.modules[name] = None
 from pathlib import Path
 from lugre_steering.replay.run import replay
+from lugre_steering.replay.table import show_replay
 print(replay([Path({str(bag)!r})], Path({str(VEHICLE)!r}), Path("out"))["bags"][0]["samples"]["command"]["used"])
 """
     environment = os.environ | {"PYTHONPATH": str(Path(lugre_steering.__file__).parents[1])}

@@ -19,17 +19,20 @@ from lugre_steering.replay.result import Replay, ReplayedBag
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
-def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, options: Options | None = None) -> Replay:
+def replay(
+    data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, options: Options | None = None, look_ahead: bool = False
+) -> Replay:
     """Torques of bags (paths) or recordings, kept in memory: the same numbers as the command and the live node give.
 
-    ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file.
+    ``data``: one or several paths of rosbag2 folders or files, or recordings; ``vehicle``: a vehicle or the path of its file;
+    ``look_ahead``: tell the error with the motion known from all samples, too.
     """
     model, timing, items = vehicle_of(vehicle), options or Options(), each(data)
     overall, bags = Comparison(), list[ReplayedBag]()
     for item in items:
         path = Path(item.name if isinstance(item, Recording) else item)
         name = item.name if isinstance(item, Recording) else bag_name(path)
-        passage = Passage(path, unused_name(name, [bag.name for bag in bags]), model, timing)
+        passage = Passage(path, unused_name(name, [bag.name for bag in bags]), model, timing, look_ahead=look_ahead)
         if isinstance(item, Recording):
             bags.append(passage.remember_recording(with_both_tracks(item, model.channels)))
         else:
@@ -37,6 +40,6 @@ def replay(data: Given | Sequence[Given], vehicle: Vehicle | str | Path, *, opti
             bags.append(passage.remember())
         overall.merge(passage.fit)
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
-    origin = made("replay", {**asdict(timing), "initial_temperature": None}, sheet, files(items))
+    origin = made("replay", {**asdict(timing), "initial_temperature": None, "look_ahead": look_ahead}, sheet, files(items))
     result = Replay.begun(model, None if isinstance(vehicle, Vehicle) else vehicle, timing, origin, ())
     return replace(result, bags=tuple(bags), overall=overall.result())

@@ -59,6 +59,7 @@ def _head(bag: ReplayedBag, vehicle: Vehicle) -> str:
         numbers += [
             ("root mean square error", words.torque(vehicle, fit.rmse_Nm), r2_words(fit.r2, "R²").removeprefix(", ")),
             ("mean error", f"{words.tenths(fit.bias_Nm, '+', fit.rmse_Nm)} {vehicle.coordinate.force_unit}", "measured minus estimate"),
+            *_ahead(bag, vehicle),
             ("largest torque measured", words.torque(vehicle, peak), ""),
         ]
     more = f'<p class="more">{counted(len(bag.findings), "finding")} below.</p>' if bag.findings else ""
@@ -66,6 +67,11 @@ def _head(bag: ReplayedBag, vehicle: Vehicle) -> str:
         f'<header id="verdict"><p class="over">{text(vehicle.name)}</p>\n<h1>{text(bag.name)}</h1>\n'
         f'<div class="verdict"><p>{text(said)}</p>{more}</div>\n{facts(numbers)}</header>'
     )
+
+
+def _ahead(bag: ReplayedBag, vehicle: Vehicle) -> list[tuple[str, str, str]]:
+    error = bag.look_ahead_rmse_Nm
+    return [] if error is None else [("looking ahead", words.torque(vehicle, error), "motion known from all samples")]
 
 
 def _findings(bag: ReplayedBag) -> str:

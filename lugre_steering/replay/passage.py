@@ -18,7 +18,7 @@ import numpy as np
 from lugre_steering.bag import Bag, BagWriter, Block
 from lugre_steering.bag.find import REPLAYED
 from lugre_steering.bag.given import in_stamp_order
-from lugre_steering.bag.load import STRAY_NS
+from lugre_steering.bag.load import STRAY_NS, read_recording
 from lugre_steering.bag.reader import damage_words, shortened
 from lugre_steering.bag.writer import copied, stock_types
 from lugre_steering.chain.step import Records
@@ -27,6 +27,7 @@ from lugre_steering.errors import BagError, DataError
 from lugre_steering.estimator import Estimator, Options
 from lugre_steering.estimator.plan import PLAN_BYTES, planned_angles
 from lugre_steering.files import new_folder
+from lugre_steering.fitting.hindsight import hindsight_rmse
 from lugre_steering.online import Agreement, Comparison, Curves, Timeline, is_large, sheet_words
 from lugre_steering.pool import Progress
 from lugre_steering.provenance import MADE, Provenance
@@ -48,12 +49,17 @@ NOT_REJECTED = ("accepted", "unpaired", "gap", "overrun", "restart", "absurd_rat
 class Passage:
     """One bag through a new estimator."""
 
-    def __init__(self, path: Path, name: str, vehicle: Vehicle, options: Options, initial_temperature: str | None = None) -> None:
+    def __init__(
+        self, path: Path, name: str, vehicle: Vehicle, options: Options, initial_temperature: str | None = None, *,
+        look_ahead: bool = False,
+    ) -> None:
         self.path, self.name, self.vehicle = path, name, vehicle
         self.estimator = Estimator(vehicle, options)
+        self._look_ahead = look_ahead
+        self._rubber_degC: float | None = None  # at the start, where it is not that of the vehicle file
         self._as_warm_as_air = initial_temperature == AIR
         if initial_temperature not in (None, AIR):
-            self.estimator.begin_at(degrees(initial_temperature))
+            self._begin_at(degrees(initial_temperature))
         self.fit = Comparison()
         self.motion = Curves(2 * len(vehicle.sides) + 1)  # angles, temperatures, torque
         self.check = Curves(2)  # cylinder torque, residual
@@ -77,8 +83,9 @@ class Passage:
             samples = self._samples(bag, topics)
             self._check_estimates(samples, bag.findings)
             refuse_foreign(out / self.name)  # again: a file may have been put there meanwhile
+            ahead = self._ahead()
             findings = [*bag.findings, *self._found, *self._last_findings()]
-        summary = self._summary(samples, findings)
+        summary = self._summary(samples, findings, ahead)
         page = out / f"{self.name}.html"
         write_page(summary, self.vehicle, self.motion, self.check, origin, page)
         picture, note = self._picture(out / f"{self.name}.png", summary.fit, origin)
@@ -93,8 +100,9 @@ class Passage:
             kept = [self._take(block, bag, command) for block in bag.blocks(channels, all_messages=True) if len(block.messages)]
             samples = self._samples(bag, topics)
             self._check_estimates(samples, bag.findings)
+            ahead = self._ahead()
             findings = [*bag.findings, *self._found, *self._last_findings()]
-        return replace(self._summary(samples, findings), series=self._series(kept))
+        return replace(self._summary(samples, findings, ahead), series=self._series(kept))
 
     def remember_recording(self, recording: Recording) -> ReplayedBag:
         """The same for samples in memory, which come in the order of their stamps."""
@@ -113,8 +121,9 @@ class Passage:
             label: replace(counts, topic=label if counts.used else None) for label, counts in self._samples(None, {}).items()
         }
         self._check_estimates(samples, recording.findings)
-        findings = [*recording.findings, *self._last_findings()]
-        return replace(self._summary(samples, findings), series=self._series([kept]))
+        ahead = self._ahead(recording)
+        findings = [*recording.findings, *self._found, *self._last_findings()]
+        return replace(self._summary(samples, findings, ahead), series=self._series([kept]))
 
     def _topics(self, bag: Bag, channels: Sequence[Channel]) -> Mapping[Channel, str]:
         """The recorded topic of each channel; refuses a bag without one of the angles."""
@@ -131,7 +140,17 @@ class Passage:
             came = self._counted(samples, Kind.ANGLE)
             raise BagError(f"{self.path}: no torque could be estimated ({came}){damage_words(findings)}")
 
-    def _summary(self, samples: Mapping[str, InputCounts], findings: Sequence[Finding]) -> ReplayedBag:
+    def _ahead(self, recording: Recording | None = None) -> float | None:
+        """Error [N m] of the model with the motion known from all samples, if it is asked for and can be told."""
+        if not self._look_ahead:
+            return None
+        try:
+            return hindsight_rmse(self.vehicle, recording or read_recording(self.path, self.vehicle.channels), self._rubber_degC)
+        except DataError as error:
+            self._found.append(Finding("no_look_ahead", "", str(error)))
+            return None
+
+    def _summary(self, samples: Mapping[str, InputCounts], findings: Sequence[Finding], ahead: float | None) -> ReplayedBag:
         fit = self.fit.result()
         return ReplayedBag(
             bag=str(self.path),
@@ -144,6 +163,7 @@ class Passage:
             samples=samples,
             saturated_rubber_table_steps=self.estimator.saturated_steps,
             findings=tuple(findings),
+            look_ahead_rmse_Nm=ahead,
         )
 
     def _series(self, kept: Sequence[tuple[Records, Records]]) -> Series:
@@ -244,10 +264,14 @@ class Passage:
         number = next((i for i, c in enumerate(self.vehicle.channels) if c.kind is Kind.AIR_TEMPERATURE), -1)
         recorded = block.value[(block.channel == number) & (np.abs(block.value) < AIR_LIMIT_DEGC)]
         if recorded.size:
-            self.estimator.begin_at(float(recorded[0]))
+            self._begin_at(float(recorded[0]))
         else:
             statement = "no air temperature at the start; the rubber begins as the vehicle file says"
             self._found.append(Finding("no_air_temperature", "", statement))
+
+    def _begin_at(self, rubber_degC: float) -> None:
+        self.estimator.begin_at(rubber_degC)
+        self._rubber_degC = rubber_degC
 
     def _finite(self, rows: Records, field: str) -> Records:
         """Rows whose torque is a finite number; the node publishes no other either."""

@@ -99,6 +99,8 @@ class ReplayedBag:
     picture_note: str | None = None
     page: str | None = field(default=None, metadata=ADDED)
     """File of the page beside the record."""
+    look_ahead_rmse_Nm: float | None = field(default=None, metadata=ADDED)
+    """Error of the model with the motion known from all samples, where it was asked for: without what a live motion does not know."""
     series: Series | None = field(default=None, repr=False, compare=False, metadata=IN_MEMORY)
 
     def kept(self) -> Series:

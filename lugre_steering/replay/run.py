@@ -34,12 +34,13 @@ def replay(
     initial_temperature: str | None = None,
     *,
     jobs: int = 1,
+    look_ahead: bool = False,
     skipped: Sequence[Skipped] = (),
 ) -> dict[str, Any]:
     """Run the estimator over each bag anew, ``jobs`` at a time; write bags, pictures and summary.json into ``out``.
 
     ``initial_temperature``: of the rubber at the start of each bag, a number [degC] or ``air`` for the first recorded air; without it that
-    of the vehicle file. ``skipped``: what has been left out before.
+    of the vehicle file. ``look_ahead``: tell the error with the motion known from all samples, too; ``skipped``: what has been left out before.
     Returns the summary. Of several bags, one that gives no torque is left out with the reason; ``BagError`` or ``VehicleFileError`` for
     input of which nothing is of use.
     """
@@ -48,9 +49,11 @@ def replay(
     options = options or Options()
     if initial_temperature not in (None, AIR):
         degrees(initial_temperature)
-    origin = made("replay", {**asdict(options), "initial_temperature": initial_temperature}, vehicle_file, bags)
+    asked = {**asdict(options), "initial_temperature": initial_temperature, "look_ahead": look_ahead}
+    origin = made("replay", asked, vehicle_file, bags)
     tasks = [
-        _Task(path, name, vehicle_file, out, options, initial_temperature, origin) for path, name in zip(bags, names, strict=True)
+        _Task(path, name, vehicle_file, out, options, initial_temperature, look_ahead, origin)
+        for path, name in zip(bags, names, strict=True)
     ]
     done: dict[int, ReplayedBag | Skipped] = {}
     overall = Comparison()
@@ -83,6 +86,7 @@ class _Task:
     out: Path
     options: Options
     initial_temperature: str | None
+    look_ahead: bool
     origin: Provenance
 
 
@@ -114,7 +118,7 @@ def _alone(task: _Task) -> _Answer:
 
 def _passed(task: _Task, vehicle: Vehicle, progress: Progress | None) -> _Answer:
     """One bag written, or why not."""
-    run = Passage(task.path, task.name, vehicle, task.options, task.initial_temperature)
+    run = Passage(task.path, task.name, vehicle, task.options, task.initial_temperature, look_ahead=task.look_ahead)
     try:
         return run.write(task.out, task.origin, progress), run.fit
     except BagError as error:

@@ -24,17 +24,24 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     table.add_column("recording", overflow="fold")
     for column in ("seconds", "torques", f"RMSE ({unit})", "R2", f"bias ({unit})"):
         table.add_column(column, justify="right", no_wrap=True)
+    if ahead := any(bag["look_ahead_rmse_Nm"] is not None for bag in summary["bags"]):
+        table.add_column(f"ahead ({unit})", justify="right", no_wrap=True)
     shown = told_apart([bag["bag"] for bag in summary["bags"]])
     for bag, path in zip(summary["bags"], shown, strict=True):
         # Of several recordings of one name, where each lies and what its results are called.
         label = f"{path} -> {bag['name']}" if "/" in path or bag_name(Path(bag["bag"])) != bag["name"] else bag["name"]
-        table.add_row(label, f"{bag['duration_s']:.1f}", words.whole(bag["estimates"]), *_fit(bag["fit"]))
+        table.add_row(label, f"{bag['duration_s']:.1f}", words.whole(bag["estimates"]), *_fit(bag["fit"]), *_ahead(bag) * ahead)
     if len(summary["bags"]) > 1:
         seconds, torques = (sum(bag[key] for bag in summary["bags"]) for key in ("duration_s", "estimates"))
         table.add_row("all", f"{seconds:.1f}", words.whole(torques), *_fit(summary["overall"]))
     console.print(table)
     for line in _remarks(summary):
         console.print(line, highlight=False, soft_wrap=True)
+
+
+def _ahead(bag: Mapping[str, Any]) -> tuple[str, ...]:
+    error = bag["look_ahead_rmse_Nm"]
+    return ("-" if error is None else words.tenths(error),)
 
 
 def _fit(fit: Mapping[str, Any] | None) -> tuple[str, str, str]:
@@ -54,5 +61,7 @@ def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{bag['name']}: {label}: {counts['used']} used; rejected: {reasons}"
         for finding in bag["findings"]:
             yield f"{bag['name']}: {finding['finding']}: {finding['topic']} {finding['statement']}".replace(":  ", ": ")
+    if any(bag["look_ahead_rmse_Nm"] is not None for bag in summary["bags"]):
+        yield "ahead: RMSE of the model with the motion known from all samples, as diagnose has it"
     for left in summary["skipped"]:
         yield f"skipped: {left['bag']}: {left['reason']}"
