@@ -135,6 +135,27 @@ def test_a_filter_that_suits_slow_motion_follows_a_fast_one() -> None:
     assert error_live(recording, filtering(sheet, 0.16)) < 1.2 * error_live(recording, filtering(sheet, 0.02))
 
 
+def test_looking_ahead_the_motion_is_no_part_of_the_error() -> None:
+    """Live, an acceleration that comes late is a tenth of the torque of an inertia and more."""
+    sheet, recording = swinging()
+    (asked,), (plain,) = (replay(recording, filtering(sheet, 0.04), look_ahead=ahead).bags for ahead in (True, False))
+    assert asked.fit is not None
+    assert recording.measured_torque is not None
+    assert asked.look_ahead_rmse_Nm is not None
+    assert asked.look_ahead_rmse_Nm < 0.03 * float(np.std(recording.measured_torque.value))
+    assert asked.fit.rmse_Nm > 5.0 * asked.look_ahead_rmse_Nm
+    assert plain.look_ahead_rmse_Nm is None
+    assert plain.fit == asked.fit
+
+
+def test_an_error_that_cannot_be_told_looking_ahead_is_told_so() -> None:
+    sheet, recording = swinging()
+    (bag,) = replay(dataclasses.replace(recording, measured_torque=None), sheet, look_ahead=True).bags
+    assert bag.look_ahead_rmse_Nm is None
+    assert [finding.finding for finding in bag.findings] == ["no_look_ahead"]
+    assert "measured_torque" in bag.findings[0].statement
+
+
 def test_what_a_joint_has_is_told_beside_a_law_with_the_values_that_it_has() -> None:
     """A torque periodic in the angle, of a tenth to a half of the friction, is a law. It had stood in place of the inertia and the losses,
     or left their intervals a tenth of them wide and more."""

@@ -469,7 +469,7 @@ def test_an_average_takes_nothing_from_an_inertia_that_it_takes_from_the_torque(
         alpha = averaged(seen, seen.alpha[0])[seen.valid]
         return float(alpha @ seen.measured[seen.valid] / (alpha @ alpha))
 
-    assert inertia(run) < 39.0
+    assert inertia(run) < 39.8
     for average_s in (0.1, 0.14, 0.2):
         assert inertia(in_parallel(run, average_s)) == pytest.approx(40.0, rel=0.005)
     assert as_recorded(in_parallel(run, 0.1)).measured == pytest.approx(run.measured)

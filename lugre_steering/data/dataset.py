@@ -187,7 +187,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
     angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else SensorNoise(vehicle.sensors.angle_sigma, 0.0)
     raw = np.array([_at(time, present[f"angle/{side}"]) for side in vehicle.sides])
-    theta = np.array([smooth_angle(row, angle.sigma()) for row in raw])
+    theta = np.array([smooth_angle(row, angle.sigma(), inert=vehicle.rubber is None) for row in raw])
     omega, alpha = motion(time, theta)
     rounding = np.zeros(0)
     if vehicle.hydraulics is not None:

@@ -5,12 +5,15 @@
 Maximum a-posteriori angle under Gaussian sensor noise, a heavy-tailed (Cauchy) prior on the third difference and another on
 the first: jerk is small except now and then, and a parked vehicle does not move at all. Solved by iteratively reweighted
 least squares on a banded system (Whittaker 1923 for the quadratic case; Geman and Reynolds 1992 for the half-quadratic form).
+
+The most probable angle puts all jerk into a few samples, so that its acceleration is one of steps. Where inertia acts, the variance of the
+third difference is spread over neighbours.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
 from lugre_steering.chain.compiled import njit
 from lugre_steering.recording import Array
@@ -26,12 +29,14 @@ PARKED_SIGMA = 0.25
 """The same while parked: friction near its limit is a ratchet that turns any wander of the angle into a drift of torque."""
 PARKED_SAMPLES = 100
 """Parked is where the smoothed angle spans less than the parked dead band over so many samples."""
+NEIGHBOURS, SPREADS = 8.0, 4
+"""Standard deviation [samples] of the average by which jerk is spread, and how often it is."""
 
 
-def smooth_angle(angle: Array, sigma: float) -> Array:
+def smooth_angle(angle: Array, sigma: float, *, inert: bool = False) -> Array:
     """Smoothed angle [rad] (n,) of uniformly sampled ``angle`` with noise ``sigma`` [rad] (quantisation included).
 
-    With sigma = 0 the angle is returned as it is.
+    ``inert``: of a joint, whose acceleration counts. With sigma = 0 the angle is returned as it is.
     """
     if sigma == 0.0 or angle.size < 5:
         return angle.copy()
@@ -42,10 +47,19 @@ def smooth_angle(angle: Array, sigma: float) -> Array:
         estimate = _least(angle, data, weights[1], weights[3])
         for order in weights:
             step = np.diff(estimate, n=order)
-            weights[order] = _WEIGHT[order] / ((_WIDTH_SIGMA[order] * sigma) ** 2 + step**2)
+            weights[order] = _weight(order, sigma, step**2)
+    for _ in range(SPREADS if inert else 0):
+        spread = gaussian_filter1d(np.diff(estimate, n=3) ** 2, NEIGHBOURS, mode="nearest")
+        estimate = _least(angle, data, weights[1], 1.0 / (spread + (_WIDTH_SIGMA[3] * sigma) ** 2 / _WEIGHT[3]))
+        weights[1] = _weight(1, sigma, np.diff(estimate) ** 2)
     span = maximum_filter1d(estimate, PARKED_SAMPLES) - minimum_filter1d(estimate, PARKED_SAMPLES)
     half_width = sigma * np.where(span < 2.0 * PARKED_SIGMA * sigma, PARKED_SIGMA, SETTLE_SIGMA)
     return _settled(np.asarray(estimate), half_width)
+
+
+def _weight(order: int, sigma: float, squares: Array) -> Array:
+    """Of differences of an order by their squares: the heavy tail as a normal law of its own width for each."""
+    return np.asarray(_WEIGHT[order] / ((_WIDTH_SIGMA[order] * sigma) ** 2 + squares))
 
 
 @njit(cache=True)

@@ -207,7 +207,7 @@ def repeated_motion(problem: Problem, draws: int, seed: int) -> list[list[Run]]:
         repeated = []
         for _ in range(draws):
             noisy = _sensed_again(run, sigma, rng, sensors)
-            theta = np.array([smooth_angle(row, sigma) for row in noisy])
+            theta = np.array([smooth_angle(row, sigma, inert=problem.vehicle.rubber is None) for row in noisy])
             omega, alpha = motion(run.time, theta)
             if run.average_s:
                 alpha = run.alpha + acceleration(run.time, noisy - run.theta)

@@ -40,7 +40,8 @@ def replay(
     """Run the estimator over each bag anew, ``jobs`` at a time; write bags, pictures and summary.json into ``out``.
 
     ``initial_temperature``: of the rubber at the start of each bag, a number [degC] or ``air`` for the first recorded air; without it that
-    of the vehicle file. ``look_ahead``: tell the error with the motion known from all samples, too; ``skipped``: what has been left out before.
+    of the vehicle file. ``look_ahead``: tell the error with the motion known from all samples, too; ``skipped``: what has been left out
+    before.
     Returns the summary. Of several bags, one that gives no torque is left out with the reason; ``BagError`` or ``VehicleFileError`` for
     input of which nothing is of use.
     """

@@ -24,7 +24,7 @@ from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import without_part
+from lugre_steering.fitting.trial import SURE_SIGMA, without_part
 from lugre_steering.recording import Array
 
 ROUNDS = 2
@@ -91,11 +91,15 @@ def beside_laws(done: Finished, lawful: FoundLaws, parallel: Parallel, seed: int
 
 
 def _surely(problem: Problem, weight: Array, roles: Split, fitted: Fit, found: Sequence[Found]) -> tuple[tuple[Found, ...], Fit]:
-    """What was found, and its fit, without names and optional parts of terms of every joint that may be nothing; laws come after names."""
+    """What was found, and its fit, without names, parts and refinements of terms of every joint that may be nothing; laws come after
+    names."""
     kept = list(found)
     while True:
         terms = [i for i in range(len(kept)) if fitted.effects[i][0].effect.of_every_joint]
         effects: Effects
+        if (plainer := _unrefined(problem, weight, fitted, terms)) is not None:
+            fitted = plainer
+            continue
         if (part := least_sure_part(problem, weight, roles, fitted, terms)) is not None:
             effects = without_part(fitted.effects, *part)
         elif (nothing := least_sure_name(problem, weight, roles, fitted, len(kept))) is not None:
@@ -104,3 +108,14 @@ def _surely(problem: Problem, weight: Array, roles: Split, fitted: Fit, found: S
         else:
             return tuple(kept), fitted
         fitted = fit(problem, weight, effects, fitted.x, linearisations=20)
+
+
+def _unrefined(problem: Problem, weight: Array, fitted: Fit, terms: Sequence[int]) -> Fit | None:
+    """A fit without the refinement of the law of one of these ``terms`` that it can best spare; None where each takes what it must."""
+    refined = [
+        (i, name) for i in terms for name in fitted.effects[i][0].free
+        if fitted.effects[i][0].parameter(name).optional and name not in fitted.effects[i][0].effect.amplitudes
+    ]  # fmt: skip
+    fits = [fit(problem, weight, without_part(fitted.effects, *each), fitted.x, linearisations=20) for each in refined]
+    least = min(fits, key=lambda each: each.cost, default=None)
+    return least if least is not None and least.cost - fitted.cost < SURE_SIGMA**2 * problem.doubt else None

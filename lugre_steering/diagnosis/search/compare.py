@@ -32,10 +32,10 @@ SURE_OF_LEFT = 2.0
 """Standard deviations by which more may be left beyond noise than a fit shows."""
 OWN_SHARE = 0.1
 """Share of the simulation's own error that may look like one name beside freedoms, which take up most of it."""
-NAME_TAKEN, TAKEN_OF_SLOW = 0.04, 0.06
-"""What another form of names than nature's may make, of what they take: the energy of an error of a fifth of their torque; and of those
-that settle with time, or follow the acceleration: how rubber, oil and sensors settle is known less well than how they act, and an
-acceleration only as smoothed as the angles ask for."""
+NAME_TAKEN, TAKEN_OF_SLOW, DONE_BY_INERTIA = 0.04, 0.06, 0.01
+"""What another form of names than nature's may make, of what they take: the energy of an error of a fifth of their torque; of those that
+settle with time, or follow the acceleration: how rubber, oil and sensors settle is known less well than how they act; and of all that the
+inertia of every joint does: an acceleration is known only as smoothed as the angles ask for."""
 SHOWN = 20.0
 """Times what the bends of names themselves do that their laws may be wrong by at most: of an error, places along a name's own coordinate
 take more than a twentieth."""
@@ -134,14 +134,16 @@ def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]
     """Energy that another form of the ``older`` effects of ``result`` may make; ``gains``: what each of the last of these took.
 
     Shares of these, as beside a name its own law may bend along its coordinate, but no more than SHOWN by how far it does, unless time
-    or acceleration is that; then too, of what every joint has, of all that its torque does beyond a recalibration.
+    or acceleration is that; of the inertia that every joint has, one of all that its torque does beyond a recalibration.
     """
     first, slow, found = older - len(gains), 0.0, 0.0
     for i, (candidate, _) in enumerate(result.effects[:older]):
-        if _slow(candidate.effect):
-            took = gains[i - first] if i >= first else beyond_calibration(problem, result, contribution(problem, result, i))
-            slow += TAKEN_OF_SLOW * took
-        elif i >= first:
+        if i < first:
+            if _slow(candidate.effect):
+                slow += DONE_BY_INERTIA * beyond_calibration(problem, result, contribution(problem, result, i))
+        elif _slow(candidate.effect):
+            slow += TAKEN_OF_SLOW * gains[i - first]
+        else:
             found += NAME_TAKEN * gains[i - first]
     own = slice(problem.nuisances - problem.shapes, problem.nuisances)
     bent = problem.bends[:, problem.bends.shape[1] - problem.shapes :] @ result.x[own]
