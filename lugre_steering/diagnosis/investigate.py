@@ -33,9 +33,9 @@ NOISE_ROUNDS, QUIETER = 2, 0.8
 
 def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = lambda _: None) -> Finished:
     """Recalibrate and search; on joints and axes also for a friction that rises smoothly from standstill, where that of the vehicle file
-    leaves much more."""
+    leaves much more: than it or, which nothing can fall below, than noise."""
     done = _investigated(problem, seed, progress)
-    if not is_rig(problem.vehicle) or problem.calibrations == SMOOTH:
+    if not is_rig(problem.vehicle) or problem.calibrations == SMOOTH or MUCH_LESS * _left(done) < done.noise.floor**2:
         return done
     progress("searching beside a friction that rises smoothly from standstill")
     smooth = _investigated(Problem(problem.vehicle, problem.runs, smooth_calibrations(problem.vehicle, problem.runs)), seed, progress)
