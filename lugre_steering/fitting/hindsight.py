@@ -19,11 +19,13 @@ from lugre_steering.vehicle import Vehicle
 
 def hindsight_rmse(vehicle: Vehicle, recording: Recording, rubber_degC: float | None = None) -> float:
     """Root mean square error [N m] of a vehicle file on a recording whose motion is smoothed over all of it, as a diagnosis has it, on
-    the samples that may be used. Bristles are at the start as it tells, the rubber as warm as the file says or as given [degC].
+    the samples that may be used. Bristles are at the start as it tells, the rubber, if there is any, as warm as the file says or as
+    given [degC].
 
     Raises ``DataError`` where a channel is missing or too short.
     """
-    if rubber_degC is not None and vehicle.initial is not None:
+    if rubber_degC is not None:
+        assert vehicle.initial is not None
         vehicle = vehicle.replace(initial=replace(vehicle.initial, rubber_temperature_degC=rubber_degC))
     run = prepare(with_even_stamps(inspect(recording, vehicle).recording), vehicle)
     problem = Problem(vehicle, [run], ()).with_known_weather()

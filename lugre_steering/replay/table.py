@@ -24,7 +24,7 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     table.add_column("recording", overflow="fold")
     for column in ("seconds", "torques", f"RMSE ({unit})", "R2", f"bias ({unit})"):
         table.add_column(column, justify="right", no_wrap=True)
-    if ahead := any(bag["look_ahead_rmse_Nm"] is not None for bag in summary["bags"]):
+    if ahead := _looked_ahead(summary):
         table.add_column(f"ahead ({unit})", justify="right", no_wrap=True)
     shown = told_apart([bag["bag"] for bag in summary["bags"]])
     for bag, path in zip(summary["bags"], shown, strict=True):
@@ -37,6 +37,10 @@ def show_replay(console: Console, summary: Mapping[str, Any]) -> None:
     console.print(table)
     for line in _remarks(summary):
         console.print(line, highlight=False, soft_wrap=True)
+
+
+def _looked_ahead(summary: Mapping[str, Any]) -> bool:
+    return any(bag["look_ahead_rmse_Nm"] is not None for bag in summary["bags"])
 
 
 def _ahead(bag: Mapping[str, Any]) -> tuple[str, ...]:
@@ -61,7 +65,7 @@ def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{bag['name']}: {label}: {counts['used']} used; rejected: {reasons}"
         for finding in bag["findings"]:
             yield f"{bag['name']}: {finding['finding']}: {finding['topic']} {finding['statement']}".replace(":  ", ": ")
-    if any(bag["look_ahead_rmse_Nm"] is not None for bag in summary["bags"]):
+    if _looked_ahead(summary):
         yield "ahead: RMSE of the model with the motion known from all samples, as diagnose has it"
     for left in summary["skipped"]:
         yield f"skipped: {left['bag']}: {left['reason']}"

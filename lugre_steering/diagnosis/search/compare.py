@@ -134,7 +134,7 @@ def may_differ(problem: Problem, result: Fit, older: int, gains: Sequence[float]
     """Energy that another form of the ``older`` effects of ``result`` may make; ``gains``: what each of the last of these took.
 
     Shares of these, as beside a name its own law may bend along its coordinate, but no more than SHOWN by how far it does, unless time
-    or acceleration is that; of the inertia that every joint has, one of all that its torque does beyond a recalibration.
+    or acceleration is that. Of the inertia that every joint has a share of all that its torque does beyond a recalibration.
     """
     first, slow, found = older - len(gains), 0.0, 0.0
     for i, (candidate, _) in enumerate(result.effects[:older]):
