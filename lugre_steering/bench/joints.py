@@ -25,6 +25,8 @@ from lugre_steering.vehicle import EffectEntry, Vehicle, load
 
 TERMS = tuple((effect.id, effect.amplitudes[0]) for effect in CATALOGUE.values() if effect.of_every_joint)
 """What every joint may have, and the value by which it is counted."""
+GEAR = ("load_friction", "share")
+"""The same of friction that grows with the transmitted torque."""
 STEP_S = 5e-4
 """Of the simulation: its own error passes for 0.5 % of viscous friction at the 2 ms of recordings to look at."""
 SMOOTHED = 3
@@ -56,9 +58,10 @@ class Told:
         return self.low <= self.true <= self.high
 
 
-def drawn(seed: int, *, ripple: bool = False) -> Joint:
+def drawn(seed: int, *, ripple: bool = False, gear: bool = False) -> Joint:
     """Torques are drawn against the Coulomb friction, so that all of them can be seen; sensors and motion over what is usual. ``ripple``:
-    also a torque periodic in the angle, as of a motor's magnets, which no entry of the catalogue is."""
+    also a torque periodic in the angle, as of a motor's magnets, which no entry of the catalogue is; ``gear``: also friction in proportion
+    to what gravity and inertia ask for."""
     rng = np.random.default_rng([seed, 16])
 
     def between(low: float, high: float) -> float:
@@ -96,8 +99,22 @@ def drawn(seed: int, *, ripple: bool = False) -> Joint:
     if ripple:
         periods = np.interp(torque.time_s, run.truth.motion.time, run.truth.motion.theta[0]) / np.radians(between(3.0, 12.0))
         torque = Signal(torque.time_s, torque.value + coulomb * between(0.1, 0.5) * np.sin(2.0 * np.pi * periods))
+    if gear:
+        truth["load_friction"] = between(0.03, 0.3)
+        theta = run.truth.motion.theta[0]
+        carried = values["amplitude"] * np.sin(theta) + values["torque"] + values["inertia"] * run.truth.motion.acceleration[0]
+        lost = truth["load_friction"] * np.abs(carried) * _turned(theta, np.radians(between(0.02, 0.2)))
+        torque = Signal(torque.time_s, torque.value + np.interp(torque.time_s, run.truth.motion.time, lost))
     recording = Recording(f"joint_{seed}", 0, {"left": signals[Kind.ANGLE]}, {}, measured_torque=torque)
     return Joint(real, known.replace(contact=guess), recording, truth)
+
+
+def _turned(theta: Array, width: float) -> Array:
+    """Direction of the motion (n,), from one to the other over twice an angle [rad]: a stop operator, no bristle."""
+    way = np.zeros(theta.size)
+    for i, step in enumerate(np.diff(theta) / width, 1):
+        way[i] = min(max(way[i - 1] + step, -1.0), 1.0)
+    return way
 
 
 def _sweeps(rng: np.random.Generator, fastest_deg_s: float) -> Motion:
@@ -130,12 +147,12 @@ def _rounded(rng: np.random.Generator, time: Array, angle_deg: Array) -> Motion:
     return Motion(grid, theta[None])
 
 
-def judged(seed: int, *, ripple: bool = False) -> tuple[list[Told], list[str]]:
-    """What diagnosis says of each of TERMS of a drawn joint, and the names that the joint does not have."""
-    joint = drawn(seed, ripple=ripple)
+def judged(seed: int, *, ripple: bool = False, gear: bool = False) -> tuple[list[Told], list[str]]:
+    """What diagnosis says of each of TERMS of a drawn joint, of its ``gear`` if there is one, and names that the joint does not have."""
+    joint = drawn(seed, ripple=ripple, gear=gear)
     found = {effect.id: effect.parameters for effect in diagnose_recordings([joint.recording], joint.sheet).effects}
     told = []
-    for name, parameter in TERMS:
+    for name, parameter in (*TERMS, *[GEAR][:gear]):
         value = found[name][parameter] if name in found else None
         low, high = (None, None) if value is None else value.ci95
         if value is None or low is None or high is None:
@@ -149,7 +166,7 @@ def table(told: Sequence[Told]) -> dict[str, dict[str, float]]:
     """Per term, and of all: how many were told, the share held, the median half width of an interval and the median error, each over the
     true value."""
     rows = {}
-    for term in (*(name for name, _ in TERMS), "all"):
+    for term in (*dict.fromkeys(each.term for each in told), "all"):
         own = [each for each in told if each.value is not None and term in (each.term, "all")]
         rows[term] = {
             "told": len(own), "held": float(np.mean([each.held for each in own])),
@@ -165,12 +182,13 @@ def run(argv: Sequence[str]) -> None:
     parser.add_argument("--joints", type=int, default=24, help="joints drawn, one recording each [24]")
     parser.add_argument("--seed", type=int, default=1, help="of the first joint [1]")
     parser.add_argument("--ripple", action="store_true", help="beside a torque periodic in the angle, which no entry of the catalogue is")
+    parser.add_argument("--gear", action="store_true", help="with friction in proportion to what gravity and inertia ask for")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     options = parser.parse_args(argv)
     told: list[Told] = []
     foreign: list[str] = []
     for seed in range(options.seed, options.seed + options.joints):
-        of_joint, more = judged(seed, ripple=options.ripple)
+        of_joint, more = judged(seed, ripple=options.ripple, gear=options.gear)
         told, foreign = told + of_joint, foreign + more
     rows = table(told)
     if options.json:

@@ -77,6 +77,9 @@ class Run:
     """Angles (sides, n) [rad] before smoothing."""
     bridged: Mask = field(default_factory=lambda: np.zeros(0, bool))
     """Where a sample of a channel is missing (n,), so that a line is in its place."""
+    sharp: Array | None = None
+    """Plain second difference of the angles (sides, n) [rad/s2], which an inertia has in place of the smooth ``alpha``: its noise is white,
+    and no law but one in proportion to it may have it."""
     average_s: float = 0.0
     """Standard deviation [s] of the Gaussian average through which ``measured`` is seen, as predictions must be; see ``in_parallel``."""
     mean_of: float | None = None
@@ -147,7 +150,7 @@ def impulse(size: int) -> Array:
 
 
 def in_parallel(run: Run, average_s: float) -> Run:
-    """The run with the plain second difference of its angles, whose noise is white before it, and its torque averaged; predictions are
+    """The run with the plain second difference of its angles beside their smooth acceleration, and its torque averaged; predictions are
     averaged alike (parallel filtering, as M. Gautier, ICRA 1997, 2278, for robots).
 
     Smoothed angles have an acceleration of steps, and errors in a regressor make its coefficient smaller. An average that acts on both
@@ -157,7 +160,7 @@ def in_parallel(run: Run, average_s: float) -> Run:
     response = averaged(averaging, impulse(run.time.size))
     reach = 2 * int(np.ceil(REACH * average_s / float(run.time[1] - run.time[0]))) + 3
     return replace(
-        averaging, alpha=acceleration(run.time, run.raw), measured=averaged(averaging, run.measured),
+        averaging, sharp=acceleration(run.time, run.raw), measured=averaged(averaging, run.measured),
         sigma=run.sigma * float(np.linalg.norm(response)),
         valid=minimum_filter1d((run.valid & ~run.bridged).astype(np.uint8), reach, mode="constant") > 0,
     )  # fmt: skip
@@ -165,7 +168,7 @@ def in_parallel(run: Run, average_s: float) -> Run:
 
 def as_recorded(run: Run) -> Run:
     """The run with its torque as it was measured, and friction as the live node follows it."""
-    return replace(run, measured=run.side_torque.sum(axis=0), average_s=0.0, midway=False)
+    return replace(run, measured=run.side_torque.sum(axis=0), sharp=None, average_s=0.0, midway=False)
 
 
 def prepare(recording: Recording, vehicle: Vehicle) -> Run:

@@ -74,7 +74,9 @@ def _searched(problem: Problem, noise: Noise, roles: Split, baseline: Fit, progr
     beside = Finished(there, less, used, found, form=(*words, *[""] * (there.bends.shape[1] - len(words))), freedoms=freedoms)
     done = Finished(problem, noise, roles, replace(found, baseline=baseline), beside_form=beside)
     done = _with_final(done, found.final)
-    if not there.bends.shape[1] or not found.found or any(item.in_place for item in found.found) or not done.needs_form:
+    # The values of a joint are found anew in parallel at the end (``conclude.joint``), and those beside bends of a name's own law, all the
+    # freedoms that it has, are no better.
+    if alone or not there.bends.shape[1] or not found.found or any(item.in_place for item in found.found) or not done.needs_form:
         return done
     return _with_final(replace(done, around=True), found.final)
 

@@ -16,7 +16,7 @@ import numpy as np
 from lugre_steering.recording import Array
 
 STAGES = ("motion", "contact", "thermal", "parallel_torque", "measurement")
-NEEDS = ("hydraulics", "rubber")
+NEEDS = ("hydraulics", "rubber", "contact")
 """Sections of the vehicle file that an effect may need."""
 RELATIVE_TO = ("max_angle", "slip", "duration")
 """Properties of a recording [rad, rad, s] that a parameter may be relative to."""
@@ -165,6 +165,11 @@ class Effect:
     def fields(self, values: Mapping[str, float] | Mapping[str, float | Array]) -> dict[str, float | Array]:
         """What the parameter record holds of it, by field: its tables, and the given values of its parameters."""
         return {f"{self.id}_{name}": value for name, value in {**self.constants, **values}.items()}
+
+    def reads(self, hook: str) -> tuple[str, ...]:
+        """What a law asks for, by name; nothing where it has none."""
+        compiled = self.hooks.get(hook)
+        return () if compiled is None else _arguments(getattr(compiled, "py_func", compiled))
 
     def law(self, hook: str, values: Mapping[str, float], **quantities: Any) -> Any:
         """A law without memory over arrays: its own parameters from ``values`` (0 where absent)."""

@@ -209,9 +209,8 @@ def repeated_motion(problem: Problem, draws: int, seed: int) -> list[list[Run]]:
             noisy = _sensed_again(run, sigma, rng, sensors)
             theta = np.array([smooth_angle(row, sigma, inert=problem.vehicle.rubber is None) for row in noisy])
             omega, alpha = motion(run.time, theta)
-            if run.average_s:
-                alpha = run.alpha + acceleration(run.time, noisy - run.theta)
-            repeated.append(replace(run, theta=theta, omega=omega, alpha=alpha))
+            sharp = None if run.sharp is None else run.sharp + acceleration(run.time, noisy - run.theta)
+            repeated.append(replace(run, theta=theta, omega=omega, alpha=alpha, sharp=sharp))
         return repeated
 
     return in_threads(repeat, range(len(problem.runs)))

@@ -465,7 +465,12 @@ class Problem:
         here = [effect for effect in effects if effect[0].active_in(bag)]
         torque = self.torque(bag, x, here, run)
         given = {candidate.label for candidate, _ in here} if self.standing else set()
-        for candidate, values in [*(effect for effect in self.standing if effect[0].label not in given), *here]:
+        every = [*(effect for effect in self.standing if effect[0].label not in given), *here]
+        if run.sharp is not None:
+            rough = (run.sharp - run.alpha).sum(axis=0)
+            inertias = (effect for effect in every if effect[0].effect.of_every_joint and "alpha" in effect[0].effect.reads("torque"))
+            torque = torque + sum(candidate.effect.law("torque", values, alpha=rough) for candidate, values in inertias)
+        for candidate, values in every:
             start = candidate.start(bag)
             if candidate.effect.hooks.keys() & SENSOR_HOOKS:
                 changed = self._through_sensor(run, candidate, values, torque, start)

@@ -314,10 +314,9 @@ def _every(run: Run, stride: int) -> Run:
     time, theta = run.time[keep].copy(), run.theta[:, keep].copy()
     omega, alpha = motion(time, theta)
     raw = run.raw[:, keep]
-    if run.average_s:
-        alpha = acceleration(time, raw)
     return replace(
-        run, time=time, theta=theta, omega=omega, alpha=alpha, raw=raw, bridged=run.bridged[keep],
+        run, time=time, theta=theta, omega=omega, alpha=alpha, raw=raw, sharp=None if run.sharp is None else acceleration(time, raw),
+        bridged=run.bridged[keep],
         gains=run.gains[:, :, keep], pressure=run.pressure[:, keep],
         side_torque=run.side_torque[:, keep], side_slope=run.side_slope[:, keep], measured=run.measured[keep],
         sigma=run.sigma[keep], valid=run.valid[keep],

@@ -1,0 +1,37 @@
+# Copyright 2026 The lugre_steering contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Friction of gears and screws, which grows with the torque that they transmit."""
+
+from __future__ import annotations
+
+from lugre_steering.chain.compiled import law
+from lugre_steering.effects.entry import Effect, Parameter
+
+
+@law
+def loss(load, elastic, damping, viscous, g, share):
+    """share |M_load| M_f / g [N m]: against the motion like the friction M_f of the contact, in presliding as much of it as of its level g.
+
+    The load is what ``load`` [N m] has beside friction. That a gear loses another share of it where the load drives is a factor on the
+    load, so that no torque tells it from a heavier one.
+    """
+    return share * abs(load - elastic - damping - viscous) * elastic / g
+
+
+EFFECT = Effect(
+    id="load_friction",
+    stage="measurement",
+    tier=1,
+    title="Friction grows with the torque that is transmitted",
+    equation="M = share |M_load| sgn(omega), smooth in presliding",
+    source="Hamon, Gautier, Garrec, IROS 2010, 6187; Bittencourt, Gunnarsson, J. Dyn. Sys. Meas. Control 134 (2012) 051013",
+    trace="the two branches of a sweep are wide apart where the load is large",
+    coordinate="torque",
+    parameters=(
+        Parameter("share", "1", "friction as a share of the transmitted torque", 0.05, 0.0, 1.0),
+    ),
+    hooks={"loss": loss},
+    rivals=("surface_patch", "direction_asymmetry", "cylinder_friction"),
+    needs=("contact",),
+    joint_title="Friction of gears or screws, which grows with the torque that they transmit",
+)
