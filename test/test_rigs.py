@@ -36,6 +36,8 @@ from lugre_steering.diagnosis.report.page import write_report
 from lugre_steering.effects.registry import CATALOGUE, leaving_out
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.estimator import Estimator
+from lugre_steering.fitting.fingerprint import candidates
+from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.parallel import as_joint
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.importing import import_table
@@ -466,13 +468,50 @@ def test_an_average_takes_nothing_from_an_inertia_that_it_takes_from_the_torque(
     run = prepare(Recording("a", 0, {"left": Signal(at, angle)}, {}, measured_torque=Signal(at, torque)), joint)
 
     def inertia(seen: Run) -> float:
-        alpha = averaged(seen, seen.alpha[0])[seen.valid]
+        alpha = averaged(seen, (seen.alpha if seen.sharp is None else seen.sharp)[0])[seen.valid]
         return float(alpha @ seen.measured[seen.valid] / (alpha @ alpha))
 
     assert inertia(run) < 39.8
     for average_s in (0.1, 0.14, 0.2):
         assert inertia(in_parallel(run, average_s)) == pytest.approx(40.0, rel=0.005)
     assert as_recorded(in_parallel(run, 0.1)).measured == pytest.approx(run.measured)
+
+
+def test_friction_of_a_gear_is_its_share_of_the_load_on_either_way() -> None:
+    """A slow sweep under a weight W of 40 N m, by another formula: M = W + (10 + |W| / 10) sgn(rate)."""
+    plain = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=Gravity(40.0, 0.0))
+    assert plain.contact is not None
+    stiff = dataclasses.replace(plain.contact, stiffness_Nm_per_deg=1e3, presliding_damping_Nms=0.0)
+    contact = dataclasses.replace(stiff, coulomb_torque_Nm=10.0, static_torque_Nm=10.0)
+    joint = plain.replace(contact=contact, effects=(EffectEntry("load_friction", {"share": 0.1}),))
+    time = np.arange(0.0, 20.0, 0.01)
+    theta = 1.2 * np.sin(0.1 * np.pi * time)
+    rate = 0.12 * np.pi * np.cos(0.1 * np.pi * time)
+    run = ideal_run(joint, "a", time, theta[None], (rate[None], np.zeros((1, time.size))), np.zeros(time.size), 1.0)
+    torque = Problem(joint, [run]).predict_all(np.zeros(5))
+    weight, sliding = 40.0 * np.cos(theta), np.abs(np.sin(0.1 * np.pi * time)) < 0.99
+    sliding[:100] = False
+    assert torque[sliding] == pytest.approx((weight + (10.0 + 0.1 * np.abs(weight)) * np.sign(rate))[sliding], abs=0.02)
+
+
+def test_the_friction_of_a_gear_is_named_with_its_share() -> None:
+    """Made by a stop operator, no bristle. A patch, a law of the angle or nothing had stood for it."""
+    told, foreign = joints.judged(20303, gear=True)
+    assert foreign == []
+    assert told[-1].term == "load_friction"
+    assert told[-1].held
+    assert told[-1].value == pytest.approx(told[-1].true, rel=0.1)
+
+
+def test_the_noise_of_an_acceleration_is_no_load() -> None:
+    """The load of this gear is mostly that of its inertia; with the plain second difference of the angles in it, its share came out as a
+    tenth of what it is."""
+    joint = joints.drawn(20306, gear=True)
+    problem = as_joint(Problem(joint.sheet, [prepare(joint.recording, joint.sheet)]))
+    terms = [each for each in candidates(problem) if each.effect.of_every_joint or each.effect.id == "load_friction"]
+    fitted = fit(problem, problem.sensor_weight, [(each, dict.fromkeys(each.free, 0.0)) for each in terms], linearisations=30)
+    (values,) = (own for each, own in fitted.effects if each.effect.id == "load_friction")
+    assert values["share"] == pytest.approx(joint.truth["load_friction"], rel=0.1)
 
 
 @pytest.mark.parametrize(("engage", "shift"), [(0.2, 0.3), (0.5, -0.3)])

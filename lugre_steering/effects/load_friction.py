@@ -9,13 +9,13 @@ from lugre_steering.effects.entry import Effect, Parameter
 
 
 @law
-def loss(load, elastic, damping, viscous, g, share):
-    """share |M_load| M_f / g [N m]: against the motion like the friction M_f of the contact, in presliding as much of it as of its level g.
+def loss(load, elastic, damping, viscous, coulomb_torque, share):
+    """share |M_load| M_f / M_c [N m]: friction M_f of the contact, its presliding included, that is more by a share of the load M_load.
 
-    The load is what ``load`` [N m] has beside friction. That a gear loses another share of it where the load drives is a factor on the
-    load, so that no torque tells it from a heavier one.
+    The load is what ``load`` [N m] has beside friction; one that stays the same is another friction level, and shows no share. That a
+    gear loses another share of it where the load drives is a factor on the load, so that no torque tells it from a heavier one.
     """
-    return share * abs(load - elastic - damping - viscous) * elastic / g
+    return share * abs(load - elastic - damping - viscous) * elastic / coulomb_torque
 
 
 EFFECT = Effect(
@@ -23,7 +23,7 @@ EFFECT = Effect(
     stage="measurement",
     tier=1,
     title="Friction grows with the torque that is transmitted",
-    equation="M = share |M_load| sgn(omega), smooth in presliding",
+    equation="M = M_f (1 + share |M_load| / M_c)",
     source="Hamon, Gautier, Garrec, IROS 2010, 6187; Bittencourt, Gunnarsson, J. Dyn. Sys. Meas. Control 134 (2012) 051013",
     trace="the two branches of a sweep are wide apart where the load is large",
     coordinate="torque",

@@ -44,7 +44,16 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine, without_part
+from lugre_steering.fitting.trial import (
+    PARTIAL,
+    SURE_SIGMA,
+    TRIAL_TOLERANCE,
+    Round,
+    Trial,
+    ranked,
+    refine,
+    without_part,
+)
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -214,19 +223,22 @@ def _of_sure_size(
     what every joint may have, and optional parts of that. So little is known of the friction of a single joint that they make up for it.
 
     What every joint may have is told with intervals from all samples, so it need only be as sure as those that are fitted allow. How a
-    name's own law may bend says nothing of whether there is any: nothing bends to nothing. ``plain``: without bends of any name.
+    name's own law may bend says nothing of whether there is any: nothing bends to nothing; what was looked for must be surer than what was
+    not. ``plain``: without bends of any name.
     """
-    kept, least_size = list(found), SURE_OF_SIZE * (float(np.sqrt(split.fit.sum() / problem.valid.sum())) if given else 1.0)
+    kept, least_size = list(found), SURE_OF_SIZE * float(np.sqrt(split.fit.sum() / problem.valid.sum()))
     while kept:
         names = [i for i, item in enumerate(kept) if not item.given]
-        sizes = []
+        sure = np.full(len(kept), np.inf)
         for i, item in enumerate(kept):
+            if item.given and not given:
+                continue
             bare, own = (problem, current) if item.given else _without_own_bends(plain, problem, weight, current, names, i)
-            sizes.append(in_deviations(bare, weight, split, own, i))
-        whole = [max(own.values(), default=np.inf) if given or not item.given else np.inf for item, own in zip(kept, sizes, strict=True)]
-        shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
-        least = shapeless[-1] if shapeless else int(np.argmin(whole))
-        goes = bool(shapeless) or whole[least] < least_size
+            sizes = in_deviations(bare, weight, split, own, i).values()
+            sure[i] = max(sizes, default=np.inf) / (least_size if item.given else SURE_SIGMA)
+        shapeless = [i for i in names if idle(problem, weight, split, current, i)]
+        least = shapeless[-1] if shapeless else int(np.argmin(sure))
+        goes = bool(shapeless) or sure[least] < 1.0
         effects: Effects = current.effects
         if shapeless:
             terms = []
