@@ -579,8 +579,16 @@ def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path)
     assert clean.vehicle.effects == done.vehicle.effects  # what the file has is not looked for again
 
 
-def driven_axis(vehicle: Vehicle, mass: float, loss: float, friction: Callable[[Array], Array], step_s: float = 0.04) -> Recording:
-    """Force = mass times acceleration, a loss times the rate and a friction of the rate, of a motion that is known exactly."""
+def no_load(time: Array, _: Array) -> Array:
+    return np.zeros(time.size)
+
+
+def driven_axis(
+    vehicle: Vehicle, mass: float, loss: float, friction: Callable[[Array], Array], step_s: float = 0.04,
+    load: Callable[[Array, Array], Array] = no_load,
+) -> Recording:
+    """Force = mass times acceleration, a loss times the rate, a friction of the rate and a load of time and position, of a motion that is
+    known exactly."""
     time = np.arange(0.0, 60.0, step_s)
     turns = [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
     position = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
@@ -590,6 +598,7 @@ def driven_axis(vehicle: Vehicle, mass: float, loss: float, friction: Callable[[
     rng = np.random.default_rng(4)
     noisy = position + vehicle.sensors.angle_sigma * rng.standard_normal(time.size)
     force = mass * acceleration + loss * rate + friction(rate) + vehicle.torque_sensor.noise_Nm * rng.standard_normal(time.size)
+    force += load(time, position)
     return Recording("axis", 0, {"left": Signal(time, noisy)}, {}, measured_torque=Signal(time, force))
 
 
@@ -602,6 +611,32 @@ def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_s
     assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.02)
     assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
     assert result.json["augmented"]["heldout_rmse_Nm"] < 1.5 * vehicle.torque_sensor.noise_Nm
+
+
+def test_the_spring_of_an_axis_is_told_with_its_mass_and_losses() -> None:
+    """A force of 3000 N/m from 0.05 m on had hidden the mass and the loss, which came with neither."""
+    vehicle, mass, loss, spring = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0, 3000.0
+    recording = driven_axis(vehicle, mass, loss, np.zeros_like, load=lambda _, at: spring * (at - 0.05))
+    found = {effect.id: effect.parameters for effect in diagnose_recordings([recording], vehicle).effects}
+    assert set(found) == {"yaw_inertia", "viscous_friction", "spring_load", "slope_bias"}
+    assert found["spring_load"]["stiffness"].value == pytest.approx(spring, rel=0.01)
+    assert found["slope_bias"]["torque"].value == pytest.approx(-0.05 * spring, rel=0.02)
+    assert found["yaw_inertia"]["inertia"].value == pytest.approx(mass, rel=0.05)
+    assert found["viscous_friction"]["sigma_2"].value == pytest.approx(loss, rel=0.05)
+
+
+def test_beside_a_load_that_is_picked_up_mass_and_losses_are_told() -> None:
+    """They do not show while the load is in the way, and had been left out or told as a law."""
+    vehicle, mass, loss = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0
+    recording = driven_axis(vehicle, mass, loss, np.zeros_like, load=lambda time, _: np.where(time > 36.0, 300.0, 0.0))
+    result = diagnose_recordings([recording], vehicle)
+    found = {effect.id: effect.parameters for effect in result.effects}
+    assert {"yaw_inertia", "viscous_friction"} <= set(found) <= {"yaw_inertia", "viscous_friction", "slope_bias"}
+    assert found["yaw_inertia"]["inertia"].value == pytest.approx(mass, rel=0.1)
+    assert found["viscous_friction"]["sigma_2"].value == pytest.approx(loss, rel=0.1)
+    (load,) = result.json["laws"]
+    assert load["channel"] == "conservative_torque"
+    assert load["coordinate"] in ("time", "slip", "work")
 
 
 def test_a_part_of_the_way_with_more_friction_is_found_as_far_as_a_joint_turns() -> None:

@@ -23,7 +23,7 @@ from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.vehicle import EffectEntry, Vehicle, load
 
-TERMS = tuple((effect.id, effect.amplitudes[0]) for effect in CATALOGUE.values() if effect.of_every_joint)
+TERMS = tuple((effect.id, effect.amplitudes[0]) for effect in CATALOGUE.values() if effect.of_every_joint and not effect.of_line)
 """What every joint may have, and the value by which it is counted."""
 GEAR = ("load_friction", "share")
 """The same of friction that grows with the transmitted torque."""

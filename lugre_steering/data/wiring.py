@@ -56,6 +56,8 @@ TURNED_RAD = np.pi / 2.0
 """No steered track turns this far."""
 UNLIKE = 0.4
 """Correlation of measured and nominal torque below which something is wrong, whatever it is; with hidden physics it is 0.9."""
+PARTS, CALM = 16, 0.75
+"""Parts of a recording in each of which a joint or axis may bear another load, and the share of them in which that stays."""
 POOR = 0.25
 """Relative error left by a hypothesis that cannot be all; a friction level off by GAIN leaves less."""
 MIRROR = (
@@ -225,14 +227,26 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
 
 
 def _lacks_terms(vehicle: Vehicle, run: Run, expected: Array) -> bool:
-    """Whether inertia, viscous friction, offset and gravity, which the sheet of a single joint or axis may lack and diagnosis finds,
-    explain with its friction what that alone does not."""
+    """Whether inertia, viscous friction, offset, gravity (of an axis, a spring) and loads that are picked up, which the sheet of a single
+    joint or axis may lack and diagnosis finds, explain with its friction what that alone does not."""
     if vehicle.hydraulics is not None or vehicle.rubber is not None:
         return False
     theta, omega, alpha = run.theta[0], run.omega[0], run.alpha[0]
-    gravity = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else []
-    columns = np.column_stack([expected, alpha, omega, np.ones_like(theta), *gravity])[run.valid]
-    columns, measured = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), run.measured[run.valid]
+    angle = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else [theta]
+    columns = np.column_stack([expected, alpha, omega, np.ones_like(theta), *angle])[run.valid]
+    measured = run.measured[run.valid]
+    if _explain(columns, measured):
+        return True
+    pairs = zip(np.array_split(columns, PARTS), np.array_split(measured, PARTS), strict=True)
+    parts = [(column - column.mean(axis=0), torque - torque.mean()) for column, torque in pairs]
+    size = np.linalg.lstsq(np.concatenate([each for each, _ in parts]), np.concatenate([each for _, each in parts]), rcond=1e-10)[0]
+    calm = sorted(parts, key=lambda part: float(np.linalg.norm(part[1] - part[0] @ size)))[: int(CALM * PARTS)]
+    return _explain(np.concatenate([each for each, _ in calm]), np.concatenate([each for _, each in calm]))
+
+
+def _explain(columns: Array, measured: Array) -> bool:
+    """Whether friction, inertia and viscous friction, the first three of the columns (n, k), explain with the others a torque (n,)."""
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     free = measured - columns @ np.linalg.lstsq(columns, measured, rcond=1e-10)[0]
     # Friction wins no work and inertia weighs: where these explain far more with the other sign, a sign is flipped.
     least = np.where(np.arange(columns.shape[1]) < 3, 0.0, -np.inf)

@@ -13,7 +13,7 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.loudness import loudness
-from lugre_steering.diagnosis.search.search import Search
+from lugre_steering.diagnosis.search.search import Found, Search
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import Noise
@@ -84,6 +84,15 @@ class Finished:
         """What was found with the values that explain most, be it the form of the friction law."""
         final = self.found.final
         return replace(self, around=False).in_file(self.fitted, final.effects, final.x) if self.around else final
+
+    def with_more(self, more: Sequence[Found], effects: Effects) -> Finished:
+        """The same with more before what it has, fitted anew."""
+        found = replace(
+            self.found, found=(*more, *self.found.found),
+            final=fit(self.problem, self.fitted, [*effects, *self.found.final.effects], self.found.final.x, linearisations=20),
+        )  # fmt: skip
+        beside = None if self.beside_form is None else self.beside_form.with_more(more, effects)
+        return replace(self, found=found, beside_form=beside)
 
     def only(self, kept: Sequence[int]) -> Finished:
         """The same with some of its names alone, fitted anew."""

@@ -138,6 +138,8 @@ class Effect:
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
     of_angle: bool = False
     """Its law is one of an angle and means nothing along a line."""
+    of_line: bool = False
+    """Sought along a line only; of a joint, what turns has another law for it."""
     joint_title: str = ""
     """Title for a single joint, which has no tracks and no kingpin."""
     variants: Callable[[Seen], Sequence[Variant]] | None = None

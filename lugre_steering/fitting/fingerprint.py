@@ -75,7 +75,7 @@ def possible(vehicle: Vehicle, effect: Effect) -> bool:
         return False
     if is_rig(vehicle) and effect.id not in ORIGINS and not effect.joint_title:
         return False
-    if effect.of_angle and vehicle.coordinate.unit != "rad":
+    if (effect.of_line if vehicle.coordinate.unit == "rad" else effect.of_angle):
         return False
     return all(getattr(vehicle, section) is not None for section in effect.needs)
 

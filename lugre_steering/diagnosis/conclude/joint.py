@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.investigate import NULL_DRAWS
-from lugre_steering.diagnosis.laws.find import FoundLaws
+from lugre_steering.diagnosis.laws.find import FoundLaws, with_freedoms
 from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.diagnosis.search.search import Found
 from lugre_steering.diagnosis.search.surely import least_sure_name, least_sure_part
@@ -22,7 +22,7 @@ from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
 from lugre_steering.fitting.parallel import as_joint
-from lugre_steering.fitting.problem import Effects, Problem
+from lugre_steering.fitting.problem import Effects, Problem, is_rig
 from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import SURE_SIGMA, without_part
 from lugre_steering.recording import Array
@@ -65,6 +65,21 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> Parallel | None:
     held = fit(done.problem, done.weight, [*known, *laws], there.x, linearisations=20)
     whole = replace(held, effects=(*names, *held.effects[len(kept) :]))
     return Parallel(replace(done, beside_form=seen, around=False), whole, held, there)
+
+
+def with_terms(done: Finished, laws: FoundLaws) -> Finished | None:
+    """The search with what every joint or axis may have and only shows beside the first of ``laws``, whose torque had kept it in doubt: the
+    second may have taken its place. None where there is nothing more."""
+    there, fitted = done.compared, laws.fitted
+    if not is_rig(done.problem.vehicle):
+        return None
+    problem = with_freedoms(there, beside_names=True)
+    x = np.append(fitted.x[: problem.first_bend], np.zeros(problem.bends.shape[1]))
+    current, more = fit(problem, there.fitted, fitted.effects[: laws.names + 1], x, linearisations=6), list[Found]()
+    for richer, score in rig.wanted(problem, there.noise, there.fitted, current):
+        more.insert(0, Found(score, (), (), current.cost - richer.cost, given=True))
+        current = richer
+    return done.with_more(more, current.effects[: len(more)]) if more else None
 
 
 class BesideLaws(NamedTuple):

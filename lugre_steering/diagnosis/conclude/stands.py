@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.formed import Formed, formed, formed_beside
-from lugre_steering.diagnosis.conclude.joint import Parallel, beside_laws, in_parallel
+from lugre_steering.diagnosis.conclude.joint import Parallel, beside_laws, in_parallel, with_terms
 from lugre_steering.diagnosis.conclude.late import begun_late, timed_by_all
 from lugre_steering.diagnosis.conclude.left_over import LeftOver, left_over
 from lugre_steering.diagnosis.finished import Finished
@@ -191,8 +191,15 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
     if not named:
         if alone is not None and not left.structured and not evident(done, alone):
             alone = None
+        if alone is not None and (richer := _richer(done, alone, seed, progress)) is not None:
+            done, alone = richer
+            judged = verify.verify(alone.problem, done.weight, found.baseline, alone.fitted, done.roles, seed)
+            return done, Stands(True, clock, alone, judged, _left(done, True))
         return done, Stands(False, clock, alone, judged if alone is None else alone.judged, left)
     found_beside = find(done, done.freely, seed, progress) if left.structured else None
+    if found_beside is not None and (richer := _richer(done, found_beside, seed, progress)) is not None:
+        done, found_beside = richer
+        bare, left = done.of_every_joint, _left(done, True)
     beside = found_beside if found_beside is not None and leaves_names(done, found_beside) else None
     if alone is not None and in_place(done, alone, beside):
         swapped = in_place_of_one(done, alone, seed)
@@ -204,6 +211,13 @@ def _beside_laws(done: Finished, tested: _Tested, seed: int, progress: Callable[
     if beside is not None:
         judged = verify.verify(beside.problem, done.weight, found.baseline, beside.fitted, done.roles, seed)
     return done, Stands(True, clock, beside, judged, left)
+
+
+def _richer(done: Finished, laws: FoundLaws, seed: int, progress: Callable[[str], None]) -> tuple[Finished, FoundLaws] | None:
+    """The search with what every joint may have and only shows beside laws, and laws beside all that; None where there is nothing more."""
+    more = with_terms(done, laws)
+    beside = None if more is None else find(more, more.freely, seed, progress)
+    return None if more is None or beside is None else (more, beside)
 
 
 def _left(done: Finished, named: bool) -> LeftOver:

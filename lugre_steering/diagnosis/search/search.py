@@ -44,16 +44,7 @@ from lugre_steering.fitting.noise import Noise
 from lugre_steering.fitting.problem import TYPICAL, Candidate, Effects, Problem, is_rig
 from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.split import Split
-from lugre_steering.fitting.trial import (
-    PARTIAL,
-    SURE_SIGMA,
-    TRIAL_TOLERANCE,
-    Round,
-    Trial,
-    ranked,
-    refine,
-    without_part,
-)
+from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine, without_part
 from lugre_steering.recording import Array
 
 MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
@@ -137,11 +128,11 @@ def search(
         if len(found) > given:
             found, current = _given_beside(now, noise, weight, split, current, found)
             now, current = settled(now, weight, current)
-            sure_ones, fitted = _of_sure_size(problem, now, weight, split, current, found)
+            sure_ones, fitted = _of_sure_size(now, weight, split, current, found)
             if len(sure_ones) < len(found):
                 found, current = _given_beside(now, noise, weight, split, fitted, sure_ones)
                 now, current = settled(now, weight, current)
-        found, current = _of_sure_size(problem, now, weight, split, current, found, given=True)
+        found, current = _of_sure_size(now, weight, split, current, found, given=True)
         given = sum(item.given for item in found)
     now, current, found = _without_those_of_sensors(problem, now, weight, current, found)
     for i, item in enumerate(found[:-1]):  # with everything named there is less in doubt
@@ -217,28 +208,20 @@ def _given_beside(
 
 
 def _of_sure_size(
-    plain: Problem, problem: Problem, weight: Array, split: Split, current: Fit, found: Sequence[Found], *, given: bool = False
+    problem: Problem, weight: Array, split: Split, current: Fit, found: Sequence[Found], *, given: bool = False
 ) -> tuple[list[Found], Fit]:
     """Without what may be nothing: names whose size is not sure, or whose law has acted before any recording shows it; with ``given`` also
     what every joint may have, and optional parts of that. So little is known of the friction of a single joint that they make up for it.
 
-    What every joint may have is told with intervals from all samples, so it need only be as sure as those that are fitted allow. How a
-    name's own law may bend says nothing of whether there is any: nothing bends to nothing; what was looked for must be surer than what was
-    not. ``plain``: without bends of any name.
+    What every joint may have is told with intervals from all samples, so it need only be as sure as those that are fitted allow.
     """
-    kept, least_size = list(found), SURE_OF_SIZE * float(np.sqrt(split.fit.sum() / problem.valid.sum()))
+    kept, least_size = list(found), SURE_OF_SIZE * (float(np.sqrt(split.fit.sum() / problem.valid.sum())) if given else 1.0)
     while kept:
-        names = [i for i, item in enumerate(kept) if not item.given]
-        sure = np.full(len(kept), np.inf)
-        for i, item in enumerate(kept):
-            if item.given and not given:
-                continue
-            bare, own = (problem, current) if item.given else _without_own_bends(plain, problem, weight, current, names, i)
-            sizes = in_deviations(bare, weight, split, own, i).values()
-            sure[i] = max(sizes, default=np.inf) / (least_size if item.given else SURE_SIGMA)
-        shapeless = [i for i in names if idle(problem, weight, split, current, i)]
-        least = shapeless[-1] if shapeless else int(np.argmin(sure))
-        goes = bool(shapeless) or sure[least] < 1.0
+        sizes = [in_deviations(problem, weight, split, current, i) for i in range(len(kept))]
+        whole = [max(own.values(), default=np.inf) if given or not item.given else np.inf for item, own in zip(kept, sizes, strict=True)]
+        shapeless = [i for i, item in enumerate(kept) if not item.given and idle(problem, weight, split, current, i)]
+        least = shapeless[-1] if shapeless else int(np.argmin(whole))
+        goes = bool(shapeless) or whole[least] < least_size
         effects: Effects = current.effects
         if shapeless:
             terms = []
