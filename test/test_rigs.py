@@ -496,7 +496,7 @@ def test_friction_of_a_gear_is_its_share_of_the_load_on_either_way() -> None:
 
 def test_the_friction_of_a_gear_is_named_with_its_share() -> None:
     """Made by a stop operator, no bristle. A patch, a law of the angle or nothing had stood for it."""
-    told, foreign = joints.judged(20303, gear=True)
+    told, foreign = joints.judged(20301, gear=True)
     assert foreign == []
     assert told[-1].term == "load_friction"
     assert told[-1].held

@@ -139,7 +139,7 @@ class Effect:
     of_angle: bool = False
     """Its law is one of an angle and means nothing along a line."""
     of_line: bool = False
-    """Sought along a line only; of a joint, what turns has another law for it."""
+    """Sought along a line only: what turns has another law for it."""
     joint_title: str = ""
     """Title for a single joint, which has no tracks and no kingpin."""
     variants: Callable[[Seen], Sequence[Variant]] | None = None

@@ -30,5 +30,6 @@ EFFECT = Effect(
     rivals=("end_stop", "soil_shear"),
     needs=("contact",),
     joint_title="Spring, or another force in proportion to the position",
+    of_every_joint=True,
     of_line=True,
 )

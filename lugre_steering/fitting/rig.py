@@ -1,7 +1,7 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
 """What every joint or axis may have beside friction, fitted together before anything is looked for: inertia, viscous friction,
-an offset, gravity.
+an offset, gravity of a joint, the spring of an axis that works against one.
 
 Each hides the others while it is missing, so one after another they would be judged wrongly; those stay that the data carry.
 """
@@ -25,13 +25,21 @@ LEAST, SHARE, SURE = 0.05, 0.02, 0.3
 so large against the noise."""
 
 
+MUCH = 2.0
+"""Times what is left with a spring, which few axes have, that must be left without it; a smaller one is looked for like any name."""
+
+
 def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> list[tuple[Fit, Score]]:
     """The terms without which clearly more would be left over, what matters most first.
 
     Each with the fit that has it and those before it, and its score against what the others leave.
     """
     least, terms = _least(problem, baseline, weight), _terms(problem, baseline)
-    full = fitted(problem, weight, [(c, dict.fromkeys(c.free, 0.0)) for c in terms], baseline)
+    full = _with_all(problem, weight, terms, baseline)
+    if any(term.effect.of_line for term in terms):
+        sprung, terms = full, [term for term in terms if not term.effect.of_line]
+        full = _with_all(problem, weight, terms, baseline)
+        full = sprung if cost(problem, full, weight) > MUCH * cost(problem, sprung, weight) else full
     problem = problem.doubted(doubt(problem, full, weight), problem.typical)
     while full.effects:
         rests = [*_fewer(full.effects).values(), *_less(full.effects)]
@@ -55,6 +63,10 @@ def carried(problem: Problem, noise: Noise, weight: Array, baseline: Fit) -> lis
     return found
 
 
+def _with_all(problem: Problem, weight: Array, terms: Sequence[Candidate], baseline: Fit) -> Fit:
+    return fitted(problem, weight, [(term, dict.fromkeys(term.free, 0.0)) for term in terms], baseline)
+
+
 def spared(problem: Problem, weight: Array, current: Fit, terms: int) -> Iterator[tuple[int, Fit]]:
     """Those of the first ``terms`` effects of a fit that had only stood for what follows them, last first, each with the fit without it."""
     least = _least(problem, current, weight)
@@ -69,7 +81,7 @@ def spared(problem: Problem, weight: Array, current: Fit, terms: int) -> Iterato
 def wanted(problem: Problem, noise: Noise, weight: Array, current: Fit) -> Iterator[tuple[Fit, Score]]:
     """Terms that a fit lacks beside all that it has, each with the fit that has it first, and its score."""
     least = _least(problem, current, weight)
-    for candidate in _terms(problem, current):
+    for candidate in (term for term in _terms(problem, current) if not term.effect.of_line):
         score = next(s for s in screen(problem, current, weight, noise.draws, among=[candidate]) if s.candidate == candidate)
         richer = fit(problem, weight, [(candidate, score.values), *current.effects], current.x, tolerance=TRIAL_TOLERANCE)
         if cost(problem, current, weight) - cost(problem, richer, weight) > least:

@@ -15,7 +15,7 @@ from lugre_steering.diagnosis.investigate import NULL_DRAWS
 from lugre_steering.diagnosis.laws.find import FoundLaws, with_freedoms
 from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.diagnosis.search.search import Found
-from lugre_steering.diagnosis.search.surely import least_sure_name, least_sure_part
+from lugre_steering.diagnosis.search.surely import in_deviations, least_sure_name, least_sure_part
 from lugre_steering.diagnosis.verify import Judged, verify
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.doubt import in_doubt
@@ -79,7 +79,15 @@ def with_terms(done: Finished, laws: FoundLaws) -> Finished | None:
     for richer, score in rig.wanted(problem, there.noise, there.fitted, current):
         more.insert(0, Found(score, (), (), current.cost - richer.cost, given=True))
         current = richer
-    return done.with_more(more, current.effects[: len(more)]) if more else None
+    known = in_doubt(problem, there.fitted, current)
+    while more:
+        sizes = [max(in_deviations(known, there.fitted, there.roles, current, i).values(), default=np.inf) for i in range(len(more))]
+        least = int(np.argmin(sizes))
+        if sizes[least] >= SURE_SIGMA:
+            return done.with_more(more, current.effects[: len(more)])
+        del more[least]
+        current = fit(known, there.fitted, [effect for i, effect in enumerate(current.effects) if i != least], current)
+    return None
 
 
 class BesideLaws(NamedTuple):

@@ -95,10 +95,10 @@ def find(
     sought = with_freedoms(there, beside_names=bool(before.effects)) if freely else _with_places(there.problem, before)
     roles, weight = there.roles, there.fitted
     samples = float(roles.fit.sum())
-    gains: list[float] = []
+    gains, foretold, steps = list[float](), list[float](), list[Fit]()
     ties: tuple[Tried, ...] = ()
     x = np.append(before.x, np.zeros(sought.nuisances - before.x.size))
-    current, first_bar, foretold, ceiling = fit(sought, weight, before.effects, x), 0.0, 0.0, 0.0
+    current, first_bar, ceiling = fit(sought, weight, before.effects, x), 0.0, 0.0
     for index in range(MOST_LAWS):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
@@ -118,19 +118,21 @@ def find(
             ceiling = screen.black_box(seed)
             ties = tuple(each for each in tried if each is not best and each.fit.cost < best.fit.cost + TIED * gain)
         gains.append(gain)
-        foretold += best.screened.gain
+        foretold.append(best.screened.gain)
+        steps.append(best.fit)
         current = best.fit
-    if not gains:
-        return None
     progress("proving the law")
-    if not _sure(there, current, len(before.effects)):
+    while steps and not _sure(there, steps[-1], len(before.effects)):  # a second one of many values may put both in doubt
+        steps, gains, foretold = steps[:-1], gains[:-1], foretold[:-1]
+    if not steps:
         return None
+    current = steps[-1]
     fitted, whole = (fit(problem, w, current.effects, current.x[: problem.nuisances], linearisations=6) for w in (done.fitted, done.weight))
     judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
     if judged.interval[0] <= 0.0:
         return None
     own = doubt(problem, whole, done.weight)
-    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, foretold, max(ceiling, foretold), own)
+    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, sum(foretold), max(ceiling, sum(foretold)), own)
 
 
 def _sure(there: Finished, found: Fit, names: int) -> bool:
