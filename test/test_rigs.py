@@ -483,7 +483,7 @@ def test_friction_of_a_gear_is_its_share_of_the_load_on_either_way() -> None:
     assert plain.contact is not None
     stiff = dataclasses.replace(plain.contact, stiffness_Nm_per_deg=1e3, presliding_damping_Nms=0.0)
     contact = dataclasses.replace(stiff, coulomb_torque_Nm=10.0, static_torque_Nm=10.0)
-    joint = plain.replace(contact=contact, effects=(EffectEntry("load_friction", {"share": 0.1}),))
+    joint = plain.replace(contact=contact, effects=(EffectEntry("gear_friction", {"share": 0.1}),))
     time = np.arange(0.0, 20.0, 0.01)
     theta = 1.2 * np.sin(0.1 * np.pi * time)
     rate = 0.12 * np.pi * np.cos(0.1 * np.pi * time)
@@ -496,9 +496,9 @@ def test_friction_of_a_gear_is_its_share_of_the_load_on_either_way() -> None:
 
 def test_the_friction_of_a_gear_is_named_with_its_share() -> None:
     """Made by a stop operator, no bristle. A patch, a law of the angle or nothing had stood for it."""
-    told, foreign = joints.judged(20301, gear=True)
+    told, foreign = joints.judged(20301, gear="gear_friction")
     assert foreign == []
-    assert told[-1].term == "load_friction"
+    assert told[-1].term == "gear_friction"
     assert told[-1].held
     assert told[-1].value == pytest.approx(told[-1].true, rel=0.1)
 
@@ -506,12 +506,12 @@ def test_the_friction_of_a_gear_is_named_with_its_share() -> None:
 def test_the_noise_of_an_acceleration_is_no_load() -> None:
     """The load of this gear is mostly that of its inertia; with the plain second difference of the angles in it, its share came out as a
     tenth of what it is."""
-    joint = joints.drawn(20306, gear=True)
+    joint = joints.drawn(20306, gear="gear_friction")
     problem = as_joint(Problem(joint.sheet, [prepare(joint.recording, joint.sheet)]))
-    terms = [each for each in candidates(problem) if each.effect.of_every_joint or each.effect.id == "load_friction"]
+    terms = [each for each in candidates(problem) if each.effect.of_every_joint or each.effect.id == "gear_friction"]
     fitted = fit(problem, problem.sensor_weight, [(each, dict.fromkeys(each.free, 0.0)) for each in terms], linearisations=30)
-    (values,) = (own for each, own in fitted.effects if each.effect.id == "load_friction")
-    assert values["share"] == pytest.approx(joint.truth["load_friction"], rel=0.1)
+    (values,) = (own for each, own in fitted.effects if each.effect.id == "gear_friction")
+    assert values["share"] == pytest.approx(joint.truth["gear_friction"], rel=0.1)
 
 
 @pytest.mark.parametrize(("engage", "shift"), [(0.2, 0.3), (0.5, -0.3)])

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from lugre_steering.diagnosis.engine import diagnose_recordings
-from lugre_steering.effects.registry import CATALOGUE
+from lugre_steering.effects.registry import CATALOGUE, effect
 from lugre_steering.recording import Array, Kind, Recording, Signal
 from lugre_steering.resources import config_folder
 from lugre_steering.serialise import as_json
@@ -23,10 +23,8 @@ from lugre_steering.simulate.manoeuvres import Motion
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.vehicle import EffectEntry, Vehicle, load
 
-TERMS = tuple((effect.id, effect.amplitudes[0]) for effect in CATALOGUE.values() if effect.of_every_joint and not effect.of_line)
+TERMS = tuple((entry.id, entry.amplitudes[0]) for entry in CATALOGUE.values() if entry.of_every_joint and not entry.of_line)
 """What every joint may have, and the value by which it is counted."""
-GEAR = ("load_friction", "share")
-"""The same of friction that grows with the transmitted torque."""
 STEP_S = 5e-4
 """Of the simulation: its own error passes for 0.5 % of viscous friction at the 2 ms of recordings to look at."""
 SMOOTHED = 3
@@ -58,10 +56,10 @@ class Told:
         return self.low <= self.true <= self.high
 
 
-def drawn(seed: int, *, ripple: bool = False, gear: bool = False) -> Joint:
+def drawn(seed: int, *, ripple: bool = False, gear: str = "") -> Joint:
     """Torques are drawn against the Coulomb friction, so that all of them can be seen; sensors and motion over what is usual. ``ripple``:
     also a torque periodic in the angle, as of a motor's magnets, which no entry of the catalogue is; ``gear``: also friction in proportion
-    to what gravity and inertia ask for."""
+    to what gravity and inertia ask for, and the entry of the catalogue that it is."""
     rng = np.random.default_rng([seed, 16])
 
     def between(low: float, high: float) -> float:
@@ -100,10 +98,10 @@ def drawn(seed: int, *, ripple: bool = False, gear: bool = False) -> Joint:
         periods = np.interp(torque.time_s, run.truth.motion.time, run.truth.motion.theta[0]) / np.radians(between(3.0, 12.0))
         torque = Signal(torque.time_s, torque.value + coulomb * between(0.1, 0.5) * np.sin(2.0 * np.pi * periods))
     if gear:
-        truth["load_friction"] = between(0.03, 0.3)
+        truth[gear] = between(0.03, 0.3)
         theta = run.truth.motion.theta[0]
         carried = values["amplitude"] * np.sin(theta) + values["torque"] + values["inertia"] * run.truth.motion.acceleration[0]
-        lost = truth["load_friction"] * np.abs(carried) * _turned(theta, np.radians(between(0.02, 0.2)))
+        lost = truth[gear] * np.abs(carried) * _turned(theta, np.radians(between(0.02, 0.2)))
         torque = Signal(torque.time_s, torque.value + np.interp(torque.time_s, run.truth.motion.time, lost))
     recording = Recording(f"joint_{seed}", 0, {"left": signals[Kind.ANGLE]}, {}, measured_torque=torque)
     return Joint(real, known.replace(contact=guess), recording, truth)
@@ -147,12 +145,12 @@ def _rounded(rng: np.random.Generator, time: Array, angle_deg: Array) -> Motion:
     return Motion(grid, theta[None])
 
 
-def judged(seed: int, *, ripple: bool = False, gear: bool = False) -> tuple[list[Told], list[str]]:
+def judged(seed: int, *, ripple: bool = False, gear: str = "") -> tuple[list[Told], list[str]]:
     """What diagnosis says of each of TERMS of a drawn joint, of its ``gear`` if there is one, and names that the joint does not have."""
     joint = drawn(seed, ripple=ripple, gear=gear)
-    found = {effect.id: effect.parameters for effect in diagnose_recordings([joint.recording], joint.sheet).effects}
+    found = {named.id: named.parameters for named in diagnose_recordings([joint.recording], joint.sheet).effects}
     told = []
-    for name, parameter in (*TERMS, *[GEAR][:gear]):
+    for name, parameter in (*TERMS, (gear, effect(gear).amplitudes[0])) if gear else TERMS:
         value = found[name][parameter] if name in found else None
         low, high = (None, None) if value is None else value.ci95
         if value is None or low is None or high is None:
@@ -182,7 +180,7 @@ def run(argv: Sequence[str]) -> None:
     parser.add_argument("--joints", type=int, default=24, help="joints drawn, one recording each [24]")
     parser.add_argument("--seed", type=int, default=1, help="of the first joint [1]")
     parser.add_argument("--ripple", action="store_true", help="beside a torque periodic in the angle, which no entry of the catalogue is")
-    parser.add_argument("--gear", action="store_true", help="with friction in proportion to what gravity and inertia ask for")
+    parser.add_argument("--gear", default="", metavar="ID", help="with friction in proportion to the load, to be told by this name")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     options = parser.parse_args(argv)
     told: list[Told] = []

@@ -22,7 +22,7 @@ from lugre_steering.effects import registry
 from lugre_steering.effects.entry import Effect
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.files import output_folder
-from lugre_steering.fitting.fingerprint import candidates
+from lugre_steering.fitting.fingerprint import candidates, possible
 from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.recording import Array
 from lugre_steering.report import words
@@ -34,6 +34,8 @@ from lugre_steering.vehicle import Vehicle
 
 REFERENCE = "double-cycle"
 """Manoeuvre that sizes the example: it reaches the limits, slides and warms."""
+MACHINES = ("test_vehicle.yaml", "single_joint_example.yaml", "linear_axis_example.yaml")
+"""Shipped vehicle files; the first that can have an effect shows it."""
 SAMPLE_S = 0.02
 NUDGE = 0.02
 """Finite-difference step of the calibration values."""
@@ -43,7 +45,7 @@ ROUNDING_NM = 1e-6
 
 @dataclass(frozen=True)
 class Trace:
-    """One manoeuvre of the shipped test vehicle with and without an effect at its typical size; no sensor noise."""
+    """One manoeuvre of a shipped vehicle with and without an effect at its typical size; no sensor noise."""
 
     manoeuvre: Manoeuvre
     problem: Problem
@@ -87,7 +89,8 @@ def traces(effect: Effect) -> list[Trace]:
     """The effect in every built-in manoeuvre, the most telling first; empty if the standard topics cannot show it."""
     if not effect.observable:
         return []
-    vehicle, runs = _recorded()
+    machine = next((file for file in MACHINES if possible(_recorded(file)[0], effect)), MACHINES[0])
+    vehicle, runs = _recorded(machine)
     problems = {name: Problem(vehicle, [run]) for name, run in runs.items()}  # of the catalogue as it is now
     others = [name for name in CATALOGUE if name != effect.id]
     variants = [variant for variant in candidates(problems[REFERENCE], others) if variant.bags is None]
@@ -99,9 +102,9 @@ def traces(effect: Effect) -> list[Trace]:
 
 
 @cache
-def _recorded() -> tuple[Vehicle, dict[str, Run]]:
-    """The test vehicle, and every built-in manoeuvre of its baseline as a run."""
-    vehicle = vehicle_file.load(config_folder() / "test_vehicle.yaml")
+def _recorded(file: str) -> tuple[Vehicle, dict[str, Run]]:
+    """A shipped vehicle, and every built-in manoeuvre of its baseline as a run."""
+    vehicle = vehicle_file.load(config_folder() / file)
     return vehicle, {name: _ideal_run(vehicle, manoeuvre) for name, manoeuvre in BUILT_IN.items()}
 
 
@@ -160,7 +163,7 @@ def draw(found: Sequence[Trace], out: Path) -> Path:
     values = ", ".join(f"{key} = {words.number(value)}" for key, value in best.values.items())
     line = f" on line {best.candidate.line}" if best.candidate.line else ""
     caption = (
-        f"SIMULATED: test vehicle, manoeuvre '{best.manoeuvre.name}', no sensor noise. {effect.title} ({effect.id}){line} with "
+        f"SIMULATED: {vehicle.name}, manoeuvre '{best.manoeuvre.name}', no sensor noise. {effect.title} ({effect.id}){line} with "
         f"{values} (SI). Law: {effect.equation}. How it shows: {effect.trace}. Thin line: the part of the difference that "
         "recalibrating the baseline cannot imitate; only that part can be seen in a recording."
     )

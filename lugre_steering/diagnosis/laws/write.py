@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering import units
+from lugre_steering.diagnosis.finished import amplitude_of
 from lugre_steering.diagnosis.laws.cells import Traces, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law, law_of
@@ -123,7 +124,7 @@ def _shape_words(law: Law, values: Mapping[str, float], along: str, vehicle: Veh
 def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, Any]]:
     """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties;
     ``nearest``: entries of the catalogue in whose place they stand."""
-    torque = 0.5 * float(np.ptp(found.problem.measured))
+    torque = amplitude_of(found.problem.measured)
     made = []
     effects = found.fit.effects[found.names :]
     cells = [law_of(candidate.effect).at(values) for candidate, values in effects]

@@ -19,7 +19,7 @@ def loss(load, elastic, damping, viscous, coulomb_torque, share):
 
 
 EFFECT = Effect(
-    id="load_friction",
+    id="gear_friction",
     stage="measurement",
     tier=1,
     title="Friction grows with the torque that is transmitted",
