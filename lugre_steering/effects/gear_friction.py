@@ -26,7 +26,7 @@ EFFECT = Effect(
     equation="M = M_f (1 + share |M_load| / M_c)",
     source="Hamon, Gautier, Garrec, IROS 2010, 6187; Bittencourt, Gunnarsson, J. Dyn. Sys. Meas. Control 134 (2012) 051013",
     trace="the two branches of a sweep are wide apart where the load is large",
-    coordinate="direction",
+    coordinate="torque",
     parameters=(
         Parameter("share", "1", "friction as a share of the transmitted torque", 0.05, 0.0, 1.0),
     ),
