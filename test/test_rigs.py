@@ -505,7 +505,7 @@ def test_the_friction_of_a_gear_is_named_with_its_share() -> None:
 
 def test_the_noise_of_an_acceleration_is_no_load() -> None:
     """The load of this gear is mostly that of its inertia; with the plain second difference of the angles in it, its share came out as a
-    tenth of what it is."""
+    twenty-fifth of what it is."""
     joint = joints.drawn(20306, gear="gear_friction")
     problem = as_joint(Problem(joint.sheet, [prepare(joint.recording, joint.sheet)]))
     terms = [each for each in candidates(problem) if each.effect.of_every_joint or each.effect.id == "gear_friction"]
@@ -614,7 +614,7 @@ def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_s
 
 
 def test_the_spring_of_an_axis_is_told_with_its_mass_and_losses() -> None:
-    """A force of 3000 N/m from 0.05 m on had hidden the mass and the loss, which came with neither."""
+    """3000 N/m with their zero at 0.05 m; the recording had been refused as wrongly wired."""
     vehicle, mass, loss, spring = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0, 3000.0
     recording = driven_axis(vehicle, mass, loss, np.zeros_like, load=lambda _, at: spring * (at - 0.05))
     found = {effect.id: effect.parameters for effect in diagnose_recordings([recording], vehicle).effects}
@@ -626,7 +626,7 @@ def test_the_spring_of_an_axis_is_told_with_its_mass_and_losses() -> None:
 
 
 def test_beside_a_load_that_is_picked_up_mass_and_losses_are_told() -> None:
-    """They do not show while the load is in the way, and had been left out or told as a law."""
+    """They do not show while the load is in the way; the recording had been refused as wrongly wired."""
     vehicle, mass, loss = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0
     recording = driven_axis(vehicle, mass, loss, np.zeros_like, load=lambda time, _: np.where(time > 36.0, 300.0, 0.0))
     result = diagnose_recordings([recording], vehicle)

@@ -235,8 +235,8 @@ def _lacks_terms(vehicle: Vehicle, run: Run, expected: Array) -> bool:
     angle = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else [theta]
     columns = np.column_stack([expected, alpha, omega, np.ones_like(theta), *angle])[run.valid]
     measured = run.measured[run.valid]
-    if _explain(columns, measured):
-        return True
+    if (alike := _explain(columns, measured)) or measured.size < PARTS:
+        return alike
     pairs = zip(np.array_split(columns, PARTS), np.array_split(measured, PARTS), strict=True)
     parts = [(column - column.mean(axis=0), torque - torque.mean()) for column, torque in pairs]
     size = np.linalg.lstsq(np.concatenate([each for each, _ in parts]), np.concatenate([each for _, each in parts]), rcond=1e-10)[0]

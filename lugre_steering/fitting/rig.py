@@ -23,8 +23,6 @@ from lugre_steering.recording import Array
 LEAST, SHARE, SURE = 0.05, 0.02, 0.3
 """Energy by which what is left must rise without a term: in noise variances per sample, and a share of what all leave, unless it is
 so large against the noise."""
-
-
 MUCH = 2.0
 """Times what is left with a spring, which few axes have, that must be left without it; a smaller one is looked for like any name."""
 

@@ -84,7 +84,8 @@ def with_terms(done: Finished, laws: FoundLaws) -> Finished | None:
         sizes = [max(in_deviations(known, there.fitted, there.roles, current, i).values(), default=np.inf) for i in range(len(more))]
         least = int(np.argmin(sizes))
         if sizes[least] >= SURE_SIGMA:
-            return done.with_more(more, current.effects[: len(more)])
+            standing = done if laws.names else done.only(())  # what did not stand does not for being in the way
+            return standing.with_more(more, current.effects[: len(more)])
         del more[least]
         current = fit(known, there.fitted, [effect for i, effect in enumerate(current.effects) if i != least], current)
     return None
