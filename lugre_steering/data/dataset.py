@@ -21,6 +21,8 @@ from lugre_steering.vehicle.cylinders import gauge_offset, line_gains
 from lugre_steering.vehicle.size import angle_unit
 
 MAX_RATE_HZ = 125.0
+TORQUE = "measured_torque"
+"""The channel of a torque sensor."""
 GAP_S = 0.25
 TURNED_RAD = 1e-4
 """Step of the derivative of arms by the angle."""
@@ -177,7 +179,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
     signals |= {f"pressure/{line}": recording.pressure.get(line) for line in lines}
     if vehicle.torque_sensor is not None:
-        signals["measured_torque"] = recording.measured_torque
+        signals[TORQUE] = recording.measured_torque
     topics = [channel.topic for channel in vehicle.channels if channel.kind is not Kind.AIR_TEMPERATURE]
     for topic, (name, signal) in zip(topics, signals.items(), strict=True):
         if signal is None or signal.time_s.size < 20:
@@ -186,7 +188,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     present = {name: signal for name, signal in signals.items() if signal is not None}
     present = {name: evened(signal)[0] for name, signal in present.items()}
     time, valid = _clock(recording.name, present)
-    seen = {name: _on_clock(time, signal, sensed(signal)) for name, signal in present.items()}
+    seen = {name: _on_clock(time, signal, sensed(signal, jumps=name == TORQUE)) for name, signal in present.items()}
     worst = max((seen[f"angle/{side}"] for side in vehicle.sides), key=lambda sensor: sensor.sigma())
     angle = worst if worst.sigma() > vehicle.sensors.angle_sigma else SensorNoise(vehicle.sensors.angle_sigma, 0.0)
     raw = np.array([_at(time, present[f"angle/{side}"]) for side in vehicle.sides])
@@ -207,9 +209,9 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
     else:
         assert vehicle.torque_sensor is not None
         gains = turned = np.full((len(vehicle.sides), 1, time.size), 1.0 / len(vehicle.sides))
-        pressure = _at(time, present["measured_torque"])[None, :]
+        pressure = _at(time, present[TORQUE])[None, :]
         sheet = vehicle.torque_sensor.noise_Nm
-        sigma = max(sheet, seen["measured_torque"].sigma()) * _louder(time, present["measured_torque"], sheet)
+        sigma = max(sheet, seen[TORQUE].sigma()) * _louder(time, present[TORQUE], sheet, jumps=True)
     side_torque, side_slope = _of_sides(gains, turned, pressure)
     measured = side_torque.sum(axis=0)
     if float(np.ptp(measured)) <= 1e-9 * float(np.abs(measured).max()):
@@ -321,9 +323,9 @@ def _on_clock(time: Array, signal: Signal, sensor: SensorNoise) -> SensorNoise:
     return sensor if sensor.coarse else SensorNoise(sensor.sigma(averaged), 0.0)
 
 
-def _louder(time: Array, signal: Signal, sheet: float) -> Array:
+def _louder(time: Array, signal: Signal, sheet: float, *, jumps: bool = False) -> Array:
     """How many times its usual noise a channel has, on the clock."""
-    return np.interp(time, signal.time_s, louder(signal, sheet, by_level=True))
+    return np.interp(time, signal.time_s, louder(signal, sheet, by_level=True, jumps=jumps))
 
 
 def _averaged(time: Array, signal: Signal) -> int:

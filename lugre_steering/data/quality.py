@@ -141,7 +141,7 @@ def _sensor(channel: Channel, signal: Signal, look: _Look, vehicle: Vehicle) -> 
     def say(value: float) -> str:
         return f"{np.degrees(value):.2g} deg" if unit == "rad" else f"{value:.2g} {unit}"
 
-    said = worse_than_said(signal, look.sheet, say) if look.sheet > 0.0 else None
+    said = worse_than_said(signal, look.sheet, say, jumps=channel.kind is Kind.TORQUE) if look.sheet > 0.0 else None
     found = [Finding("sensor_worse_than_sheet", channel.topic, f"{channel.topic}: {said}; taken into account")] if said else []
     lost = _lost(look)
     if lost > LOST:
@@ -369,7 +369,7 @@ def _examine(
     spikes = [(a, b) for a, b in look.runs(_spikes(look) & keep) if b - a < SPIKE_SAMPLES and _returns(look, a, b)]
     for first, last in spikes:
         keep[first : last + 1] = False
-    noisy = _noise_change(look, keep, by_level=channel.kind is not Kind.ANGLE)
+    noisy = _noise_change(look, keep, channel.kind)
     if channel.kind is Kind.ANGLE:  # what it seems to move there would pass for friction
         for first, last in noisy:
             keep[first : last + 1] = False
@@ -482,11 +482,12 @@ def _returns(look: _Look, first: int, last: int) -> bool:
     return bool(abs(after - before) < 0.5 * height + (last - first + 2) * usual)
 
 
-def _noise_change(look: _Look, keep: Mask, *, by_level: bool) -> list[tuple[int, int]]:
+def _noise_change(look: _Look, keep: Mask, kind: Kind) -> list[tuple[int, int]]:
     """Stretches where a channel is clearly noisier than usual."""
     kept = np.flatnonzero(keep)
     if kept.size < 2:
         return []
     loud = np.zeros(keep.size, bool)
-    loud[kept] = louder(Signal(look.time[kept], look.value[kept]), look.sheet, by_level=by_level) > 1.0
+    signal = Signal(look.time[kept], look.value[kept])
+    loud[kept] = louder(signal, look.sheet, by_level=kind is not Kind.ANGLE, jumps=kind is Kind.TORQUE) > 1.0
     return look.runs(loud, 0.5 * WINDOW_S)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.stats import norm
 
 from lugre_steering.data.stamps import evened
@@ -85,11 +85,12 @@ def white_noise(signal: Signal) -> float:
     return float(np.sqrt(np.median(mean) / (FOURTH @ FOURTH)))
 
 
-def own_noise(signal: Signal) -> float:
-    """The same, of the sensor alone: of a slow channel, each of whose windows holds a start or a stop, the usual one of its samples."""
+def own_noise(signal: Signal, *, jumps: bool = False) -> float:
+    """The same, of the sensor alone: of a slow channel, each of whose windows holds a start or a stop, the usual one of its samples; so of
+    one that ``jumps``, as the torque of a friction does at each reversal."""
     spacing = np.diff(signal.time_s)
     period = float(np.median(spacing))
-    if period < 1.1 / SLOWEST_HZ:
+    if period < 1.1 / SLOWEST_HZ and not jumps:
         return white_noise(signal)
     if spacing.size < SIXTH.size - 1:
         return 0.0
@@ -98,8 +99,9 @@ def own_noise(signal: Signal) -> float:
     return float(np.median(size) / norm.ppf(0.75) / np.sqrt(SIXTH @ SIXTH)) if size.size else 0.0
 
 
-def local_noise(signal: Signal, period: float) -> Array:
-    """Standard deviation (n,) of the white part around each sample, from fourth differences over WINDOW_S.
+def local_noise(signal: Signal, period: float, *, jumps: bool = False) -> Array:
+    """Standard deviation (n,) of the white part around each sample, from fourth differences over WINDOW_S: their mean, or where the signal
+    ``jumps`` their median.
 
     What stamp jitter makes of a slope is taken off; windows with a lost message do not count.
     """
@@ -110,26 +112,30 @@ def local_noise(signal: Signal, period: float) -> Array:
     regular[2:-2] = sliding_window_view(spacing, 4).max(axis=1) < 1.5 * period
     size = np.zeros(value.size)
     size[2:-2] = np.abs(np.convolve(value, FOURTH, mode="valid"))
-    share = uniform_filter1d(regular, width)
-    mean = uniform_filter1d(size * regular, width) / np.maximum(share, 0.1)
-    sigma = mean * np.sqrt(np.pi / 2.0) / np.sqrt(FOURTH @ FOURTH)
+    if jumps and regular.any():
+        told = regular > 0.0
+        usual = np.interp(time, time[told], median_filter(size[told], width, mode="reflect")) / norm.ppf(0.75)
+    else:
+        share = uniform_filter1d(regular, width)
+        usual = uniform_filter1d(size * regular, width) / np.maximum(share, 0.1) * np.sqrt(np.pi / 2.0)
+    sigma = usual / np.sqrt(FOURTH @ FOURTH)
     jitter = 1.4826 * float(np.median(np.abs(spacing - period)))
     slope = np.gradient(uniform_filter1d(value, samples_in(0.1, period)), time)
     excess = sigma**2 - jitter**2 * uniform_filter1d(slope**2, width)
     return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
 
 
-def louder(signal: Signal, sheet: float, *, by_level: bool) -> Array:
+def louder(signal: Signal, sheet: float, *, by_level: bool, jumps: bool = False) -> Array:
     """How many times its usual noise, that of its ``sheet`` at least, a channel has around each sample (n,); 1 unless it is LOUDER for
     LOUD_S.
 
-    ``by_level``: what is usual goes with the level of the signal, as ripple with the load.
+    ``by_level``: what is usual goes with the level of the signal, as ripple with the load; ``jumps``: of a torque of a joint.
     """
     period = float(np.median(np.diff(signal.time_s)))
     found = np.ones(signal.value.size)
     if period > 1.0 / SLOWEST_HZ or signal.value.size < 2 * samples_in(WINDOW_S, period):
         return found
-    sigma, level = local_noise(signal, period), np.abs(uniform_filter1d(signal.value, samples_in(WINDOW_S, period)))
+    sigma, level = local_noise(signal, period, jumps=jumps), np.abs(uniform_filter1d(signal.value, samples_in(WINDOW_S, period)))
     floor = max(sheet, 0.5 * resolution(signal.value), 1e-9 * float(level.max()))
     parts = np.array_split(np.argsort(level), LEVELS if by_level else 1)
     middles = [float(np.median(level[part])) for part in parts]
@@ -157,10 +163,10 @@ def samples_in(duration_s: float, period: float) -> int:
     return max(3, round(duration_s / period))
 
 
-def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -> str | None:
+def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str], *, jumps: bool = False) -> str | None:
     """What a channel shows of its sensor that is clearly worse than its noise by the vehicle file, in words; None if it is not."""
     even, scatter = evened(signal)
-    sensor = replace(sensed(even), noise=own_noise(even))
+    sensor = replace(sensed(even), noise=own_noise(even, jumps=jumps))
     said = []
     if sensor.coarse and sensor.sigma() > WORSE * sheet:
         said.append(f"steps of {say(sensor.resolution)}")
@@ -173,6 +179,6 @@ def worse_than_said(signal: Signal, sheet: float, say: Callable[[float], str]) -
     return "; ".join(said) or None
 
 
-def sensed(signal: Signal) -> SensorNoise:
+def sensed(signal: Signal, *, jumps: bool = False) -> SensorNoise:
     """Steps and noise of a channel."""
-    return SensorNoise(white_noise(signal), resolution(signal.value))
+    return SensorNoise(own_noise(signal, jumps=True) if jumps else white_noise(signal), resolution(signal.value))

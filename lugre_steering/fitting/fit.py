@@ -64,9 +64,10 @@ class Fit:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the fitted values (q, q); few of many fits are asked for it."""
-        spread = np.linalg.pinv(_stiffened(self.gram, self.prior**2), rcond=1e-12)
-        return np.asarray(spread * np.outer(self.natural, self.natural), float)
+        """Of the fitted values (q, q), by their columns: the square of these forgets what the prior alone tells of. Few of many fits are
+        asked for it."""
+        half = self.natural[:, None] * np.linalg.pinv(np.linalg.qr(np.vstack([self.slope, np.diag(self.prior)]), mode="r"), rcond=1e-12)
+        return np.asarray(half @ half.T)
 
     def basis(self, without: slice | None = None) -> Array:
         """Orthonormal columns (n, k) that span what the fitted values can change, but for those ``without``; weighted too."""
