@@ -87,7 +87,8 @@ class Run:
     mean_of: float | None = None
     """Where each sample of ``measured`` is the mean over its step, as predictions must be: of how many independent ones, by its noise."""
     midway: bool = False
-    """Whether the friction level follows the rate midway between samples, to second order, and not that at their end."""
+    """Whether the friction level follows the rate midway between samples, to second order, and not that at their end: of joints, whose
+    friction may turn within one."""
 
     @cached_property
     def steps(self) -> tuple[Array, Array, Array, Array]:
@@ -169,8 +170,8 @@ def in_parallel(run: Run, average_s: float) -> Run:
 
 
 def as_recorded(run: Run) -> Run:
-    """The run with its torque as it was measured, and friction as the live node follows it."""
-    return replace(run, measured=run.side_torque.sum(axis=0), sharp=None, average_s=0.0, midway=False)
+    """The run with its torque as it was measured."""
+    return replace(run, measured=run.side_torque.sum(axis=0), sharp=None, average_s=0.0)
 
 
 def prepare(recording: Recording, vehicle: Vehicle) -> Run:
@@ -225,6 +226,7 @@ def prepare(recording: Recording, vehicle: Vehicle) -> Run:
         side_torque=side_torque, side_slope=side_slope, measured=measured, sigma=np.maximum(sigma, floor), valid=valid,
         air=_air(recording.air_temperature, vehicle), first_air=_first_air(recording.air_temperature), angle=angle,
         rounding=rounding, angle_unit=angle_unit(vehicle), raw=raw, bridged=_bridged(time, present),
+        midway=vehicle.contact is not None,
     )  # fmt: skip
 
 

@@ -62,6 +62,7 @@ def law_fields(entry: LawEntry) -> dict[str, float | Array]:
 
 STAGE_OF: Mapping[str, str] = {
     "friction_level": "contact", "presliding_stiffness": "contact", "conservative_torque": "parallel_torque", "inertia": "parallel_torque",
+    "linked_inertia": "parallel_torque",
 }  # fmt: skip
 """Where in the chain a channel belongs; all others with losses and sensors."""
 TOLD_BY = {
@@ -93,6 +94,8 @@ def check_law(entry: LawEntry, reader: Reader, key: str) -> None:
         raise reader.fail(f"{key}.memory_size", entry.memory_size, "a number above 0 for a memory")
     if entry.memory == "ring" and (entry.channel, entry.coordinate) != laws.RINGS:
         raise reader.fail(f"{key}.memory", "ring", f"no other than {' over '.join(laws.RINGS)} with it")
+    if entry.channel == laws.LINKED[0] and (entry.coordinate, entry.memory) != (laws.LINKED[1], "none"):
+        raise reader.fail(f"{key}.channel", entry.channel, f"no other than {laws.LINKED[1]} as its coordinate, without a memory")
     if entry.memory == "ring" and not entry.memory_size >= SHORTEST_S:
         raise reader.fail(f"{key}.memory_size", entry.memory_size, f"a period of at least {SHORTEST_S:g} s for what rings")
     if len(entry.range) != 2 or not NARROWEST <= entry.range[1] - entry.range[0] <= WIDEST:

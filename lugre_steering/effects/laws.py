@@ -26,8 +26,10 @@ KNOTS = 513
 CHANNELS = {
     "friction_level": "1", "presliding_stiffness": "1", "conservative_torque": "N m", "coulomb_friction": "N m",
     "load_friction": "1", "viscous_loss": "N m s/rad", "turbulent_loss": "N m s2/rad2", "gain": "1", "inertia": "kg m2", "lag": "s",
+    "linked_inertia": "kg m2",
 }  # fmt: skip
-"""How a torque arises, with the unit of f; all of one track. Shares act on the friction level, the stiffness and the torque."""
+"""How a torque arises, with the unit of f; all of one track. Shares act on the friction level, the stiffness and the torque. A linked
+inertia is what moves by a crank or a linkage: of the angle alone."""
 COORDINATES = {
     "none": "1", "angle": "rad", "abs_angle": "rad", "rate": "rad/s", "abs_rate": "rad/s", "direction": "1", "since_reversal": "rad",
     "torque": "N m", "abs_torque": "N m", "power": "W", "time": "s", "slip": "rad", "work": "J", "dwell": "s",
@@ -45,7 +47,9 @@ RING_DAMPING = 0.03
 CELL = ("channel", "coordinate", "memory", "memory_size", "low", "per_unit", "seen_low", "seen_high")
 LEAST_STIFFENING = -0.9
 
-_LEVEL, _STIFFNESS, _TORQUE, _COULOMB, _LOAD, _VISCOUS, _TURBULENT, _GAIN, _INERTIA, _LAG = (float(i + 1) for i in range(10))
+LINKED = ("linked_inertia", "angle")
+"""Channel and coordinate of a linked inertia."""
+_LEVEL, _STIFFNESS, _TORQUE, _COULOMB, _LOAD, _VISCOUS, _TURBULENT, _GAIN, _INERTIA, _LAG, _LINKED = (float(i + 1) for i in range(11))
 _RING = float(list(MEMORIES).index("ring"))
 
 
@@ -143,10 +147,14 @@ def level(cell, value):
 
 
 @law
-def torque(cell, value, alpha):
-    """f, or f alpha [N m]."""
+def torque(cell, f, size, value, theta, omega, alpha):
+    """f, or f alpha, and of a linked inertia f' omega^2 / 2 beside that [N m] (Lagrange's equation of 1/2 f(theta) omega^2)."""
     if cell[0] == _TORQUE:
         return value, value
+    if cell[0] == _LINKED:
+        position = (theta - cell[4]) * cell[5]
+        slope = size * cell[5] * (looked_up(f, position + 0.5) - looked_up(f, position - 0.5))
+        return value * alpha + 0.5 * slope * omega * omega, value
     return (value * alpha if cell[0] == _INERTIA else 0.0), value
 
 

@@ -55,9 +55,10 @@ def filtered(vehicle: Vehicle, recordings: Sequence[Recording], runs: Sequence[R
 
 
 def _seen_live(vehicle: Vehicle, recording: Recording, run: Run) -> Run:
-    """The run with the motion that a causal filter makes of the recorded angles, and rates where they were recorded."""
+    """The run with the motion that a causal filter makes of the recorded angles, and rates where they were recorded, in steps of whole
+    samples as the node takes them."""
     motion = np.array([_causal(vehicle, recording, side, run.time) for side in vehicle.sides])
-    return replace(as_recorded(run), theta=motion[:, 0], omega=motion[:, 1], alpha=motion[:, 2])
+    return replace(as_recorded(run), midway=False, theta=motion[:, 0], omega=motion[:, 1], alpha=motion[:, 2])
 
 
 def _causal(vehicle: Vehicle, recording: Recording, side: str, time: Array) -> Array:

@@ -80,6 +80,11 @@ class Cell:
         knots = np.concatenate([[low] * degree, np.linspace(low, high, self.pieces - degree + 1), [high] * degree])
         return np.asarray(BSpline.design_matrix(inside, knots, degree).toarray())
 
+    def slope(self, places: Array) -> Array:
+        """Its derivative (n, pieces), over the step that the law itself takes it by."""
+        step = (self.high - self.low) / (laws.KNOTS - 1)
+        return np.asarray((self.basis(places + 0.5 * step) - self.basis(places - 0.5 * step)) / step)
+
     def fields(self, f: Array, size: float = 1.0) -> dict[str, float | Array]:
         """The law with f (KNOTS,) as ``effects.laws.record`` has it."""
         axis = self.axis
@@ -92,6 +97,8 @@ class Traces:
 
     signals: dict[str, list[Array]]
     axes: dict[Axis, list[Array]]
+    swings: list[Array]
+    """Change of the torque per unit of the slope of a linked inertia."""
     remembering: Collection[str]
     """Channels whose laws may remember."""
 
@@ -119,7 +126,8 @@ class Traces:
         """Those that may depend on an axis."""
         if axis.memory == "ring":
             return laws.RINGS[:1]
-        return self.signals if axis.memory == "none" else self.remembering
+        channels = self.signals if axis.memory == "none" else self.remembering
+        return [channel for channel in channels if channel != laws.LINKED[0] or axis == Axis(laws.LINKED[1])]
 
     def pieces(self, cell: Cell) -> list[Array]:
         """What each piece of a free f is, by bag (sides, n, pieces); the same for every channel."""
@@ -127,8 +135,16 @@ class Traces:
 
     def columns(self, cell: Cell, pieces: Sequence[Array]) -> Array:
         """Change of the torque (n of all bags, pieces) by each piece of a free f."""
-        bags = zip(self.signals[cell.channel], pieces, strict=True)
-        return np.concatenate([np.einsum("sn,snp->np", np.asarray(signal), piece) for signal, piece in bags])
+        columns = _summed(self.signals[cell.channel], pieces)
+        if cell.channel == laws.LINKED[0]:
+            slopes = [np.array([cell.slope(place) for place in bag]) for bag in self.axes[cell.axis]]
+            columns = columns + _summed(self.swings, slopes)
+        return columns
+
+
+def _summed(signals: Sequence[Array], pieces: Sequence[Array]) -> Array:
+    bags = zip(signals, pieces, strict=True)
+    return np.concatenate([np.einsum("sn,snp->np", np.asarray(signal), piece) for signal, piece in bags])
 
 
 def axes_of(problem: Problem) -> list[Axis]:
@@ -172,10 +188,11 @@ def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Tr
 
     def sides(bag: int, values: dict[str, float | Array], carried: bool) -> Array:
         run, p = problem.runs[bag], record(bag, values)
-        motions = [(run.theta[i], run.omega[i], run.alpha[i]) for i in range(len(run.theta))]
+        time, *motion = run.steps
+        rubber, tracks = problem.model.rubber, zip(*motion, strict=True)
         if carried:
-            return np.array([run_side(p, problem.model.rubber, run.time, *motion)["parallel"] for motion in motions])
-        return np.array([torque_side(p, problem.model.rubber, run.time, *motion) for motion in motions])
+            return np.array([run_side(p, rubber, time, *track)["parallel"] for track in tracks])[:, :: 1 + run.midway]
+        return np.array([torque_side(p, rubber, time, *track) for track in tracks])[:, :: 1 + run.midway]
 
     bags: Sequence[int] = range(len(problem.runs))
     nothing = Cell("gain", Axis("none"), -1.0, 1.0, 1).fields(np.zeros(laws.KNOTS))
@@ -184,7 +201,7 @@ def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Tr
     def signal(channel: str) -> list[Array]:
         rate = max(float(np.abs(run.omega).max()) for run in problem.runs)
         acceleration = max(float(np.abs(run.alpha).max()) for run in problem.runs)
-        per = {"viscous_loss": rate, "turbulent_loss": rate**2, "inertia": acceleration}.get(channel)
+        per = {"viscous_loss": rate, "turbulent_loss": rate**2, "inertia": acceleration, "linked_inertia": acceleration}.get(channel)
         small = SMALL.get(channel, 1e-2 if per is None else SMALLEST * amplitude / per)
         values = Cell(channel, Axis("none"), -1.0, 1.0, 1).fields(np.full(laws.KNOTS, small))
         return [(sides(bag, values, False) - base[False][bag]) / small / gain for bag in bags]
@@ -194,8 +211,10 @@ def trace(problem: Problem, fitted: Fit, place: int, axes: Sequence[Axis]) -> Tr
         values = cell.fields(np.linspace(-WIDE, WIDE, laws.KNOTS), TRACER)
         return [(sides(bag, values, True) - base[True][bag]) / TRACER for bag in bags]
 
+    signals = dict(zip(laws.CHANNELS, in_threads(signal, list(laws.CHANNELS)), strict=True))
+    squares = (0.5 * run.omega**2 for run in problem.runs)
     return Traces(
-        dict(zip(laws.CHANNELS, in_threads(signal, list(laws.CHANNELS)), strict=True)),
-        dict(zip(axes, in_threads(along, axes), strict=True)),
+        signals, dict(zip(axes, in_threads(along, axes), strict=True)),
+        [torque * square for torque, square in zip(signals[laws.RINGS[0]], squares, strict=True)],
         REMEMBERING if any(candidate.effect.id in CATALOGUE for candidate, _ in fitted.effects) else tuple(laws.CHANNELS),
     )

@@ -24,6 +24,9 @@ from lugre_steering.recording import Array
 MOST_LAWS = 2
 SHORTLIST, CLOSE, SIMPLIFIED = 8, 0.75, 3
 """Cells refitted in the chain, share of the best gain that brings them there, and how many of them are put into closed forms."""
+FORETOLD = 0.5
+"""Share of the gain foretold by the screen below which a fit that began with its pieces begins with none once more: in the chain a law of
+the torque acts on itself."""
 SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
 TIED = 0.03
@@ -179,8 +182,12 @@ def _tried(
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
         traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
         best = screen.search(traces, one.cell)[0]
-        start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
-        tried.append(Tried(best, with_law(problem, weight, current, start)))
+        law, start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
+        fitted = with_law(problem, weight, current, (law, start))
+        if current.cost - fitted.cost < FORETOLD * best.gain:
+            small = {name: 0.0 if name.startswith("piece_") else value for name, value in start.items()}
+            fitted = min(fitted, with_law(problem, weight, current, (law, small)), key=lambda each: each.cost)
+        tried.append(Tried(best, fitted))
     tried.sort(key=lambda each: each.fit.cost)
     tried = [
         replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)

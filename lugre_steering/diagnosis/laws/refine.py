@@ -79,7 +79,7 @@ def typical(problem: Problem, channel: str) -> float:
     acceleration = max(float(np.abs(run.alpha).max()) for run in problem.runs)
     return {
         "conservative_torque": amplitude, "coulomb_friction": amplitude, "viscous_loss": amplitude / rate,
-        "turbulent_loss": amplitude / rate**2, "inertia": amplitude / acceleration, "lag": 0.05,
+        "turbulent_loss": amplitude / rate**2, "inertia": amplitude / acceleration, "linked_inertia": amplitude / acceleration, "lag": 0.05,
     }.get(channel, SHARE)  # fmt: skip
 
 

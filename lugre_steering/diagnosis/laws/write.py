@@ -32,6 +32,7 @@ CHANNEL_WORDS = {
     "load_friction": "friction in proportion to the torque", "viscous_loss": "a loss in proportion to the rate",
     "turbulent_loss": "a loss that grows with the square of the rate", "gain": "a factor on the torque (arms, sensors)",
     "inertia": "a torque in proportion to the acceleration", "lag": "a lag of the torque",
+    "linked_inertia": "an inertia that changes as the linkage turns",
 }  # fmt: skip
 COORDINATE_WORDS = {
     "angle": "angle", "abs_angle": "absolute angle", "rate": "steering rate", "abs_rate": "absolute steering rate",
@@ -174,7 +175,7 @@ def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]
 _SIGNALS = {
     "friction_level": "g", "presliding_stiffness": "sigma_0 z", "conservative_torque": "", "coulomb_friction": "sgn(omega)",
     "load_friction": "|M| sgn(omega)", "viscous_loss": "omega", "turbulent_loss": "omega |omega|", "gain": "M", "inertia": "alpha",
-    "lag": "dM/dt",
+    "lag": "dM/dt", "linked_inertia": "alpha + f' omega^2 / 2",
 }  # fmt: skip
 _PLACES = {
     "angle": "theta", "abs_angle": "|theta|", "rate": "omega", "abs_rate": "|omega|", "direction": "sgn(omega)", "torque": "M",
