@@ -11,19 +11,21 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.laws.cells import Cell, axes_of, nearer, trace
+from lugre_steering.diagnosis.laws.cells import Cell, Traces, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import FITTED, NUMBER_COSTS, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
 from lugre_steering.diagnosis.search.compare import PER_VALUE, SURE
+from lugre_steering.effects import laws
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Effects, Problem, is_rig
 from lugre_steering.recording import Array
 
 MOST_LAWS = 2
-SHORTLIST, CLOSE, SIMPLIFIED = 8, 0.75, 3
-"""Cells refitted in the chain, share of the best gain that brings them there, and how many of them are put into closed forms."""
+SHORTLIST, CLOSE, SIMPLIFIED, TRIED = 8, 0.75, 3, 16
+"""Cells refitted in the chain, share of the best gain that brings them there, how many of them are put into closed forms, and the most
+that are refitted if some do not settle."""
 FORETOLD = 0.5
 """Share of the gain foretold by the screen below which a fit that began with its pieces begins with none once more: in the chain a law of
 the torque acts on itself."""
@@ -31,6 +33,8 @@ SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
 TIED = 0.03
 """Share of the gain within which two laws cannot be told apart."""
+FED_BACK = ("torque", "abs_torque", "power", "opposing_torque")
+"""Coordinates that a law's own torque changes."""
 ONCE = ("time", "slip", "work", "air_temperature")
 """Coordinates that only go on: what lies along them happened once, so that of two laws that tie the other one is likelier to hold again."""
 
@@ -125,7 +129,9 @@ def find(
         steps.append(best.fit)
         current = best.fit
     progress("proving the law")
-    while steps and not _sure(there, steps[-1], len(before.effects)):  # a second one of many values may put both in doubt
+    while steps and not (  # a second one of many values may put both in doubt
+        _sure(there, steps[-1], len(before.effects)) and _carries_over(sought, weight, before, steps[-1])
+    ):
         steps, gains, foretold = steps[:-1], gains[:-1], foretold[:-1]
     if not steps:
         return None
@@ -147,6 +153,22 @@ def _sure(there: Finished, found: Fit, names: int) -> bool:
     taken = fit(problem, there.fitted, found.effects[:names], fitted.x, linearisations=6).cost - fitted.cost
     values = sum(len(candidate.free) for candidate, _ in found.effects[names:])
     return taken > (SURE + PER_VALUE * values) * doubt(problem, fitted, there.fitted)
+
+
+def _carries_over(problem: Problem, weight: Array, before: Fit, found: Fit) -> bool:
+    """Whether laws do no harm in recordings that they were not fitted to, of a joint or axis; nothing else differs between these there."""
+    if len(problem.runs) < 2 or not is_rig(problem.vehicle):
+        return True
+    return _left_elsewhere(problem, weight, found.effects, found.x) < _left_elsewhere(problem, weight, before.effects, found.x)
+
+
+def _left_elsewhere(problem: Problem, weight: Array, effects: Effects, x: Array) -> float:
+    """Energy that effects leave of each recording when they are fitted to the others."""
+    left = 0.0
+    for own in (problem.bag == bag for bag in range(len(problem.runs))):
+        rest = fit(problem, np.where(own, 0.0, weight), effects, x, linearisations=6)
+        left += float(np.sum(np.square((problem.measured - rest.prediction) * weight)[own]))
+    return left
 
 
 def _with_places(problem: Problem, before: Fit) -> Problem:
@@ -177,8 +199,10 @@ def _tried(
     progress: Callable[[str], None],
 ) -> list[Tried]:
     """The leading cells fitted in the chain, the best of them simplified; best first."""
-    tried = []
-    for one in shortlist(screened):
+    tried: list[Tried] = []
+    for one in leading(screened)[:TRIED]:
+        if len(tried) == SHORTLIST or (tried and one.gain < CLOSE * tried[0].screened.gain):
+            break
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
         traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
         best = screen.search(traces, one.cell)[0]
@@ -187,12 +211,30 @@ def _tried(
         if current.cost - fitted.cost < FORETOLD * best.gain:
             small = {name: 0.0 if name.startswith("piece_") else value for name, value in start.items()}
             fitted = min(fitted, with_law(problem, weight, current, (law, small)), key=lambda each: each.cost)
-        tried.append(Tried(best, fitted))
+        if _loop_gain(problem, traces, fitted) < 1.0:
+            tried.append(Tried(best, fitted))
+    if not tried:
+        return []
     tried.sort(key=lambda each: each.fit.cost)
     tried = [
         replace(each, fit=simplified(problem, weight, current, each.fit, place)) if i < SIMPLIFIED else each for i, each in enumerate(tried)
     ]
     return preferred(tried, current.cost)
+
+
+def _loop_gain(problem: Problem, traces: Traces, fitted: Fit) -> float:
+    """How much of a change of the torque the last law of a fit adds to it, where it depends on that: from one on the torque of today is
+    no longer settled by that of the step before."""
+    candidate, values = fitted.effects[-1]
+    law = law_of(candidate.effect)
+    cell = law.at(values)
+    if cell.axis.coordinate not in FED_BACK or cell.axis.memory == "relay":
+        return 0.0
+    steepest = float(np.abs(np.diff(law.shape(values))).max()) * (laws.KNOTS - 1) / (cell.high - cell.low)
+    signal = np.abs(np.concatenate(traces.signals[cell.channel], axis=1))
+    if cell.axis.coordinate == "power":
+        signal = signal * np.concatenate([np.abs(run.omega) for run in problem.runs], axis=1)
+    return steepest * float(signal.max())
 
 
 def preferred(tried: Sequence[Tried], before: float) -> list[Tried]:
@@ -205,14 +247,12 @@ def preferred(tried: Sequence[Tried], before: float) -> list[Tried]:
     return sorted(tried, key=lambda each: each.fit.cost + gain * price(each))
 
 
-def shortlist(screened: Sequence[Screened]) -> list[Screened]:
-    """The best cell of each channel, coordinate and kind of memory, as long as they come close to the best of all."""
+def leading(screened: Sequence[Screened]) -> list[Screened]:
+    """The best cell of each channel, coordinate and kind of memory, best first."""
     chosen: dict[tuple[str, str, str], Screened] = {}
     for one in screened:
-        if one.gain < CLOSE * screened[0].gain:
-            break
         chosen.setdefault((one.cell.channel, one.cell.axis.coordinate, one.cell.axis.memory), one)
-    return list(chosen.values())[:SHORTLIST]
+    return list(chosen.values())
 
 
 def cell_of(tried: Tried) -> Cell:

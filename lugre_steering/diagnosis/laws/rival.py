@@ -80,9 +80,10 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     """Whether every name is still needed with laws ``beside`` it, where names are compared; one that is not has a rival there, and no
     companion, or was named for the form of the friction law. What every joint has was not looked for, and may go where laws show that it
-    is nothing, but not where they only do the same."""
+    is nothing, but not where they only do the same: where they are not far truer."""
     problem, weight, fitted = beside_form(done, beside)
-    if _in_place_of_given(done, problem, weight, fitted):
+    truer = beside.beyond(done.held) < TRUER * excess(done.problem, done.freely, done.held)
+    if not truer and _in_place_of_given(done, problem, weight, fitted):
         return False
     least = SURE * doubt(problem, fitted, weight)
     for index in (i for i, item in enumerate(done.found.found) if not item.given):

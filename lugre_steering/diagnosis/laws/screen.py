@@ -114,11 +114,12 @@ class Screen:
         return Beside(self.nuisance, self.errors, self.rows.fold)
 
     def pieces(self, traces: Traces, cell: Cell) -> Array:
-        """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
+        """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration; without their mean, which what is named may be."""
         columns, m = self.rows.mean(traces.columns(cell, traces.pieces(cell))), self.nuisance.shape[1]
         both = np.column_stack([self.nuisance, columns])
         prior = block_diag((1.0 + 1e-9) * np.eye(m), smoothed(columns.T @ columns, SMOOTHING[0]))
-        return np.asarray(np.linalg.solve(both.T @ both + prior, both.T @ self.errors[:, 0])[m:])
+        pieces = np.linalg.solve(both.T @ both + prior, both.T @ self.errors[:, 0])[m:]
+        return np.asarray(pieces - pieces.mean() * (cell.pieces > HATS))
 
     def black_box(self, seed: int) -> float:
         """Energy that any smooth function of all coordinates together, or of the few of STATE, foretells of blocks left out, whatever it
