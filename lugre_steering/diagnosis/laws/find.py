@@ -117,8 +117,8 @@ def find(
             break
         tried = _tried(sought, weight, current, screen, screened, place, progress)
         known = _unseen(there, current)
-        holding = (each for each in tried if current.cost - each.fit.cost >= least and _unseen(there, each.fit) < known)
-        if (best := next(holding, None)) is None:
+        better = (each for each in tried if current.cost - each.fit.cost >= least and _unseen(there, each.fit) < known)
+        if (best := next((each for each in better if _carries_over(sought, weight, current, each.fit)), None)) is None:
             break
         gain = current.cost - best.fit.cost
         if not index:
@@ -129,9 +129,7 @@ def find(
         steps.append(best.fit)
         current = best.fit
     progress("proving the law")
-    while steps and not (  # a second one of many values may put both in doubt
-        _sure(there, steps[-1], len(before.effects)) and _carries_over(sought, weight, before, steps[-1])
-    ):
+    while steps and not _sure(there, steps[-1], len(before.effects)):  # a second one of many values may put both in doubt
         steps, gains, foretold = steps[:-1], gains[:-1], foretold[:-1]
     if not steps:
         return None
@@ -163,11 +161,15 @@ def _carries_over(problem: Problem, weight: Array, before: Fit, found: Fit) -> b
 
 
 def _left_elsewhere(problem: Problem, weight: Array, effects: Effects, x: Array) -> float:
-    """Energy that effects leave of each recording when they are fitted to the others."""
+    """Energy that effects leave of each recording when they are fitted to the others; its bristles begin as in x."""
     left = 0.0
-    for own in (problem.bag == bag for bag in range(len(problem.runs))):
-        rest = fit(problem, np.where(own, 0.0, weight), effects, x, linearisations=6)
-        left += float(np.sum(np.square((problem.measured - rest.prediction) * weight)[own]))
+    for bag in range(len(problem.runs)):
+        own = problem.bag == bag
+        rest, start = fit(problem, np.where(own, 0.0, weight), effects, x, linearisations=6), len(problem.calibrations) + bag
+        known = rest.x.copy()
+        known[start] = x[start]
+        error = problem.measured[own] - problem.predict(bag, known, rest.effects)
+        left += float(np.sum(np.square(error * weight[own])))
     return left
 
 
@@ -206,7 +208,8 @@ def _tried(
         progress(f"fitting a law: {one.cell.channel} over {one.cell.axis.coordinate}")
         traces = trace(problem, current, place, [one.cell.axis, *nearer(one.cell.axis)])
         best = screen.search(traces, one.cell)[0]
-        law, start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell))
+        centred = best.cell.pieces > 1 and screen.is_named(traces, best.cell)
+        law, start = free_law(problem, best.cell, place, screen.pieces(traces, best.cell), centred=centred)
         fitted = with_law(problem, weight, current, (law, start))
         if current.cost - fitted.cost < FORETOLD * best.gain:
             small = {name: 0.0 if name.startswith("piece_") else value for name, value in start.items()}
@@ -248,10 +251,11 @@ def preferred(tried: Sequence[Tried], before: float) -> list[Tried]:
 
 
 def leading(screened: Sequence[Screened]) -> list[Screened]:
-    """The best cell of each channel, coordinate and kind of memory, best first."""
-    chosen: dict[tuple[str, str, str], Screened] = {}
+    """The best cell of each channel, coordinate and kind of memory, free and periodic, best first."""
+    chosen: dict[tuple[str, str, str, bool], Screened] = {}
     for one in screened:
-        chosen.setdefault((one.cell.channel, one.cell.axis.coordinate, one.cell.axis.memory), one)
+        cell = one.cell
+        chosen.setdefault((cell.channel, cell.axis.coordinate, cell.axis.memory, cell.period > 0.0), one)
     return list(chosen.values())
 
 

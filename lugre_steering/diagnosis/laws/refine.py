@@ -83,15 +83,18 @@ def typical(problem: Problem, channel: str) -> float:
     }.get(channel, SHARE)  # fmt: skip
 
 
-def free_law(problem: Problem, cell: Cell, place: int, pieces: Array) -> tuple[Candidate, dict[str, float]]:
-    """The cell with f of free pieces, that start as given."""
+def free_law(
+    problem: Problem, cell: Cell, place: int, pieces: Array, *, centred: bool = False
+) -> tuple[Candidate, dict[str, float]]:
+    """The cell with f of free pieces, that start as given; ``centred``: without their mean, which something else has."""
     scale, names = typical(problem, cell.channel), [f"piece_{i}" for i in range(cell.pieces)]
     basis = cell.basis(np.linspace(cell.low, cell.high, laws.KNOTS))
     low = 0.0 if cell.channel == "lag" else -MOST * scale
     parameters = [Parameter(name, laws.CHANNELS[cell.channel], "of f", scale, low, MOST * scale, pull=PULL) for name in names]
 
     def shape(values: Mapping[str, float]) -> Array:
-        return np.asarray(basis @ np.array([values[name] for name in names]))
+        own = np.array([values[name] for name in names])
+        return np.asarray(basis @ (own - own.mean() * centred))
 
     effect = _law(cell, place, laws.TABLE, parameters, shape=shape)
     start = dict(zip(names, np.maximum(pieces, low).tolist(), strict=True))

@@ -158,12 +158,13 @@ def _values(effects: Effects) -> int:
 
 
 def _energies(done: Finished, models: Sequence[tuple[Problem, Array, Fit]]) -> list[float]:
-    """What models leave, with what their values cost, and what the baseline does: by the doubt of the one that leaves least in doubt."""
+    """What models leave, with what their values cost, and what the baseline does, with what every joint has: by the doubt of the one that
+    leaves least in doubt."""
     there, weight = done.compared, done.compared.fitted
     known = [settled(*model) for model in models]
     least = min(problem.doubt for problem, _ in known)
-    energies = []
-    for problem, result in (*known, (there.problem, there.found.baseline)):
+    bare, energies = there.of_every_joint, list[float]()
+    for problem, result in (*known, (there.problem, there.found.baseline if bare is there else bare.found.final)):
         problem, result = settled(problem, weight, fit(problem, weight, result.effects, result.x), least)
         energies.append(left(problem, result) + PER_VALUE * least * _values(result.effects))
     return energies

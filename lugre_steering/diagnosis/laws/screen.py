@@ -30,6 +30,8 @@ SMOOTHING = (1e-4, 1e-2, 1.0)
 """Weights of the second differences of a free f, as shares of its own energy."""
 FREE = 30.0
 """Length of the columns of what is named, in noise standard deviations: so long that priors of one leave it free."""
+ALIKE = 0.01
+"""Share of what a constant law does that names leave of it at most, if they do the same."""
 PERMUTED = 16
 STATE = ("angle", "rate", "torque")
 """Coordinates in which a black box sees fine waves, that it cannot among many."""
@@ -102,6 +104,7 @@ class Screen:
         residual = problem.measured - fitted.prediction
         slopes = fitted.jacobian / np.where(weight > 0.0, weight, 1.0)[:, None]
         named = FREE * normalised(self.rows.mean(slopes[:, problem.nuisances :]))
+        self.names = named.shape[1]
         far = problem.scales()
         far[problem.first_bend :] /= problem.prior_weights(True)[problem.first_bend :]  # no further than where names are compared
         self.nuisance = np.column_stack([self.rows.mean(slopes[:, : problem.nuisances] * far), named])
@@ -114,12 +117,18 @@ class Screen:
         return Beside(self.nuisance, self.errors, self.rows.fold)
 
     def pieces(self, traces: Traces, cell: Cell) -> Array:
-        """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration; without their mean, which what is named may be."""
+        """Pieces of f (pieces,) that all rows suggest, beside a linear recalibration."""
         columns, m = self.rows.mean(traces.columns(cell, traces.pieces(cell))), self.nuisance.shape[1]
         both = np.column_stack([self.nuisance, columns])
         prior = block_diag((1.0 + 1e-9) * np.eye(m), smoothed(columns.T @ columns, SMOOTHING[0]))
-        pieces = np.linalg.solve(both.T @ both + prior, both.T @ self.errors[:, 0])[m:]
-        return np.asarray(pieces - pieces.mean() * (cell.pieces > HATS))
+        return np.asarray(np.linalg.solve(both.T @ both + prior, both.T @ self.errors[:, 0])[m:])
+
+    def is_named(self, traces: Traces, cell: Cell) -> bool:
+        """Whether a constant f does what a name does already."""
+        named = self.nuisance[:, self.nuisance.shape[1] - self.names :]
+        constant = self.rows.mean(traces.columns(cell, traces.pieces(cell))).sum(axis=1)
+        rest = constant - named @ np.linalg.lstsq(named, constant, rcond=None)[0]
+        return bool(np.linalg.norm(rest) < ALIKE * np.linalg.norm(constant))
 
     def black_box(self, seed: int) -> float:
         """Energy that any smooth function of all coordinates together, or of the few of STATE, foretells of blocks left out, whatever it
