@@ -11,7 +11,7 @@ import numpy as np
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
-from lugre_steering.diagnosis.laws.cells import Cell, Traces, axes_of, nearer, trace
+from lugre_steering.diagnosis.laws.cells import Axis, Cell, Traces, axes_of, nearer, trace
 from lugre_steering.diagnosis.laws.refine import FITTED, NUMBER_COSTS, Law, free_law, law_of, simplified, with_law
 from lugre_steering.diagnosis.laws.screen import Screen, Screened, bar
 from lugre_steering.diagnosis.loudness import OWN_ERROR, excess
@@ -33,6 +33,8 @@ SECOND = 0.1
 """Share of the first law's gain that a second one must have."""
 TIED = 0.03
 """Share of the gain within which two laws cannot be told apart."""
+LOOP = 0.3
+"""Share of a change of the torque that a law may add to it in the mean: elsewhere it is more, and from one on nothing settles."""
 FED_BACK = ("torque", "abs_torque", "power", "opposing_torque")
 """Coordinates that a law's own torque changes."""
 ONCE = ("time", "slip", "work", "air_temperature")
@@ -214,7 +216,7 @@ def _tried(
         if current.cost - fitted.cost < FORETOLD * best.gain:
             small = {name: 0.0 if name.startswith("piece_") else value for name, value in start.items()}
             fitted = min(fitted, with_law(problem, weight, current, (law, small)), key=lambda each: each.cost)
-        if _loop_gain(problem, traces, fitted) < 1.0:
+        if _loop_gain(problem, traces, best.cell.axis, fitted) < LOOP:
             tried.append(Tried(best, fitted))
     if not tried:
         return []
@@ -225,19 +227,19 @@ def _tried(
     return preferred(tried, current.cost)
 
 
-def _loop_gain(problem: Problem, traces: Traces, fitted: Fit) -> float:
-    """How much of a change of the torque the last law of a fit adds to it, where it depends on that: from one on the torque of today is
-    no longer settled by that of the step before."""
+def _loop_gain(problem: Problem, traces: Traces, axis: Axis, fitted: Fit) -> float:
+    """How much of a change of the torque the last law of a fit, along an axis, adds to it in the mean, where it depends on that."""
     candidate, values = fitted.effects[-1]
-    law = law_of(candidate.effect)
-    cell = law.at(values)
-    if cell.axis.coordinate not in FED_BACK or cell.axis.memory == "relay":
+    cell = law_of(candidate.effect).cell
+    if axis.coordinate not in FED_BACK or axis.memory == "relay":
         return 0.0
-    steepest = float(np.abs(np.diff(law.shape(values))).max()) * (laws.KNOTS - 1) / (cell.high - cell.low)
-    signal = np.abs(np.concatenate(traces.signals[cell.channel], axis=1))
-    if cell.axis.coordinate == "power":
-        signal = signal * np.concatenate([np.abs(run.omega) for run in problem.runs], axis=1)
-    return steepest * float(signal.max())
+    f, knot = law_of(candidate.effect).shape(values), (cell.high - cell.low) / (laws.KNOTS - 1)
+    slopes = np.abs(np.gradient(f, knot))
+    gains = []
+    for run, signal, places in zip(problem.runs, traces.signals[cell.channel], traces.axes[axis], strict=True):
+        along = np.interp(places, np.linspace(cell.low, cell.high, laws.KNOTS), slopes)
+        gains.append(np.abs(signal) * along * (np.abs(run.omega) if axis.coordinate == "power" else 1.0))
+    return float(np.mean(np.concatenate(gains, axis=1)))
 
 
 def preferred(tried: Sequence[Tried], before: float) -> list[Tried]:
