@@ -32,6 +32,9 @@ from lugre_steering.data.dataset import Run, as_recorded, averaged, ideal_run, i
 from lugre_steering.data.quality import inspect
 from lugre_steering.diagnosis.conclude import experiment
 from lugre_steering.diagnosis.engine import diagnose, diagnose_recordings
+from lugre_steering.diagnosis.laws.cells import Axis, Cell
+from lugre_steering.diagnosis.laws.find import _carries_over
+from lugre_steering.diagnosis.laws.refine import closed_law, with_law
 from lugre_steering.diagnosis.report.page import write_report
 from lugre_steering.effects.registry import CATALOGUE, leaving_out
 from lugre_steering.errors import DataError, VehicleFileError
@@ -623,6 +626,55 @@ def test_the_spring_of_an_axis_is_told_with_its_mass_and_losses() -> None:
     assert found["slope_bias"]["torque"].value == pytest.approx(-0.05 * spring, rel=0.02)
     assert found["yaw_inertia"]["inertia"].value == pytest.approx(mass, rel=0.05)
     assert found["viscous_friction"]["sigma_2"].value == pytest.approx(loss, rel=0.05)
+
+
+def test_a_spring_that_stiffens_is_no_stop() -> None:
+    vehicle, spring, stiffening = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 3000.0, 2e5
+    recording = driven_axis(vehicle, 40.0, 250.0, np.zeros_like, load=lambda _, at: spring * at + stiffening * at**3)
+    found = {effect.id: effect.parameters for effect in diagnose_recordings([recording], vehicle).effects}
+    assert set(found) == {"yaw_inertia", "viscous_friction", "spring_load"}
+    assert found["spring_load"]["stiffness"].value == pytest.approx(spring, rel=0.02)
+    assert found["spring_load"]["cubic_stiffness"].value == pytest.approx(stiffening, rel=0.02)
+
+
+def test_friction_that_turns_within_a_sample_is_no_late_stamp() -> None:
+    """Without presliding at 60 Hz: half a sample of delay had been named, or noise had been taken to be ten times as much."""
+    vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+    recording = driven_axis(vehicle, 40.0, 250.0, lambda rate: 60.0 * np.sign(rate), step_s=1.0 / 60.0)
+    result = diagnose_recordings([recording], vehicle)
+    assert {effect.id for effect in result.effects} == {"yaw_inertia", "viscous_friction"}
+    assert result.laws == ()
+    assert result.augmented.heldout_rmse_Nm < 0.1 * 60.0
+
+
+def test_an_inertia_that_follows_a_crank_is_told_by_its_law() -> None:
+    """20 kg times the cosine of 20 rad for each metre, beside the constant 40 kg."""
+    vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+
+    def crank(time: Array, at: Array) -> Array:
+        rate = np.gradient(at, time)
+        return np.asarray(20.0 * np.cos(20.0 * at) * np.gradient(rate, time) - 0.5 * 20.0 * 20.0 * np.sin(20.0 * at) * rate**2)
+
+    result = diagnose_recordings([driven_axis(vehicle, 40.0, 250.0, np.zeros_like, load=crank)], vehicle)
+    (law,) = result.json["laws"]
+    assert (law["channel"], law["coordinate"]) == ("linked_inertia", "angle")
+    assert "an inertia that changes as the linkage moves" in law["title"]
+    inertia = next(effect for effect in result.effects if effect.id == "yaw_inertia").parameters["inertia"].value
+    whole = inertia + np.interp([0.0, 0.08, 0.12], law["f"]["at"], law["f"]["f"])
+    assert whole == pytest.approx(40.0 + 20.0 * np.cos([0.0, 1.6, 2.4]), rel=0.1)
+
+
+@pytest.mark.parametrize("elsewhere", [True, False])
+def test_a_law_must_do_no_harm_in_recordings_that_it_was_not_fitted_to(elsewhere: bool) -> None:
+    """A force of the position in one of two recordings is none of the machine."""
+    vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+    loads = [lambda _, at: 300.0 * at, lambda _, at: 300.0 * at * elsewhere]
+    runs = [prepare(driven_axis(vehicle, 0.0, 0.0, np.zeros_like, load=load), vehicle) for load in loads]
+    problem = Problem(vehicle, runs, more_laws=1)
+    weight = np.where(problem.valid, 1.0 / problem.sigma, 0.0)
+    law = closed_law(problem, Cell("conservative_torque", Axis("angle"), -0.2, 0.2), 0, "linear", {"value": 0.0}, {"slope": 300.0})
+    before = fit(problem, weight)
+    assert _carries_over(problem, weight, before, with_law(problem, weight, before, law)) == elsewhere
 
 
 def test_beside_a_load_that_is_picked_up_mass_and_losses_are_told() -> None:

@@ -46,6 +46,8 @@ def test_laws_are_written_and_read_again(tmp_path: Path) -> None:
         (LAW, {"memory": "lagg"}, ("laws[0].memory", "lag")),
         (LAW, {"memory_size": 0.0}, ("laws[0].memory_size", "above 0")),
         (LAW, {"memory": "ring"}, ("laws[0].memory", "ring", "conservative_torque over torque")),
+        (LAW, {"channel": "linked_inertia", "coordinate": "rate"}, ("laws[0].channel", "linked_inertia", "angle")),
+        (LAW, {"channel": "linked_inertia", "coordinate": "angle", "memory": "lag", "memory_size": 1.0}, ("laws[0].channel", "memory")),
         (LAW, {"memory": "ring", "coordinate": "torque", "memory_size": 1e-200}, ("laws[0].memory_size", "0.001 s")),
         (LAW, {"coordinate": "rubber_temperature"}, ("laws[0].coordinate", "rubber")),
         (LAW, {"range": [1.0, -1.0]}, ("laws[0].range", "ascending")),

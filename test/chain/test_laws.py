@@ -65,6 +65,15 @@ def test_a_torque_of_the_angle_stands_beside_the_contact() -> None:
     assert with_law(entry) - with_law() == pytest.approx(9e3 * np.maximum(THETA - 0.1, 0.0), abs=10.0)
 
 
+def test_an_inertia_that_follows_the_angle_has_the_torque_of_lagrange() -> None:
+    """Of 1/2 J(theta) omega^2 with J = 300 cos(2 theta / 0.3): J alpha + J' omega^2 / 2."""
+    values = {"value": 0.0, "sine": 0.0, "cosine": 300.0, "period": 0.3 * np.pi}
+    entry = LawEntry("linked_inertia", "angle", "sinusoid", (-0.5, 0.5), values)
+    turning = THETA / 0.15
+    expected = 300.0 * np.cos(turning) * ALPHA - 0.5 * 300.0 / 0.15 * np.sin(turning) * OMEGA**2
+    assert with_law(entry) - with_law() == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
+
+
 def test_a_table_is_linear_between_its_knots_and_held_beyond_its_range() -> None:
     entry = LawEntry("coulomb_friction", "angle", "table", (-0.1, 0.1), knots=(100.0, 300.0, 200.0))
     expected = np.interp(THETA, [-0.1, 0.0, 0.1], [100.0, 300.0, 200.0]) * smooth_sign(OMEGA)

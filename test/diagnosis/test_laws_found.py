@@ -23,8 +23,8 @@ from lugre_steering.diagnosis.conclude.stands import standing
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws import rival
-from lugre_steering.diagnosis.laws.cells import Axis, Cell, trace
-from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _sure, find, preferred
+from lugre_steering.diagnosis.laws.cells import Axis, Cell, axes_of, trace
+from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _loop_gain, _sure, find, leading, preferred
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
 from lugre_steering.diagnosis.laws.rival import (
     _in_place_of_given,
@@ -243,6 +243,55 @@ def test_a_second_law_is_sought_beside_the_first_as_it_was_fitted() -> None:
     first = with_law(problem, used, fitted(problem), free_law(problem, short, 0, np.zeros(short.pieces)))
     screen = Screen(problem, first, used, split(problem), white(problem).draws, trace(problem, first, 1, [Axis("angle")]), 1)
     assert screen.beside.left[0] < 1.2 * first.cost
+
+
+def screen_of(problem: Problem, before: Fit) -> Screen:
+    used = np.where(split(problem).fit, weight(problem), 0.0)
+    return Screen(problem, before, used, split(problem), white(problem).draws, trace(problem, before, 0, axes_of(problem)), 1)
+
+
+def test_an_inertia_that_follows_the_angle_is_found_by_what_it_does_at_constant_rate_too() -> None:
+    hidden = by_run(lambda run: np.sum(3e4 * np.sin(8.0 * run.theta) * run.alpha + 1.2e5 * np.cos(8.0 * run.theta) * run.omega**2, axis=0))
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start()) + hidden)
+    room = Problem(problem.vehicle, problem.runs, more_laws=2)
+    found = screen_of(room, fitted(room)).search()
+    assert (found[0].cell.channel, found[0].cell.axis) == ("linked_inertia", Axis("angle"))
+
+
+def test_the_constant_of_a_law_is_left_to_what_is_named() -> None:
+    room = Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1, beside_names=True)
+    before = fitted(room, effect("slope_bias", torque=100.0))
+    screen = screen_of(room, before)
+    torque, loss = (Cell(channel, Axis("angle"), -0.3, 0.3) for channel in ("conservative_torque", "viscous_loss"))
+    assert screen.is_named(screen.traces, torque)
+    assert not screen.is_named(screen.traces, loss)
+    pieces = np.linspace(900.0, 1100.0, torque.pieces)
+    (whole, values), (centred, _) = (free_law(room, torque, 0, pieces, centred=each) for each in (False, True))
+    assert whole.effect.fields(values)["law_1_f"].mean() == pytest.approx(1000.0, rel=0.01)
+    assert centred.effect.fields(values)["law_1_f"].mean() == pytest.approx(0.0, abs=10.0)
+
+
+def test_what_a_law_adds_of_a_change_of_the_torque_counts_how_often_it_does() -> None:
+    """Half of each newton metre; a tenth of the signal beyond a knee that hardly any sample passes."""
+    room = Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1)
+    before, axis = fitted(room), Axis("torque")
+    traces = trace(room, before, 0, [axis])
+    largest = max(float(np.abs(bag).max()) for bag in traces.axes[axis])
+    cell = Cell("conservative_torque", axis, -largest, largest)
+
+    def gain(form: str, fixed: dict[str, float], start: dict[str, float]) -> float:
+        law = closed_law(room, cell, 0, form, fixed, start)
+        return _loop_gain(room, traces, axis, replace(before, effects=(law,)))
+
+    assert gain("linear", {"value": 0.0}, {"slope": -0.5}) == pytest.approx(0.5, rel=0.01)
+    assert gain("hinge", {"value": 0.0, "below": 0.0}, {"above": 2.0, "at": 0.999 * largest}) < 0.1
+
+
+def test_free_and_periodic_functions_of_the_same_are_both_tried() -> None:
+    free = Cell("conservative_torque", Axis("angle"), -0.3, 0.3, 36)
+    cells = [free, replace(free, pieces=2, period=0.1), replace(free, pieces=2, period=0.2), replace(free, pieces=10)]
+    found = leading([Screened(cell, 10.0 - i, np.zeros(1)) for i, cell in enumerate(cells)])
+    assert [one.cell for one in found] == cells[:2]
 
 
 def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling() -> None:

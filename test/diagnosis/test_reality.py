@@ -20,7 +20,7 @@ from lugre_steering.data.dataset import prepare, with_hydraulics
 from lugre_steering.data.dead import inspect_dead
 from lugre_steering.data.pieces import LONGEST_S, PIECE_S, in_pieces
 from lugre_steering.data.quality import inspect
-from lugre_steering.data.sensing import own_noise, sensed
+from lugre_steering.data.sensing import louder, own_noise, sensed, white_noise
 from lugre_steering.data.stamps import evened
 from lugre_steering.diagnosis.conclude.left_out import left_out
 from lugre_steering.diagnosis.engine import diagnose_recordings
@@ -323,6 +323,18 @@ def test_the_noise_of_a_slow_channel_is_not_its_motion(noise: float) -> None:
     rate = np.repeat(rng.uniform(-0.5, 0.5, 120) * (rng.random(120) > 0.4), 10)
     seen = np.cumsum(rate) * 0.1 + 0.1 * np.sin(4.0 * time) + noise * rng.standard_normal(time.size)
     assert 0.7 * noise < own_noise(Signal(time, seen)) < 2.5 * noise
+
+
+def test_the_noise_of_a_torque_is_not_its_jumps_at_reversals() -> None:
+    """Friction of 1 N m without presliding at 100 Hz, reversed three times a second: a fifth of the differences hold a jump. Then half of
+    the time with three times the noise."""
+    rng, time = np.random.default_rng(4), np.arange(0.0, 60.0, 0.01)
+    signal = Signal(time, np.sign(np.sin(3.0 * np.pi * time)) + 0.02 * rng.standard_normal(time.size))
+    assert white_noise(signal) > 0.1
+    assert 0.018 < sensed(signal, jumps=True).noise < 0.028
+    assert (louder(signal, 0.02, by_level=True, jumps=True) == 1.0).all()
+    rough = replace(signal, value=signal.value + (time > 30.0) * 0.06 * rng.standard_normal(time.size))
+    assert louder(rough, 0.02, by_level=True, jumps=True)[time > 32.0].min() > 1.5
 
 
 def other_cylinders(changed: dict[str, dict[str, Any]]) -> Vehicle:
