@@ -25,7 +25,7 @@ from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws import rival
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, axes_of, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _loop_gain, _sure, find, leading, preferred
-from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, with_law
+from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, law_of, with_law
 from lugre_steering.diagnosis.laws.rival import (
     _in_place_of_given,
     beside_form,
@@ -36,7 +36,7 @@ from lugre_steering.diagnosis.laws.rival import (
     leaves_names,
 )
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
-from lugre_steering.diagnosis.laws.write import described, entries, sentence
+from lugre_steering.diagnosis.laws.write import described, entries, law_words, sentence
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.effects.law_entry import LawEntry
@@ -256,6 +256,13 @@ def test_an_inertia_that_follows_the_angle_is_found_by_what_it_does_at_constant_
     room = Problem(problem.vehicle, problem.runs, more_laws=2)
     found = screen_of(room, fitted(room)).search()
     assert (found[0].cell.channel, found[0].cell.axis) == ("linked_inertia", Axis("angle"))
+
+
+def test_a_law_of_the_direction_is_said_as_one() -> None:
+    cell = Cell("viscous_loss", Axis("direction"), -1.0, 1.0, 3)
+    law = closed_law(Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1), cell, 0, "linear", {"value": 0.0}, {"slope": 3e3})
+    said = law_words(law_of(law[0].effect), law[1], NOTHING.vehicle)
+    assert said == "a loss in proportion to the rate, another one in either direction"
 
 
 def test_the_constant_of_a_law_is_left_to_what_is_named() -> None:

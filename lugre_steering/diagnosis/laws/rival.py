@@ -16,6 +16,7 @@ from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, with_freedo
 from lugre_steering.diagnosis.laws.refine import law_of
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
+from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
@@ -30,8 +31,9 @@ OPPOSING = (
 """Channels whose torque is against the motion, as friction is, or a share of the whole, of which friction is most."""
 MOVED, BLURRED = 4.0, 2.0
 """Standard deviations by which laws beside what every joint has may move its values, if they make these as many times as large."""
-TRUER = 0.5
-"""Share of what another model leaves beyond noise that one must leave at most to be far truer."""
+TRUER, ALIKE = 0.5, 0.5
+"""Share of what another model leaves beyond noise that one must leave at most to be far truer; share of what laws do that names could,
+from which they are mostly the same."""
 
 
 def room_for_laws(done: Finished) -> bool:
@@ -80,10 +82,10 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     """Whether every name is still needed with laws ``beside`` it, where names are compared; one that is not has a rival there, and no
     companion, or was named for the form of the friction law. What every joint has was not looked for, and may go where laws show that it
-    is nothing, but not where they only do the same: where they are not far truer."""
+    is nothing, but not where they only do the same: where they are not far truer, or are mostly that."""
     problem, weight, fitted = beside_form(done, beside)
     truer = beside.beyond(done.held) < TRUER * excess(done.problem, done.freely, done.held)
-    if not truer and _in_place_of_given(done, problem, weight, fitted):
+    if not (truer and _apart(problem, weight, fitted, beside.names)) and _in_place_of_given(done, problem, weight, fitted):
         return False
     least = SURE * doubt(problem, fitted, weight)
     for index in (i for i, item in enumerate(done.found.found) if not item.given):
@@ -91,6 +93,15 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
         if fit(problem, weight, rest, fitted, linearisations=6).cost - fitted.cost < least:
             return False
     return True
+
+
+def _apart(problem: Problem, weight: Array, fitted: Fit, names: int) -> bool:
+    """Whether less than half of what laws do, after so many ``names``, could be done by other values of these."""
+    values = sum(len(candidate.free) for candidate, _ in fitted.effects[:names])
+    columns = fitted.jacobian[:, problem.nuisances : problem.nuisances + values]
+    torque = np.sum([contribution(problem, fitted, i) for i in range(names, len(fitted.effects))], axis=0) * weight
+    alike = columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
+    return bool(alike @ alike < ALIKE * (torque @ torque))
 
 
 def _in_place_of_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.finished import amplitude_of
-from lugre_steering.diagnosis.laws.cells import Traces, trace
+from lugre_steering.diagnosis.laws.cells import Axis, Traces, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law, law_of
 from lugre_steering.diagnosis.search.locate import contribution
@@ -103,6 +103,8 @@ def _shape_words(law: Law, values: Mapping[str, float], along: str, vehicle: Veh
     def at(key: str) -> str:
         return shown(name, known[key], vehicle)
 
+    if law.cell.axis == Axis("direction"):
+        return "another one in either direction"
     if law.form == "hinge" and known["below"] == 0.0 and known["value"] == 0.0:
         return f"only beyond {at('at')} of the {along}, growing with it"
     if law.form == "hinge" and known["above"] == 0.0 and known["value"] == 0.0:
