@@ -24,6 +24,8 @@ from lugre_steering.recording import Array
 NULL_DRAWS = 16
 MUCH_LESS = 2.0 / 3.0
 """Share of what is left, at most, with which another friction law takes the place of that of the vehicle file."""
+RISE = 1.0
+"""Stribeck exponent with which a friction rises from standstill in proportion to the rate, as that of a lubricated contact does."""
 SAMPLES, FASTEST_HZ, ALONE = 3000, 200.0, 10
 """Samples on which names are compared, unless the recording is slow; the rate beyond which there is nothing to be seen; and how many
 times as many are as quick without freedoms."""
@@ -38,7 +40,10 @@ def investigate(problem: Problem, seed: int, progress: Callable[[str], None] = l
     if not is_rig(problem.vehicle) or problem.calibrations == SMOOTH or MUCH_LESS * _left(done) < done.noise.floor**2:
         return done
     progress("searching beside a friction that rises smoothly from standstill")
-    smooth = _investigated(Problem(problem.vehicle, problem.runs, smooth_calibrations(problem.vehicle, problem.runs)), seed, progress)
+    contact = problem.vehicle.contact
+    assert contact is not None
+    vehicle = problem.vehicle.replace(contact=replace(contact, stribeck_exponent=RISE))
+    smooth = _investigated(Problem(vehicle, problem.runs, smooth_calibrations(vehicle, problem.runs)), seed, progress)
     return smooth if _left(smooth) < MUCH_LESS * _left(done) else done
 
 

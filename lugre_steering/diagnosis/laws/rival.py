@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,16 +13,17 @@ from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis
 from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, with_freedoms
-from lugre_steering.diagnosis.laws.refine import law_of
+from lugre_steering.diagnosis.laws.refine import given_law, law_of
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
-from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.surely import deviations
+from lugre_steering.effects.laws import KNOTS
 from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.sheet import at_bounds
+from lugre_steering.fitting.trial import SURE_SIGMA
 from lugre_steering.recording import Array
 
 OPPOSING = (
@@ -85,7 +86,8 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     is nothing, but not where they only do the same: where they are not far truer, or are mostly that."""
     problem, weight, fitted = beside_form(done, beside)
     truer = beside.beyond(done.held) < TRUER * excess(done.problem, done.freely, done.held)
-    if not (truer and _apart(problem, weight, fitted, beside.names)) and _in_place_of_given(done, problem, weight, fitted):
+    other = truer and _apart(problem, weight, fitted, beside.names) and _keeps_given(done, problem, weight, fitted)
+    if not other and _in_place_of_given(done, problem, weight, fitted):
         return False
     least = SURE * doubt(problem, fitted, weight)
     for index in (i for i, item in enumerate(done.found.found) if not item.given):
@@ -96,10 +98,14 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
 
 
 def _apart(problem: Problem, weight: Array, fitted: Fit, names: int) -> bool:
-    """Whether less than half of what laws do, after so many ``names``, could be done by other values of these."""
+    """Whether other values of so many ``names`` could do less than half of what the laws after them do, but for the mean of each."""
     values = sum(len(candidate.free) for candidate, _ in fitted.effects[:names])
     columns = fitted.jacobian[:, problem.nuisances : problem.nuisances + values]
-    torque = np.sum([contribution(problem, fitted, i) for i in range(names, len(fitted.effects))], axis=0) * weight
+    means = []
+    for place, (candidate, own) in enumerate(fitted.effects[names:], len(problem.vehicle.laws)):
+        law = law_of(candidate.effect)
+        means.append(given_law(law.at(own), place, np.full(KNOTS, law.shape(own).mean())))
+    torque = (fitted.prediction - problem.predict_all(fitted.x, [*fitted.effects[:names], *means])) * weight
     alike = columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
     return bool(alike @ alike < ALIKE * (torque @ torque))
 
@@ -107,17 +113,33 @@ def _apart(problem: Problem, weight: Array, fitted: Fit, names: int) -> bool:
 def _in_place_of_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:
     """Whether a value of what every joint has is another in a fit ``beside`` laws than it may be without them, and is known far less well
     there: the laws do the same."""
+    return any(
+        abs(now - was) > MOVED * before and after > BLURRED * before
+        for was, before, now, after in _values_of_given(done, problem, weight, beside)
+    )
+
+
+def _keeps_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:
+    """Whether every value of what every joint has that was sure to be something is so beside laws."""
+    return all(
+        abs(now) > SURE_SIGMA * after or abs(was) < SURE_SIGMA * before
+        for was, before, now, after in _values_of_given(done, problem, weight, beside)
+    )
+
+
+def _values_of_given(
+    done: Finished, problem: Problem, weight: Array, beside: Fit
+) -> Iterator[tuple[float, float, float, float]]:
+    """Each value of what every joint has with its standard deviation, without and ``beside`` laws."""
     there, final = done.compared, done.compared.found.final
     before = deviations(there.problem, there.fitted, there.roles, final)[there.problem.nuisances :]
     after = deviations(problem, weight, there.roles, beside)[problem.nuisances :]
     position = 0
     for item, (candidate, was), (_, now) in zip(done.found.found, final.effects, beside.effects, strict=False):
         for place, name in enumerate(candidate.free, position):
-            moved = abs(now[name] - was[name]) > MOVED * before[place]
-            if item.given and moved and after[place] > BLURRED * before[place]:
-                return True
+            if item.given:
+                yield was[name], float(before[place]), now[name], float(after[place])
         position += len(candidate.free)
-    return False
 
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
