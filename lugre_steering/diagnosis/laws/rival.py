@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,6 @@ from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.sensors import fitted_with_sensors
 from lugre_steering.fitting.sheet import at_bounds
-from lugre_steering.fitting.trial import SURE_SIGMA
 from lugre_steering.recording import Array
 
 OPPOSING = (
@@ -86,8 +85,7 @@ def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     is nothing, but not where they only do the same: where they are not far truer, or are mostly that."""
     problem, weight, fitted = beside_form(done, beside)
     truer = beside.beyond(done.held) < TRUER * excess(done.problem, done.freely, done.held)
-    other = truer and _apart(problem, weight, fitted, beside.names) and _keeps_given(done, problem, weight, fitted)
-    if not other and _in_place_of_given(done, problem, weight, fitted):
+    if not (truer and _apart(problem, weight, fitted, beside.names)) and _in_place_of_given(done, problem, weight, fitted):
         return False
     least = SURE * doubt(problem, fitted, weight)
     for index in (i for i, item in enumerate(done.found.found) if not item.given):
@@ -113,33 +111,17 @@ def _apart(problem: Problem, weight: Array, fitted: Fit, names: int) -> bool:
 def _in_place_of_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:
     """Whether a value of what every joint has is another in a fit ``beside`` laws than it may be without them, and is known far less well
     there: the laws do the same."""
-    return any(
-        abs(now - was) > MOVED * before and after > BLURRED * before
-        for was, before, now, after in _values_of_given(done, problem, weight, beside)
-    )
-
-
-def _keeps_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:
-    """Whether every value of what every joint has that was sure to be something is so beside laws."""
-    return all(
-        abs(now) > SURE_SIGMA * after or abs(was) < SURE_SIGMA * before
-        for was, before, now, after in _values_of_given(done, problem, weight, beside)
-    )
-
-
-def _values_of_given(
-    done: Finished, problem: Problem, weight: Array, beside: Fit
-) -> Iterator[tuple[float, float, float, float]]:
-    """Each value of what every joint has with its standard deviation, without and ``beside`` laws."""
     there, final = done.compared, done.compared.found.final
     before = deviations(there.problem, there.fitted, there.roles, final)[there.problem.nuisances :]
     after = deviations(problem, weight, there.roles, beside)[problem.nuisances :]
     position = 0
     for item, (candidate, was), (_, now) in zip(done.found.found, final.effects, beside.effects, strict=False):
         for place, name in enumerate(candidate.free, position):
-            if item.given:
-                yield was[name], float(before[place]), now[name], float(after[place])
+            moved = abs(now[name] - was[name]) > MOVED * before[place]
+            if item.given and moved and after[place] > BLURRED * before[place]:
+                return True
         position += len(candidate.free)
+    return False
 
 
 def keeps_names(done: Finished, beside: FoundLaws, alone: FoundLaws) -> bool:
