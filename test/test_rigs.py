@@ -638,7 +638,7 @@ def test_a_spring_that_stiffens_is_no_stop() -> None:
 
 
 def test_friction_that_turns_within_a_sample_is_no_late_stamp() -> None:
-    """Without presliding at 60 Hz: half a sample of delay had been named, or noise had been taken to be ten times as much."""
+    """Without presliding at 60 Hz: half a sample of delay had been named."""
     vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
     recording = driven_axis(vehicle, 40.0, 250.0, lambda rate: 60.0 * np.sign(rate), step_s=1.0 / 60.0)
     result = diagnose_recordings([recording], vehicle)

@@ -279,7 +279,7 @@ def test_the_constant_of_a_law_is_left_to_what_is_named() -> None:
 
 
 def test_what_a_law_adds_of_a_change_of_the_torque_counts_how_often_it_does() -> None:
-    """Half of each newton metre; a tenth of the signal beyond a knee that hardly any sample passes."""
+    """Half of each newton metre everywhere; twice as much as the change beyond a knee that hardly any sample passes."""
     room = Problem(NOTHING.vehicle, NOTHING.runs, more_laws=1)
     before, axis = fitted(room), Axis("torque")
     traces = trace(room, before, 0, [axis])

@@ -156,7 +156,7 @@ def _sure(there: Finished, found: Fit, names: int) -> bool:
 
 
 def _carries_over(problem: Problem, weight: Array, before: Fit, found: Fit) -> bool:
-    """Whether laws do no harm in recordings that they were not fitted to, of a joint or axis; nothing else differs between these there."""
+    """Whether laws of a joint or axis leave less of recordings that they were not fitted to; rubber is of another temperature in each."""
     if len(problem.runs) < 2 or not is_rig(problem.vehicle):
         return True
     return _left_elsewhere(problem, weight, found.effects, found.x) < _left_elsewhere(problem, weight, before.effects, found.x)

@@ -31,7 +31,7 @@ OPPOSING = (
 """Channels whose torque is against the motion, as friction is, or a share of the whole, of which friction is most."""
 MOVED, BLURRED = 4.0, 2.0
 """Standard deviations by which laws beside what every joint has may move its values, if they make these as many times as large."""
-TRUER, ALIKE = 0.5, 0.5
+TRUER, MOSTLY = 0.5, 0.5
 """Share of what another model leaves beyond noise that one must leave at most to be far truer; share of what laws do that names could,
 from which they are mostly the same."""
 
@@ -82,7 +82,7 @@ def in_place(done: Finished, alone: FoundLaws, beside: FoundLaws | None) -> bool
 def leaves_names(done: Finished, beside: FoundLaws) -> bool:
     """Whether every name is still needed with laws ``beside`` it, where names are compared; one that is not has a rival there, and no
     companion, or was named for the form of the friction law. What every joint has was not looked for, and may go where laws show that it
-    is nothing, but not where they only do the same: where they are not far truer, or are mostly that."""
+    is nothing, but not where they only do the same: unless they are far truer, and mostly something else."""
     problem, weight, fitted = beside_form(done, beside)
     truer = beside.beyond(done.held) < TRUER * excess(done.problem, done.freely, done.held)
     if not (truer and _apart(problem, weight, fitted, beside.names)) and _in_place_of_given(done, problem, weight, fitted):
@@ -105,7 +105,7 @@ def _apart(problem: Problem, weight: Array, fitted: Fit, names: int) -> bool:
         means.append(given_law(law.at(own), place, np.full(KNOTS, law.shape(own).mean())))
     torque = (fitted.prediction - problem.predict_all(fitted.x, [*fitted.effects[:names], *means])) * weight
     alike = columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
-    return bool(alike @ alike < ALIKE * (torque @ torque))
+    return bool(alike @ alike < MOSTLY * (torque @ torque))
 
 
 def _in_place_of_given(done: Finished, problem: Problem, weight: Array, beside: Fit) -> bool:

@@ -104,7 +104,7 @@ class Screen:
         residual = problem.measured - fitted.prediction
         slopes = fitted.jacobian / np.where(weight > 0.0, weight, 1.0)[:, None]
         named = FREE * normalised(self.rows.mean(slopes[:, problem.nuisances :]))
-        self.names = named.shape[1]
+        self.named_columns = named.shape[1]
         far = problem.scales()
         far[problem.first_bend :] /= problem.prior_weights(True)[problem.first_bend :]  # no further than where names are compared
         self.nuisance = np.column_stack([self.rows.mean(slopes[:, : problem.nuisances] * far), named])
@@ -125,7 +125,7 @@ class Screen:
 
     def is_named(self, traces: Traces, cell: Cell) -> bool:
         """Whether a constant f does what a name does already."""
-        named = self.nuisance[:, self.nuisance.shape[1] - self.names :]
+        named = self.nuisance[:, self.nuisance.shape[1] - self.named_columns :]
         constant = self.rows.mean(traces.columns(cell, traces.pieces(cell))).sum(axis=1)
         rest = constant - named @ np.linalg.lstsq(named, constant, rcond=None)[0]
         return bool(np.linalg.norm(rest) < ALIKE * np.linalg.norm(constant))
