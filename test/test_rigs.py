@@ -26,7 +26,7 @@ from lugre_steering.ackermann import other_track
 from lugre_steering.bag import read_recording
 from lugre_steering.bench import joints
 from lugre_steering.calibration.calibrate import calibrate_recordings
-from lugre_steering.chain.step import torque_side
+from lugre_steering.chain.step import torque_in_phases, torque_side
 from lugre_steering.cli import app
 from lugre_steering.data.dataset import Run, as_recorded, averaged, ideal_run, in_parallel, prepare
 from lugre_steering.data.quality import inspect
@@ -39,10 +39,11 @@ from lugre_steering.diagnosis.report.page import write_report
 from lugre_steering.effects.registry import CATALOGUE, leaving_out
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.estimator import Estimator
+from lugre_steering.fitting import problem as problem_module
 from lugre_steering.fitting.fingerprint import candidates
 from lugre_steering.fitting.fit import fit
 from lugre_steering.fitting.parallel import as_joint
-from lugre_steering.fitting.problem import Problem
+from lugre_steering.fitting.problem import Candidate, Problem
 from lugre_steering.importing import import_table
 from lugre_steering.recording import Array, Recording, Signal
 from lugre_steering.simulate.manoeuvres import BUILT_IN, Hold, Manoeuvre, Sweep, ackermann, motion_of
@@ -459,6 +460,25 @@ def test_friction_midway_between_samples_is_that_of_far_finer_steps() -> None:
     fine = Problem(joint, [run_at(1)]).predict_all(np.zeros(5))[::80]
     plain, midway = (Problem(joint, [dataclasses.replace(run_at(80), midway=each)]).predict_all(np.zeros(5)) for each in (False, True))
     assert np.std(midway - fine) < 0.2 * np.std(plain - fine)
+
+
+def test_what_only_adds_to_the_torque_needs_no_other_run_of_the_chain(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs: list[int] = []
+    monkeypatch.setattr(problem_module, "torque_in_phases", lambda *given: runs.append(1) or torque_in_phases(*given))
+    joint = joints.drawn(103)
+    problem = Problem(joint.sheet, [prepare(joint.recording, joint.sheet)])
+    always = [Candidate(CATALOGUE["yaw_inertia"]), Candidate(CATALOGUE["viscous_friction"])]
+    x = problem.start()
+
+    def predicted(inertia: float, sigma_2: float, patch: float = 0.0) -> Array:
+        others = [(Candidate(CATALOGUE["surface_patch"]), {"change": patch})]
+        return problem.predict_all(x, [*zip(always, ({"inertia": inertia}, {"sigma_2": sigma_2}), strict=True), *others])
+
+    plain, *more = predicted(0.0, 0.0), predicted(2.0, 0.0), predicted(0.0, 3.0), predicted(2.0, 3.0)
+    assert len(runs) == 1
+    assert more[2] == pytest.approx(more[0] + more[1] - plain, rel=1e-9, abs=1e-9)
+    predicted(2.0, 3.0, patch=0.5)
+    assert len(runs) == 2
 
 
 def test_an_average_takes_nothing_from_an_inertia_that_it_takes_from_the_torque() -> None:

@@ -18,7 +18,7 @@ from lugre_steering.chain.compiled import exp, law
 def stribeck(omega: float, static: float, coulomb: float, speed: float, exponent: float) -> float:
     """Steady sliding torque g = Mc + (Ms - Mc) exp(-|omega / omega_St|**delta) [N m] (op. cit. 1995)."""
     ratio = abs(omega) / speed
-    power = ratio * ratio if exponent == 2.0 else ratio**exponent
+    power = ratio * ratio if exponent == 2.0 else ratio if exponent == 1.0 else ratio**exponent
     return coulomb + (static - coulomb) * exp(-power)
 
 

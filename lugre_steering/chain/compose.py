@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from lugre_steering.chain import baseline, bristle, heat
 from lugre_steering.chain.compiled import law
 from lugre_steering.chain.layout import BASELINE_FIELDS, STATE_FIELDS
-from lugre_steering.chain.template import SENSED, STEP, WIND_UP
+from lugre_steering.chain.template import BESIDE, SENSED, STEP, WIND_UP
 from lugre_steering.errors import EffectError
 
 LawFunction = Callable[..., Any]
@@ -108,6 +108,9 @@ HOOKS = {
 _BITS = {name: 1 << i for i, name in enumerate(HOOKS)}
 _STEPWISE = tuple(name for name in HOOKS if name not in ("angle", "wind_up", "arm", "line", "delay", "lag"))
 SENSOR_HOOKS = ("angle", "arm", "line", "delay", "lag")
+ADDS, ADDS_WARMTH, FEELS = 1, 2, 3
+_ADDED, _OTHERS_ADD = ("torque", "viscous"), ("viscous", "load", "last_load", "last_torque")
+"""Hooks that add to the torque, and quantities of the step in which others find it."""
 
 
 @dataclass(frozen=True)
@@ -121,11 +124,15 @@ class Composition:
     lines: np.dtype[np.void]
     bits: NDArray[np.int64]
     """The hooks of the step where the effect acts whose amplitude a number of the parameter record is (0: none), one bit each."""
+    adds: NDArray[np.int64]
+    """Whether a number of the parameter record belongs to an effect that only adds to the torque of the contact (ADDS, or ADDS_WARMTH where
+    it heats the rubber as well), is the amplitude of one that FEELS what others add, or neither (0)."""
     starts: Mapping[str, float | str]
     """Memory that does not begin at zero: its field of the state, and a number or the baseline parameter that it begins with."""
     step: LawFunction
     arm_factor: LawFunction
     line_error: LawFunction
+    beside: LawFunction
 
 
 _made: dict[str, Composition] = {}
@@ -183,10 +190,12 @@ def _compose(effects: Sequence[Physics]) -> Composition:
         np.dtype([*((field, np.float64) for field in STATE_FIELDS), *_memory_fields(effects)]),
         np.dtype([(field, np.float64) for field in (*_parameter_fields(effects, per_line=True), name)]),
         _bits(effects, parameters),
+        _adds(effects, parameters),
         _starts(effects),
         scope["step"],
         scope["arm_factor"],
         scope["line_error"],
+        scope["beside"],
     )
     return _made[name]
 
@@ -275,14 +284,17 @@ def _slot(effects: Sequence[Physics], hook: str) -> Iterator[str]:
     """Lines for the slot of a hook in the step."""
     acting = _acting(effects, hook)
     if acting and hook != "angle" and hook not in _STEPWISE:
-        for effect in acting:
-            yield f"if {_guard(effect)}:"
-            yield from (f"    {line}" for line in _call(effect, hook))
+        yield from _guarded(acting, hook)
     elif acting:
         yield f"if effects & {_BITS[hook]}:"
-        for effect in acting:
-            yield f"    if {_guard(effect)}:"
-            yield from (f"        {line}" for line in _call(effect, hook))
+        yield from (f"    {line}" for line in _guarded(acting, hook))
+
+
+def _guarded(acting: Sequence[Physics], hook: str) -> Iterator[str]:
+    """Lines that put what each effect does at a hook where it acts."""
+    for effect in acting:
+        yield f"if {_guard(effect)}:"
+        yield from (f"    {line}" for line in _call(effect, hook))
 
 
 def _instead(effects: Sequence[Physics], hook: str) -> list[str]:
@@ -307,9 +319,10 @@ def _text(effects: Sequence[Physics]) -> str:
     slots = {hook: list(_slot(effects, hook)) for hook in HOOKS if hook not in ("wind_up", "contact", "delay", "lag")}
     slots |= {hook: _instead(effects, hook) for hook in ("wind_up", "contact")}
     slots |= {"memory": memory, "wind_up_laws": [*winding.splitlines(), "", ""] if winding else []}
-    text = _filled(STEP, slots) + "\n\n" + _filled(SENSED, slots)
+    slots |= {"beside": [line for hook in _ADDED for line in _guarded([e for e in _acting(effects, hook) if _only_adds(e)], hook)]}
+    text = "\n\n".join(_filled(part, slots) for part in (STEP, SENSED, BESIDE))
     header = '"""One step of one track, composed of: ' + (", ".join(effect.id for effect in effects) or "the baseline alone") + '."""\n\n'
-    return header + re.sub(r"^def (?!step\(|arm_factor\(|line_error\()", "@law\ndef ", text, flags=re.MULTILINE)
+    return header + re.sub(r"^def (?!step\(|arm_factor\(|line_error\(|beside\()", "@law\ndef ", text, flags=re.MULTILINE)
 
 
 def _bits(effects: Sequence[Physics], parameters: np.dtype[np.void]) -> NDArray[np.int64]:
@@ -320,6 +333,35 @@ def _bits(effects: Sequence[Physics], parameters: np.dtype[np.void]) -> NDArray[
         for name in () if effect.per_line else effect.amplitudes:
             bits[parameters.fields[f"{effect.id}_{name}"][1] // 8] |= sum(_BITS[hook] for hook in effect.hooks)
     return bits
+
+
+def _adds(effects: Sequence[Physics], parameters: np.dtype[np.void]) -> NDArray[np.int64]:
+    """See ``Composition.adds``: (numbers of the parameter record,)."""
+    assert parameters.fields is not None
+    adds = np.zeros(parameters.itemsize // 8, np.int64)
+    for effect in effects:
+        if _only_adds(effect):
+            names, role = [*(p.name for p in effect.parameters), *effect.tables], ADDS_WARMTH if "viscous" in effect.hooks else ADDS
+        else:
+            names, role = [*effect.amplitudes] if not effect.per_line and _feels(effect) else [], FEELS
+        for name in names:
+            kind, offset = parameters.fields[f"{effect.id}_{name}"][:2]
+            adds[offset // 8 : (offset + kind.itemsize) // 8] = role
+    return adds
+
+
+def _only_adds(effect: Physics) -> bool:
+    """Whether an effect but adds to the torque what follows from angle, rate and acceleration."""
+    own = {*(p.name for p in effect.parameters), *effect.tables, "theta", "omega", "alpha", *BASELINE_FIELDS}
+    laws = effect.hooks
+    return bool(laws) and laws.keys() <= {*_ADDED} and not effect.memory and all(own.issuperset(_arguments(law)) for law in laws.values())
+
+
+def _feels(effect: Physics) -> bool:
+    """Whether an effect does otherwise where another adds to the torque, or changes what that reads."""
+    own = {p.name for p in effect.parameters}
+    reads = {name for function in effect.hooks.values() for name in _arguments(function)} - own
+    return not effect.hooks.keys().isdisjoint(("angle", "wind_up", "loss", "limit")) or not reads.isdisjoint(_OTHERS_ADD)
 
 
 def _starts(effects: Sequence[Physics]) -> dict[str, float | str]:

@@ -9,6 +9,7 @@ the step of that composition.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,9 @@ from numba import njit
 from numba.extending import overload
 
 from lugre_steering.chain.compiled import IN_PLACE, LAW_OPTIONS
-from lugre_steering.chain.compose import Composition, compose, composition_of, name_of
+from lugre_steering.chain.compose import ADDS, ADDS_WARMTH, FEELS, Composition, compose, composition_of, name_of
 from lugre_steering.chain.layout import BASELINE_FIELDS, OUTPUT
-from lugre_steering.recording import Array
+from lugre_steering.recording import Array, IntArray
 
 Records = np.ndarray[Any, np.dtype[np.void]]
 
@@ -51,6 +52,23 @@ def _arm_factor(p, theta):  # noqa: ARG001
 @overload(line_error, jit_options=LAW_OPTIONS)
 def _line_error(q, elapsed):  # noqa: ARG001
     return composition_of(name_of(list(q.fields))).line_error
+
+
+def beside(p, theta, omega, alpha):
+    """Torque [N m] of those effects that only add to that of the contact, for compiled code: see ``template.BESIDE``."""
+    return composition_of(name_of(p.dtype.names)).beside(p, theta, omega, alpha)
+
+
+@overload(beside, jit_options=LAW_OPTIONS)
+def _beside(p, theta, omega, alpha):  # noqa: ARG001
+    return composition_of(name_of(list(p.fields))).beside
+
+
+@njit(nogil=True, cache=True)
+def _added(p, theta, omega, alpha, torque):
+    for track in range(theta.shape[0]):
+        for i in range(theta.shape[1]):
+            torque[i] += beside(p[0], theta[track, i], omega[track, i], alpha[track, i])
 
 
 @njit(nogil=True, cache=True)
@@ -143,6 +161,40 @@ def _read_otherwise(p: Records, states: Records, rubber: Array, scratch: Records
     turned = read["theta"] - states["theta"]
     states["theta"] += turned
     states["contact_angle"] += turned
+
+
+def apart(phases: Sequence[Array], kind: np.dtype[np.void], warms: bool) -> Array | None:
+    """Numbers of those effects that only add to the torque of a contact and do so alike in all ``phases``, which lose them; None if there
+    are none, or others feel what they add. ``phases``: the numbers of parameter records of a ``kind``; ``warms``: whether rubber is heated
+    by what the contact does.
+    """
+    assert kind.names is not None
+    adding, others, feeling = _roles(name_of(kind.names), warms)
+    shares = phases[0][adding]
+    if not shares.any() or any(numbers[feeling].any() or (numbers[adding] != shares).any() for numbers in phases):
+        return None
+    beside = phases[0].copy()
+    beside[others] = 0.0
+    for numbers in phases:
+        numbers[adding] = 0.0
+    return beside
+
+
+@lru_cache(maxsize=64)
+def _roles(name: str, warms: bool) -> tuple[IntArray, IntArray, IntArray]:
+    """Numbers of the parameter record of a composition: of effects that only add, of all others that have a role, amplitudes of those that
+    feel it; see ``Composition.adds``."""
+    roles = composition_of(name).adds
+    adding = (roles == ADDS) | ((roles == ADDS_WARMTH) & (not warms))
+    return np.flatnonzero(adding), np.flatnonzero((roles != 0) & ~adding), np.flatnonzero(roles == FEELS)
+
+
+def added(p: Records, theta: Array, omega: Array, alpha: Array) -> Array:
+    """What effects with parameters ``p`` add to the torque of contacts (n,) [N m], of motions (tracks, n); see ``apart``."""
+    theta, omega, alpha = (np.ascontiguousarray(values) for values in (theta, omega, alpha))  # one compiled form
+    torque = np.zeros(theta.shape[1])
+    _added(p, theta, omega, alpha, torque)
+    return torque
 
 
 def torque_in_phases(

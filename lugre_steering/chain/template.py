@@ -167,3 +167,11 @@ def line_error(q, elapsed):
     <line>
     return error
 '''
+
+BESIDE = '''\
+def beside(p, theta, omega, alpha):
+    """Torque [N m] of those effects that only add to that of the contact: it needs no step, and no memory."""
+    parallel, viscous = 0.0, 0.0
+    <beside>
+    return parallel + viscous
+'''

@@ -17,7 +17,7 @@ import numpy as np
 
 from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.lag import lagged
-from lugre_steering.chain.step import records_of, torque_in_phases
+from lugre_steering.chain.step import added, apart, records_of, torque_in_phases
 from lugre_steering.data.dataset import Run, averaged
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.effects.registry import effect as catalogue_entry
@@ -242,6 +242,7 @@ class Problem:
         self.size = size_of(vehicle, self.runs)
         self.standing = standing_effects(vehicle)
         self._last_bending: tuple[bytes | None, Array] = None, np.zeros(self.measured.size)
+        self._kept_chains: dict[int, tuple[tuple[bytes, Array], ...]] = {}
         self._last_calibrated: tuple[bytes | None, Array] = None, np.zeros(0)
         self._lines = vehicle.hydraulics.lines if vehicle.hydraulics is not None else ()
 
@@ -416,9 +417,12 @@ class Problem:
         return float(np.exp(sum(x[i] for i in self._gains))) if self._gains else 1.0
 
     def torque(
-        self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
+        self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None, *, keep: bool = False
     ) -> Array:
-        """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion."""
+        """Model torque of one bag (n,) with all effects, before the sensors; ``run``: the same bag with another motion.
+
+        ``keep``: others will be asked for that differ by what only adds to it.
+        """
         run = run or self.runs[bag]
         kind, places = self.model.parameters[0].dtype, self._at
         numbers = self._calibrated(x).copy()
@@ -440,8 +444,25 @@ class Problem:
                 if candidate.start(bag) <= start and not candidate.effect.per_line:
                     for field, number in candidate.effect.fields(values).items():
                         acting[places[field]] = number
-            phases.append((start, records_of(acting, kind)))
-        return torque_in_phases(phases, self.model.rubber, *run.steps)[:: 1 + run.midway]
+            phases.append(acting)
+        # What only adds is no part of the chain, which is the same then while a fit moves nothing else.
+        warms = self.vehicle.rubber is not None
+        beside = apart(phases, kind, warms)
+        torque = self._chain(bag, [*zip(starts, phases, strict=True)], run, keep and not (warms and beside is None))
+        return torque if beside is None else torque + added(records_of(beside, kind), run.theta, run.omega, run.alpha)
+
+    def _chain(self, bag: int, phases: Sequence[tuple[float, Array]], run: Run, keep: bool) -> Array:
+        """Torque of the chain (n,), one of those kept if it is: of each bag the last two, of which a fit leaves the worse."""
+        key = b"".join(np.float64(start).tobytes() + numbers.tobytes() for start, numbers in phases)
+        kept = self._kept_chains.get(bag, ()) if run is self.runs[bag] else ()
+        for last, known in kept:
+            if last == key:
+                return known
+        records = [(start, records_of(numbers, self.model.parameters[0].dtype)) for start, numbers in phases]
+        torque = torque_in_phases(records, self.model.rubber, *run.steps)[:: 1 + run.midway]
+        if keep and run is self.runs[bag]:
+            self._kept_chains[bag] = ((key, torque), *kept[:1])
+        return torque
 
     def _calibrated(self, x: Array) -> Array:
         """The numbers of the parameter record for the calibration part of x; kept, as they are the same for all bags and while a fit moves
@@ -455,15 +476,16 @@ class Problem:
         return last[1]
 
     def predict(
-        self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None
+        self, bag: int, x: Array, effects: Sequence[tuple[Candidate, Values]] = (), run: Run | None = None, *, keep: bool = False
     ) -> Array:
-        """Measured torque that the model expects in one bag (n,): sensor effects included, those of the vehicle file too.
+        """Measured torque that the model expects in one bag (n,): sensor effects included, those of the vehicle file too; ``keep`` as of
+        ``torque``.
 
         An effect that stands in the file and is given again counts as given.
         """
         run, own = run or self.runs[bag], slice(self.edges[bag], self.edges[bag + 1])
         here = [effect for effect in effects if effect[0].active_in(bag)]
-        torque = self.torque(bag, x, here, run)
+        torque = self.torque(bag, x, here, run, keep=keep)
         given = {candidate.label for candidate, _ in here} if self.standing else set()
         every = [*(effect for effect in self.standing if effect[0].label not in given), *here]
         if run.sharp is not None:
@@ -510,4 +532,4 @@ class Problem:
         return np.asarray(torque)
 
     def predict_all(self, x: Array, effects: Sequence[tuple[Candidate, Values]] = ()) -> Array:
-        return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects), range(len(self.runs))))
+        return np.concatenate(in_threads(lambda bag: self.predict(bag, x, effects, keep=True), range(len(self.runs))))
