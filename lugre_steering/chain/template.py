@@ -34,10 +34,12 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     if s.started == 0.0:
         begin(p, s, theta)
     s.time += dt
-    stiffness_ratio, friction_ratio, outside = ratios(rubber, p.table_low, p.table_step, s.temperature)
     hotter = 0.0
     <friction_temperature>
-    if hotter != 0.0:
+    if hotter == 0.0:
+        stiffness_ratio, friction_ratio, outside = ratios(rubber, p.table_low, p.table_step, s.temperature)
+    else:
+        stiffness_ratio, _, _ = ratios(rubber, p.table_low, p.table_step, s.temperature)
         _, friction_ratio, outside = ratios(rubber, p.table_low, p.table_step, s.temperature + hotter)
     s.saturated += outside
     stiffness = p.sigma_0 * stiffness_ratio
