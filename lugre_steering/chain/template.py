@@ -36,7 +36,7 @@ def step(p, s, rubber, out, dt, theta_measured, omega, alpha, effects):
     s.time += dt
     hotter = 0.0
     <friction_temperature>
-    if hotter == 0.0:
+    if hotter == 0.0:  # a row of the table as a whole: a second look at it after the first would take a quarter of the step
         stiffness_ratio, friction_ratio, outside = ratios(rubber, p.table_low, p.table_step, s.temperature)
     else:
         stiffness_ratio, _, _ = ratios(rubber, p.table_low, p.table_step, s.temperature)
