@@ -729,7 +729,7 @@ def test_friction_that_rises_smoothly_from_standstill_is_none_that_sticks(tmp_pa
     """Nothing beside mass and loss, in particular no clock that is late; and nothing is named that the file lacks that is written."""
     vehicle, mass, loss = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0
     assert vehicle.torque_sensor is not None
-    recording = driven_axis(vehicle, mass, loss, lambda rate: 50.0 * np.tanh(rate / 0.02), 0.01)
+    recording = driven_axis(vehicle, mass, loss, lambda rate: 50.0 * np.tanh(rate / 0.02), 0.025)
     result = diagnose_recordings([recording], vehicle)
     found = {effect["id"]: effect["parameters"] for effect in result.json["effects"]}
     assert set(found) == {"yaw_inertia", "viscous_friction"}
