@@ -29,6 +29,10 @@ def angle(stamp_ns: int, share: float = 1.0) -> float:
     return share * 0.3 * math.sin((stamp_ns - T0) * 1e-9 * 0.7)
 
 
+BEGUN = 20
+"""Samples at the start without a residual: these pressures disagree with bristles that are relaxed."""
+
+
 def pressure(line: int, stamp_ns: int) -> float:
     return 5e6 + 1e6 * line + 4e6 * math.sin((stamp_ns - T0) * 1e-9 * 0.7 + line)
 
@@ -75,7 +79,7 @@ def test_every_angle_pair_gives_one_torque_and_residuals_follow_in_order() -> No
     assert estimates.size == 600
     assert rejected(estimator) == {}
     assert np.all(np.diff(residuals["stamp_ns"]) > 0)
-    assert residuals.size >= 595
+    assert residuals.size >= 595 - BEGUN
     assert set(residuals["stamp_ns"]) <= set(estimates["stamp_ns"])
 
 
@@ -158,7 +162,7 @@ def test_arrival_order_across_topics_does_not_matter(seed: int) -> None:
     for a, b in zip(drop_message(late_estimates), drop_message(estimates), strict=True):
         np.testing.assert_array_equal(a, b)
     n = min(residuals.size, late_residuals.size)
-    assert n > 390
+    assert n > 390 - BEGUN
     for a, b in zip(drop_message(late_residuals[:n]), drop_message(residuals[:n]), strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -402,7 +406,7 @@ def test_a_single_absurd_stamp_far_ahead_does_not_lock_out(channel: int) -> None
     estimator, estimates, residuals = feed(stream)
     assert list(rejected(estimator).values()) == [{"time_jump": 1}]
     assert estimates.size == 600
-    assert residuals.size >= 595
+    assert residuals.size >= 595 - BEGUN
 
 
 def test_jump_back_in_time_starts_anew_once_confirmed() -> None:
@@ -592,7 +596,7 @@ def test_chambers_at_tank_pressure_add_nothing() -> None:
         measured.append(feed(messages(1.0), vehicle)[2]["measured_torque"])
     both, caps, rods = measured
     np.testing.assert_allclose(caps + rods, both, rtol=0.0, atol=1e-9 * np.abs(caps).max())
-    assert np.abs(rods).max() > 3e3
+    assert np.abs(rods).max() > 2e3
 
 
 def test_an_angle_without_noise_is_taken_as_it_is() -> None:

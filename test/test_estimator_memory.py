@@ -16,13 +16,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lugre_steering import replay
+from lugre_steering.chain.step import torque_side
+from lugre_steering.data.dataset import prepare
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.state_file import Ownership, read_state, write_state
+from lugre_steering.fitting.causal import causal_rmse
+from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import EffectEntry, Vehicle, load
+from lugre_steering.vehicle.model import build_model
 from lugre_steering.watch.window import read_window
 
 VEHICLE = load(Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml")
+JOINT = load(Path(__file__).resolve().parents[1] / "config" / "single_joint_example.yaml").replace(gravity=None)
 T0 = 1_790_000_000_000_000_000
 SECOND = 1_000_000_000
 
@@ -250,3 +257,44 @@ def test_a_killed_node_lets_go_of_its_state_file_and_one_that_leaves_is_waited_f
         assert own.take(file, 30.0) == ""
         killer.join()
     own.release()
+
+
+def held_at_the_start(share: float) -> tuple[Array, Array, Recording]:
+    """Time, true torque and recording of a joint that stands for a second with a part of what its bristle can hold, then swings."""
+    model, time = build_model(JOINT), np.arange(0.0, 12.0, 0.01)
+    parameters = model.parameters[0].copy()
+    parameters["initial_bristle"] = share * parameters["static_torque"] / parameters["sigma_0"]
+    angle = np.where(time < 1.0, 0.4, 0.4 * np.cos(time - 1.0))
+    rate = np.where(time < 1.0, 0.0, -0.4 * np.sin(time - 1.0))
+    torque = torque_side(parameters, model.rubber, time, angle, rate, 0.0 * time)
+    return time, torque, Recording.from_arrays(time, angle=angle, torque=torque)
+
+
+@pytest.mark.parametrize("share", [-0.9, 0.4, 0.9])
+def test_what_the_bristle_holds_at_the_start_is_what_the_first_torque_says(share: float) -> None:
+    assert JOINT.contact is not None
+    _, torque, recording = held_at_the_start(share)
+    (bag,) = replay([recording], JOINT).bags
+    series = bag.kept()
+    assert series.torque[25:100] == pytest.approx(torque[25:100], abs=0.02 * JOINT.contact.static_torque_Nm)
+    assert np.abs(series.torque[0] - torque[0]) > 0.3 * JOINT.contact.static_torque_Nm  # nothing had told of it yet
+    assert bag.fit is not None
+    assert bag.fit.rmse_Nm < 0.1 * JOINT.contact.static_torque_Nm  # nor counts what was estimated before
+    assert causal_rmse(JOINT, [recording], [prepare(recording, JOINT)]) < 0.1 * JOINT.contact.static_torque_Nm
+
+
+def test_a_bristle_that_is_relaxed_but_for_noise_stays_so_and_one_that_is_remembered_too() -> None:
+    """A first torque within a twentieth of the friction agrees; after a restart the memory counts, whatever that torque is."""
+    time, _, recording = held_at_the_start(0.9)
+    angle, torque = recording.angle["left"], recording.measured_torque
+    assert torque is not None
+    agrees = Recording.from_arrays(time, angle=angle.value, torque=np.where(time < 1.0, 0.5, torque.value))
+    assert replay([agrees], JOINT).bags[0].kept().torque[50] == replay([recording], JOINT).bags[0].kept().torque[0]
+    first, again = Estimator(JOINT), Estimator(JOINT)
+    for i in range(20):
+        first.push(0, T0 + i * 10_000_000, 0.4)
+    again.resume(first.memory)
+    for i in range(20, 40):
+        (row,) = again.push(0, T0 + i * 10_000_000, 0.4)[0]
+        again.push(1, T0 + i * 10_000_000, 40.0)
+    assert row["total"] == pytest.approx(first.push(0, T0 + 40 * 10_000_000, 0.4)[0]["total"][0], abs=1e-9)

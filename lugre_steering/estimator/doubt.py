@@ -110,6 +110,7 @@ GUARD = np.dtype(
         ("place", np.float64),  # where it stands: mean of the first of them [rad]
         ("still_other", np.float64),  # angle of the other side then, followed slowly [rad]; NaN: none yet
         ("apart", np.int64),  # samples in a row for which the other side was away from there
+        ("begun", np.bool_),  # whether its bristle holds what the first torque has told (see ``unseen``)
         ("unseen_ns", np.int64),  # stamp of the end of unseen motion after which the bristle is not known yet; 0: it is
         ("set_back", np.bool_),  # it is not known because the clock was set back
         ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not

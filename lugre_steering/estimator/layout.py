@@ -55,6 +55,9 @@ CONFIG = np.dtype(
         ("lag", np.float64),
         ("horizon", np.float64),
         ("start_ns", np.int64),
+        ("start_known", np.bool_),  # whether it has been seen, or is remembered, what the bristles held at the start
+        ("start_share", np.float64),  # of what they can hold, where that differs from the estimate
+        ("begin_ns", np.int64),  # stamp from which on they hold it; 0: nothing differs
         ("lagged", np.float64),
         ("lag_input", np.float64),  # the total that it followed last
         ("lagged_ns", np.int64),

@@ -23,9 +23,10 @@ _HANDED_OVER = (
     "motion", "trust", "guard", "output", "waiting", "pending", "line_ns", "line_value", "plan_ns", "plan_theta", "released",
 )  # fmt: skip
 _ONGOING = (
-    "start_ns", "lagged", "lag_input", "lagged_ns", "pending_first", "pending_count", "plan_size", "plan_refused_ns", "swing_ns",
-    "swing_from", "residual_ns", "agreed_ns", "residual_square", "measured_square", "estimate_square", "residual_now",
-    "measured_now", "estimate_now", "beyond", "released_ns", "weight", "message",
+    "start_ns", "start_known", "start_share", "begin_ns", "lagged", "lag_input", "lagged_ns", "pending_first",
+    "pending_count", "plan_size", "plan_refused_ns", "swing_ns", "swing_from", "residual_ns", "agreed_ns",
+    "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now", "beyond",
+    "released_ns", "weight", "message",
 )  # fmt: skip
 
 
@@ -61,7 +62,7 @@ def recall(core: Core, composition: Composition, sides: Sequence[str], memory: M
         start_ns = int(memory["start_ns"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise DataError(f"it is not the memory of this model ({error})") from error
-    core.config["start_ns"] = start_ns
+    core.config["start_ns"], core.config["start_known"] = start_ns, True
     parameters, bounds = records_of(core.parameters, composition.parameters), records_of(core.bounds, composition.state)
     for (i, _), (state, motion), (stamp_ns, angle, fastest, unseen) in zip(rows, records, last, strict=True):
         states[i], core.motion[i] = state, motion

@@ -9,6 +9,7 @@ from lugre_steering.chain.doors import call_number, row
 from lugre_steering.chain.layout import LINE
 from lugre_steering.estimator.doubt import weigh_pressures, weigh_residual
 from lugre_steering.estimator.lines import believed_at, look_for_exchange, measured_torque
+from lugre_steering.estimator.unseen import before_start, learn_start
 
 
 @inner
@@ -51,6 +52,10 @@ def form_residuals(core, first_line, residuals, count):
             continue
         measured, believed = measured_torque(core, e, value), believed_at(core, at_ns)
         look_for_exchange(core, e, at_ns, value, measured)
+        if believed and c.exchanged == 0 and not c.start_known:
+            learn_start(core, e.stamp_ns, measured - e.predicted)
+        if before_start(c, e.stamp_ns):
+            continue
         # As well of a line that has jumped: that the torque is not what it should be is told, though not shown.
         weigh_residual(c, e.stamp_ns, measured, measured - e.predicted)
         if not believed or c.exchanged != 0:

@@ -33,7 +33,7 @@ from lugre_steering.estimator.noise import lose_bristle, noise_of
 from lugre_steering.estimator.preview import preview
 from lugre_steering.estimator.rate import believed
 from lugre_steering.estimator.release import release
-from lugre_steering.estimator.unseen import drive_bounds, end_silence
+from lugre_steering.estimator.unseen import begin_held, drive_bounds, end_silence
 
 LONGEST_PERIOD_NS = 100_000_000  # of a sensor whose stamps may pair by half their period
 
@@ -194,6 +194,8 @@ def advance(core, k, stamp_ns, value, rate, verdict, estimates, count):
             end_silence(core, side, ch, stamp_ns, value)
         before = motion.theta if motion.age != 0.0 else value
         follow(motion, dt, value, rate, noise_of(core, side), p.acceleration_unit, c.accelerates)
+        if c.begin_ns != 0 and not g.begun and stamp_ns >= c.begin_ns:
+            begin_held(core, side)
         rates.travel += abs(motion.theta - before)
         call_step(c.step_door, p, state, core.rubber, output, dt, motion.theta, motion.omega, motion.alpha, c.effects)
         trust(core, side, dt)

@@ -1,6 +1,8 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Motion that nobody saw: during a silence, a freeze or a jump. How the bristle came out of it is not known.
+"""Motion that nobody saw: before the start, during a silence, a freeze or a jump. How the bristle came out of it is not known.
+
+At the start it is taken for relaxed, as on a track that was rolled straight, unless the first measured torque says otherwise.
 
 Of all the ways that the joint can have gone, dz = d theta - |d theta| z / length makes two lead to the ends of what the bristle can
 hold: first as far as possible to one side, then back to where the joint is now. Both are driven on beside the estimate. Every radian
@@ -9,7 +11,7 @@ brings two starts closer to each other, whatever they were; until all agree, the
 
 from __future__ import annotations
 
-from lugre_steering.chain.baseline import REST_RATE_RAD_S, most_friction
+from lugre_steering.chain.baseline import REST_RATE_RAD_S, most_friction, ratios
 from lugre_steering.chain.compiled import inner
 from lugre_steering.chain.doors import call_step, copy_row, row
 from lugre_steering.chain.layout import BASELINE, STATE
@@ -23,6 +25,10 @@ AGREED_SHARE = 0.05
 FORGOTTEN = 5.0
 """Presliding lengths after which less than 1 % of any start is left."""
 SUPPORTED_NS = 200_000_000
+BEGIN_NS = 200_000_000
+"""How long after the first torque the bristles are set right: at the same sample, in whatever order messages come."""
+SETTLED_LAGS = 5.0
+"""Time constants of a lag after which hardly anything is left of what was before."""
 
 
 @inner
@@ -82,3 +88,36 @@ def drive_bounds(core, side, dt):
         apart = max(apart, abs(out.torque - core.output[side].torque))
     if apart <= AGREED_SHARE * most_friction(p) or _supported(c, g.unseen_ns):
         g.unseen_ns, g.set_back = 0, False
+
+
+@inner
+def learn_start(core, stamp_ns, residual):
+    """The first measured torque is ``residual`` [N m] more than the estimate of that instant: how much bristles held at the start.
+
+    All sides hold the same share of what they can, as one torque does not tell them apart.
+    """
+    c, most = core.config[0], 0.0
+    c.start_known = True
+    if abs(residual) <= AGREED_SHARE * c.friction:
+        return
+    for side in range(core.motion.size):
+        p = row(core.parameters, side, BASELINE)
+        most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, p.rubber_temperature)[0]
+    c.start_share = max(-1.0, min(1.0, residual / most)) if most > 0.0 else 0.0
+    c.begin_ns = stamp_ns + BEGIN_NS
+
+
+@inner
+def begin_held(core, side):
+    """The bristle of a side holds what is left of what it held at the start; what was deflected since has been taken from it."""
+    c, g, state, p = core.config[0], core.guard[side], row(core.state, side, STATE), row(core.parameters, side, BASELINE)
+    g.begun = True
+    if g.unseen_ns == 0 and p.sigma_0 > 0.0:
+        state.z += c.start_share * max(0.0, most_friction(p) / p.sigma_0 - state.z_max)
+        state.z_max = max(state.z_max, abs(state.z))
+
+
+@inner
+def before_start(c, stamp_ns):
+    """Whether the bristles of that time did not hold yet what they do."""
+    return c.begin_ns != 0 and stamp_ns < c.begin_ns + int(SETTLED_LAGS * c.lag * 1e9)

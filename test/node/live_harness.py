@@ -334,6 +334,10 @@ def message_of(vehicle: Vehicle, sample: Sample) -> Any:
     return message
 
 
+BEGUN = 20
+"""Samples of such a motion without a residual at its start, as its pressures disagree with bristles that are relaxed."""
+
+
 def motion(vehicle: Vehicle, seconds: float, *, start_ns: int = T0, rate_Hz: float = 100.0) -> list[Sample]:
     """A smooth made-up steering motion with jittering pressures at the same rate, and ambient air now and then."""
     samples = []
