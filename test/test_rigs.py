@@ -344,7 +344,7 @@ def test_one_pressure_pair_gives_the_torque_of_all_its_cylinders() -> None:
             if channel.name in values:
                 now_ns = 1_000_000_000 + i * 10_000_000
                 residuals += [row.copy() for row in estimator.push(number, now_ns, values[channel.name])[1]]
-    assert len(residuals) > 40
+    assert len(residuals) > 20  # none in the first 0.2 s: the joint stands under load
     assert float(residuals[-1]["measured_torque"]) == pytest.approx(work, rel=1e-6)
 
 
