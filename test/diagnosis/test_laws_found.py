@@ -40,6 +40,7 @@ from lugre_steering.diagnosis.laws.write import described, entries, law_words, s
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.effects.law_entry import LawEntry
+from lugre_steering.effects.laws import sampled
 from lugre_steering.effects.own import read_effects
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import EffectError
@@ -475,6 +476,26 @@ def test_a_line_is_found_where_the_data_show_only_a_part_of_the_pieces() -> None
         line = next(found for found in closed_forms(cell, pieces, (turned * spread) @ turned.T) if found[1] == "linear")
         assert line[0] < 1e-6
         assert line[3]["slope"] == pytest.approx(0.2)
+
+
+def test_no_closed_form_of_a_law_beside_a_constant_can_be_that_constant() -> None:
+    """Else neither is sure: a force of 49 N had been told as a law of the time that drifts by half a newton."""
+    cell = Cell("conservative_torque", Axis("time"), 0.0, 60.0)
+    pieces = np.linspace(-0.2, 0.3, cell.pieces)
+    sure = 1e-4 * np.eye(cell.pieces)
+
+    def left(form: str, fixed: dict[str, float], free: dict[str, float]) -> float:
+        """What the sizes of a form leave of a constant, at best."""
+        bends = {"at", "width", "length", "period", "exponent"} | ({"start", "end"} if form == "window" else set())
+        sizes = [name for name in free if name not in bends]
+        at_zero = {**fixed, **free, **dict.fromkeys(sizes, 0.0)}
+        columns = np.column_stack([sampled(form, {**at_zero, name: 1.0}, (), 0.0, 60.0) for name in sizes])
+        flat = np.ones(len(columns))
+        return float(np.sqrt(np.mean((flat - columns @ np.linalg.lstsq(columns, flat, rcond=None)[0]) ** 2)))
+
+    whole = [left(*found[1:]) for found in closed_forms(cell, pieces, sure)]
+    assert min(whole) < 1e-9
+    assert min(left(*found[1:]) for found in closed_forms(cell, pieces, sure, centred=True)) > 0.02
 
 
 def test_nothing_hidden_gives_no_law() -> None:

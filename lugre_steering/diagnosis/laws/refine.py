@@ -41,6 +41,8 @@ class Law(Effect):
     form: str
     shape: Callable[[Mapping[str, float]], Array]
     fixed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    centred: bool = False
+    """Whether a constant is none of it, as a name has that."""
 
     def at(self, values: Mapping[str, float]) -> Cell:
         """The cell with the memory that was fitted."""
@@ -96,7 +98,7 @@ def free_law(
         own = np.array([values[name] for name in names])
         return np.asarray(basis @ (own - own.mean() * centred))
 
-    effect = _law(cell, place, laws.TABLE, parameters, shape=shape)
+    effect = dataclasses.replace(_law(cell, place, laws.TABLE, parameters, shape=shape), centred=centred)
     start = dict(zip(names, np.maximum(pieces, low).tolist(), strict=True))
     if cell.axis.memory in FITTED:
         start["memory_size"] = cell.axis.memory_size
@@ -137,6 +139,9 @@ VARIANTS: tuple[tuple[str, Mapping[str, float], tuple[str, ...]], ...] = (
 )  # fmt: skip
 """Closed forms: what of their values is fixed, and which of the others bend the form instead of scaling it."""
 
+LEVELLED = ("linear", "hinge", "bump", "sinusoid")
+"""Forms whose value is a constant beside the rest."""
+
 
 def _grid(cell: Cell, name: str) -> Array:
     span = cell.high - cell.low
@@ -157,10 +162,13 @@ def _bent(cell: Cell, names: Sequence[str]) -> Iterator[dict[str, float]]:
             yield found
 
 
-def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tuple[float, str, dict[str, float], dict[str, float]]]:
+def closed_forms(
+    cell: Cell, coefficients: Array, covariance: Array, *, centred: bool = False
+) -> list[tuple[float, str, dict[str, float], dict[str, float]]]:
     """Closed forms by the energy (noise variances) that they lose against free pieces: that, form, fixed values, free values.
 
-    Energy is told by the covariance of the pieces, so that places that the data hardly show do not count.
+    ``centred``: those that hold no constant of their own. Energy is told by the covariance of the pieces, so that places that the data
+    hardly show do not count.
     """
     places = np.linspace(cell.low, cell.high, laws.KNOTS)
     onto = np.linalg.pinv(cell.basis(places))
@@ -169,6 +177,10 @@ def closed_forms(cell: Cell, coefficients: Array, covariance: Array) -> list[tup
     root = (directions[:, seen] / np.sqrt(spread[seen])).T
     target, found = root @ coefficients, []
     for form, fixed, bends in VARIANTS:
+        if centred and form in LEVELLED:
+            fixed = {"value": 0.0, **fixed}
+        elif centred and not fixed and form != "power":
+            continue
         if cell.period and form != "sinusoid":
             continue  # two numbers cannot tell any other apart
         linear = [name for name in laws.form_values(form) if name not in (*fixed, *bends, "scale")]
@@ -231,7 +243,7 @@ def simplified(problem: Problem, weight: Array, before: Fit, free: Fit, place: i
     first = problem.nuisances + sum(len(known.free) for known, _ in before.effects)
     part = slice(first, first + len(names))
     gain = before.cost - free.cost
-    trials = closed_forms(cell, np.array([values[name] for name in names]), free.covariance[part, part])
+    trials = closed_forms(cell, np.array([values[name] for name in names]), free.covariance[part, part], centred=law.centred)
     promising = [trial for trial in trials if trial[0] < (1.0 - KEPT) * gain * 2.0]
     for _, form, fixed, start in sorted(promising, key=lambda trial: trial[0] + NUMBER_COSTS * gain * len(trial[3]))[:TRIED_FORMS]:
         law_here = closed_law(problem, cell, place, form, fixed, start)
