@@ -294,7 +294,7 @@ def test_a_bristle_that_is_relaxed_but_for_noise_stays_so_and_one_that_is_rememb
     for i in range(20):
         first.push(0, T0 + i * 10_000_000, 0.4)
     again.resume(first.memory)
-    for i in range(20, 40):
+    for i in range(20, 80):
         (row,) = again.push(0, T0 + i * 10_000_000, 0.4)[0]
         again.push(1, T0 + i * 10_000_000, 40.0)
-    assert row["total"] == pytest.approx(first.push(0, T0 + 40 * 10_000_000, 0.4)[0]["total"][0], abs=1e-9)
+    assert row["total"] == pytest.approx(first.push(0, T0 + 80 * 10_000_000, 0.4)[0]["total"][0], abs=1e-9)

@@ -103,8 +103,9 @@ def learn_start(core, stamp_ns, residual):
     for side in range(core.motion.size):
         p = row(core.parameters, side, BASELINE)
         most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, p.rubber_temperature)[0]
-    c.start_share = max(-1.0, min(1.0, residual / most)) if most > 0.0 else 0.0
-    c.begin_ns = stamp_ns + BEGIN_NS
+    if most > 0.0:
+        c.start_share = max(-1.0, min(1.0, residual / most))
+        c.begin_ns = stamp_ns + BEGIN_NS
 
 
 @inner

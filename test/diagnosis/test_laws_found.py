@@ -479,7 +479,7 @@ def test_a_line_is_found_where_the_data_show_only_a_part_of_the_pieces() -> None
 
 
 def test_no_closed_form_of_a_law_beside_a_constant_can_be_that_constant() -> None:
-    """Else neither is sure: a force of 49 N had been told as a law of the time that drifts by half a newton."""
+    """Else neither is sure, and the name of the constant may go."""
     cell = Cell("conservative_torque", Axis("time"), 0.0, 60.0)
     pieces = np.linspace(-0.2, 0.3, cell.pieces)
     sure = 1e-4 * np.eye(cell.pieces)
