@@ -53,6 +53,8 @@ HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 REST = 0.05
 """Share of what the freedoms take that a name without them may leave and be the simpler of two that explain the same."""
+BY_NOISE = 0.95
+"""Quantile of the doubts of noise draws up to which what names leave is no more in doubt than noise."""
 BENT = 0.3
 """By how much of its own torque the law of a name may bend at any place, at most."""
 
@@ -325,8 +327,8 @@ def _in_place(
     progress: Callable[[str], None],
 ) -> tuple[Problem, Fit, tuple[list[Found], Problem, Fit]] | None:
     """Names beside those of a vehicle that stand for ``sure``, or together where none does, where all without freedoms are clearly more
-    evident than the former with them, by SURE for each name where none stands, and leave no more in doubt than the former or noise alone
-    does, as they would of friction of another form, and each is needed: with problem and baseline without freedoms.
+    evident than the former with them, by SURE for each name where none stands, and leave no more in doubt than the former do or noise
+    alone may, as they would of friction of another form, and each is needed: with problem and baseline without freedoms.
     ``problem``: without bends of names.
     """
     found, there, free = sure
@@ -335,7 +337,8 @@ def _in_place(
         return None
     stands = may_differ(there, free, len(free.effects), [item.gain for item in found])
     now, current, best = exact, _settled_in(exact, weight, free.effects, free.x), None
-    most = (1.0 + ALIKE) * max(there.doubt, float(np.median([doubt_of(exact, draw * weight, weight) for draw in noise.draws])))
+    by_noise = np.quantile([doubt_of(exact, draw * weight, weight) for draw in noise.draws], BY_NOISE)
+    most = max((1.0 + ALIKE) * there.doubt, float(by_noise))
     while len(found) < MAX_EFFECTS:
         own = _round(now, noise, weight, current, True, progress)
         if not own.trials or own.before - own.trials[0].cost < HOPELESS * needed(now, own.best, weight, stands):
