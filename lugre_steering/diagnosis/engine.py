@@ -31,6 +31,7 @@ from lugre_steering.fitting.sheet import (
     EXPLAINED,
     Suspect,
     WrongSheet,
+    form_instead,
     physics_beside,
     physics_instead,
     wrong_entry,
@@ -119,7 +120,7 @@ def _searched(
         return case.undetermined(problem, lacking) if wrong is None else case.wrong_sheet(wrong)
     progress("recalibrating the baseline")
     done = investigate(problem, seed, progress)
-    if suspected is not None and not physics_instead(problem, done.found.final.effects, suspected):
+    if suspected is not None and not (_of_form(done, suspected) or physics_instead(problem, done.found.final.effects, suspected)):
         if not physics_beside(problem, done.found.final.effects, suspected):
             case.found(clocks.findings)
             return case.wrong_sheet(suspected)
@@ -171,6 +172,12 @@ def _misplaced(done: Finished) -> WrongSheet | None:
             said = f"both angles stand about {np.degrees(zero):.1f} deg from their zero"
             return WrongSheet(1.0, (Suspect("zero of the angle sensors", None, share, final.cost),), said)
     return None
+
+
+def _of_form(done: Finished, suspected: WrongSheet) -> bool:
+    """Whether friction of another form had passed for a wrong sheet."""
+    form = done.beside_form
+    return form is not None and done.needs_form and form_instead(form.found.baseline, form.problem, suspected)
 
 
 def _wrong_entry(done: Finished) -> WrongSheet | None:

@@ -196,6 +196,12 @@ def _takes_surprise(tried: _Tried, cost: float, surprise: float) -> bool:
     return not tried.stuck and max(tried.surprise, surprise - (cost - tried.suspect.cost)) < RELIEVED * surprise
 
 
+def form_instead(beside: Fit, problem: Problem, wrong: WrongSheet) -> bool:
+    """Whether ``beside`` the freedoms of the friction law, which ``problem`` has, the values of the sheet are no surprise: friction of
+    another form had taken them far off it."""
+    return not wrong.stuck and not at_bounds(problem, beside.x, LEVELS) and _surprise(problem, beside) < SURPRISE
+
+
 def physics_instead(problem: Problem, effects: Sequence[tuple[Candidate, Values]], wrong: WrongSheet) -> bool:
     """Whether with ``effects`` the rest of the sheet is no surprise any more, and less is left than with its worst suspect put right: far
     less where recalibration without them stops at a bound, which it must not beside them."""
@@ -332,7 +338,7 @@ def _surprise(problem: Problem, result: Fit, freed: Sequence[str] = ()) -> float
     count = len(problem.calibrations)
     scaled = (result.x / problem.scales()) ** 2
     own = [scaled[i] for i, c in enumerate(problem.calibrations) if c.name in ("friction_level", "stiffness") and c.name not in freed]
-    weather = scaled[count + len(problem.runs) :]
+    weather = scaled[count + len(problem.runs) : problem.first_bend]
     return float(sum(own) + weather.sum() / len(problem.runs))
 
 

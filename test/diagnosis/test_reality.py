@@ -35,6 +35,7 @@ from lugre_steering.fitting.problem import Effects, Problem
 from lugre_steering.fitting.sheet import (
     Suspect,
     WrongSheet,
+    form_instead,
     physics_beside,
     physics_instead,
     wrong_entry,
@@ -283,6 +284,19 @@ def test_physics_that_leaves_less_than_a_suspected_entry_is_named_instead() -> N
     assert not physics_instead(problem, [], suspected(1e9))
     assert not physics_instead(mistyped, named, suspected(1e9))
     assert not physics_instead(mistyped, named, suspected(1e9, stuck=True))
+
+
+def test_friction_of_another_form_is_no_wrong_sheet() -> None:
+    """A presliding twice as soft takes the stiffness far off its sheet, unless the form of the friction law is free to be what does it."""
+    assert VEHICLE.friction is not None
+    soft = VEHICLE.replace(friction=replace(VEHICLE.friction, stiffness_Nm_per_deg=0.5 * VEHICLE.friction.stiffness_Nm_per_deg))
+    problem = synchronised(record(soft, QUICK, 6), VEHICLE).problem
+    form = 2.0 * (Problem(soft, problem.runs).predict_all(problem.start()) - problem.predict_all(problem.start()))
+    free = problem.bent([form[:, None]])
+    suspected = WrongSheet(1.0, (Suspect("axle.load_N", 1.2, 0.01, 1e9),), stuck=False, rest=0.5)
+    assert not form_instead(fit(problem, problem.sensor_weight), problem, suspected)
+    assert form_instead(fit(free, free.sensor_weight), free, suspected)
+    assert not form_instead(fit(free, free.sensor_weight), free, replace(suspected, stuck=True))
 
 
 @pytest.mark.parametrize("load", [0.5, 2.0])
