@@ -47,7 +47,7 @@ from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine, without_part
 from lugre_steering.recording import Array
 
-MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
+MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS, EXCHANGES = 3, 6, 3, 3
 """Most names, most rivals told of one, and how many of the best fingerprints are tried in place of what every joint has."""
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
@@ -115,6 +115,8 @@ def search(
             problem, baseline = step.instead.problem, step.instead.current
         plain = problem.doubted(there.doubt, there.typical)
         there, found, current = (there, both, step.fit) if step.short else _pruned(plain, there, weight, both, step.fit)
+        if len(found) == len(both) > given + 1:
+            there, found, current = _exchanged(there, noise, weight, split, found, current, given, progress)
         if len(found) < len(both):
             found[-1] = _told(found[-1], _rivals(there, noise, weight, split, current, found[-1], len(found) - 1))
         now, current = _freed(plain, there, weight, current, given)
@@ -146,6 +148,25 @@ def search(
     more = np.zeros(now.nuisances - baseline.x.size)
     instead_of_form = () if len(found) > given else instead_of_form
     return now, Search(replace(baseline, x=np.append(baseline.x, more)), current, tuple(found), first, tuple(tried), instead_of_form)
+
+
+def _exchanged(
+    problem: Problem, noise: Noise, weight: Array, split: Split, found: Sequence[Found], current: Fit, given: int,
+    progress: Callable[[str], None],
+) -> tuple[Problem, list[Found], Fit]:
+    """Each name anew beside all others, the latest first, until none would be another: the first was chosen when nothing was known of the
+    others, and may stand for a part of what they are."""
+    found = list(found)
+    waiting, turns = list(reversed(found[given:])), EXCHANGES * (len(found) - given)
+    while waiting and turns:
+        old, turns = waiting.pop(0), turns - 1
+        rest = [effect for effect, item in zip(current.effects, found, strict=True) if item is not old]
+        own = _round(problem, noise, weight, replace(current, effects=tuple(rest)), True, progress)
+        if own.trials and own.before - own.trials[0].cost > (1.0 + PARTIAL) * (own.before - current.cost):
+            problem, current, name = _closest([problem], weight, split, [own], own.current)
+            waiting = [item for item in reversed(found[given:]) if item is not old]
+            found = [*(item for item in found if item is not old), name]
+    return problem, found, current
 
 
 class _Step(NamedTuple):
