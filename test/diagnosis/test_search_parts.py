@@ -317,7 +317,8 @@ def test_a_name_that_only_filled_in_for_the_shape_of_another_goes(problem: Probl
     assert kept[0].rivals == ("line_loss_linear", "viscous_friction")  # which may explain it as well
 
 
-def test_a_stand_in_that_was_chosen_first_is_exchanged_for_what_is_there(slower: Problem, few_sought: None) -> None:
+@pytest.mark.usefixtures("few_sought")
+def test_a_stand_in_that_was_chosen_first_is_exchanged_for_what_is_there(slower: Problem) -> None:
     """A loss of the wrong power, fitted beside what else was found, is the right one once that is known; what is right stays."""
     right, stand_in = effect("line_loss_quadratic", c=2e5), effect("line_loss_linear", b=2e4)
     other = effect("kingpin_jacking", amplitude=400.0)
