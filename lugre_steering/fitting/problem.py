@@ -24,7 +24,7 @@ from lugre_steering.effects.registry import effect as catalogue_entry
 from lugre_steering.recording import Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import Model, baseline_parameters, build_model
-from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, VEHICLE, Size, decade
+from lugre_steering.vehicle.size import FRICTION_NM, SPARE, TRAVEL_RAD, Size, decade, vehicle_size
 
 LEAST_ARM = 0.1
 """Share of the drawing's moment arm that a true one has at least."""
@@ -183,7 +183,7 @@ def standing_effects(vehicle: Vehicle) -> tuple[tuple[Candidate, Values], ...]:
 def size_of(vehicle: Vehicle, runs: Sequence[Run]) -> Size:
     """The size of a machine: of its sheet if it is a vehicle, else as its recordings show."""
     if vehicle.contact is None:
-        return VEHICLE
+        return vehicle_size(vehicle)
     travel = max(float(np.ptp(run.theta)) for run in runs)
     torque = max(float(np.percentile(np.abs(run.measured), 99.0)) for run in runs)
     angle = 1.0 if vehicle.coordinate.unit == "rad" else decade(travel, TRAVEL_RAD)
@@ -197,12 +197,12 @@ def resized(effect: Effect, size: Size) -> Effect:
     def of(p: Parameter) -> Parameter:
         worth = size.of(p.unit)
         grid = p.grid if p.relative_to else tuple(worth * value for value in p.grid)
-        low, high = p.low * worth, p.high * worth
+        low, high = size.range_of(p)
         if p.place:
             low, high = min(low, -size.farthest) if low < 0.0 else low, max(high, size.farthest)
         return replace(p, scale=p.scale * worth, low=low, high=high, grid=grid)
 
-    return effect if size == VEHICLE else replace(effect, parameters=tuple(of(p) for p in effect.parameters))
+    return effect if size.usual else replace(effect, parameters=tuple(of(p) for p in effect.parameters))
 
 
 class Problem:

@@ -15,7 +15,7 @@ from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
-from lugre_steering.vehicle.size import Size
+from lugre_steering.vehicle.size import Size, vehicle_size
 
 OF_CYLINDERS = frozenset({"arm", "line"})
 """Hooks that nothing reads where the torque itself is measured."""
@@ -70,8 +70,10 @@ def _check_machine(vehicle: Vehicle, effect: Effect, fail: Fail) -> None:
 
 def _range(vehicle: Vehicle, parameter: Parameter) -> tuple[float, float]:
     """What a value may be. Of what has the size of a machine that is no vehicle only the sign is known beforehand."""
+    if vehicle.contact is None:
+        return vehicle_size(vehicle).range_of(parameter)
     low, high = parameter.low, parameter.high
-    if vehicle.contact is None or _OTHER[vehicle.coordinate.unit].of(parameter.unit) == 1.0:
+    if _OTHER[vehicle.coordinate.unit].of(parameter.unit) == 1.0:
         return low, high
     least = -math.inf if low < 0.0 else 0.0 if low == 0.0 else sys.float_info.min
     return least, math.inf if high > 0.0 else 0.0

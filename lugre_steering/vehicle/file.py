@@ -61,7 +61,7 @@ def from_mapping(data: object, file: Path) -> Vehicle:
     vehicle = _with_initial(reader.build(Vehicle, embed_tables(data, reader), ""))
     check(vehicle, reader)
     check_laws(vehicle, reader)
-    return with_pavement(with_effects(vehicle, reader), reader)
+    return with_effects(with_pavement(vehicle, reader), reader)
 
 
 def _with_initial(vehicle: Vehicle) -> Vehicle:

@@ -9,6 +9,8 @@ import re
 from dataclasses import dataclass
 
 from lugre_steering.chain.rates import USUAL_ACCELERATION_RAD_S2
+from lugre_steering.effects.entry import Parameter
+from lugre_steering.vehicle.loads import load_moment
 from lugre_steering.vehicle.sections import Vehicle
 
 FRICTION_NM, STRIBECK_RAD_S, TRAVEL_RAD = 25e3, 0.026, 0.8
@@ -28,16 +30,28 @@ _UNIT = re.compile(r"(N m|kg m2|rad|W|J)(?![A-Za-z])(?:\^?(\d))?")
 @dataclass(frozen=True)
 class Size:
     """Units of torque [N m] and angle [rad] of a machine, powers of ten, so that all vehicles alike share one; and how far from zero it
-    turns [rad], where that may be further than tracks do."""
+    turns [rad], where that may be further than tracks do. ``tracked``: ranges written for a vehicle hold for it too, whatever its size."""
 
     torque: float = 1.0
     angle: float = 1.0
     farthest: float = 0.0
+    tracked: bool = False
+
+    @property
+    def usual(self) -> bool:
+        """Whether what is written for a vehicle holds as it stands."""
+        return self.torque == self.angle == 1.0 and not self.farthest
 
     def of(self, unit: str) -> float:
         """What a number in a unit of the catalogue, written for a vehicle, is worth on this machine."""
         above, _, below = unit.partition("/")
         return self._product(above) / self._product(below)
+
+    def range_of(self, parameter: Parameter) -> tuple[float, float]:
+        """Lowest and highest value of a parameter of the catalogue on this machine."""
+        worth = self.of(parameter.unit)
+        low, high = parameter.low * worth, parameter.high * worth
+        return (min(parameter.low, low), max(parameter.high, high)) if self.tracked else (low, high)
 
     def _product(self, text: str) -> float:
         worth = 1.0
@@ -54,6 +68,14 @@ VEHICLE = Size()
 def decade(value: float, reference: float) -> float:
     """The power of ten nearest to value / reference; 1 where there is no value."""
     return 10.0 ** round(math.log10(value / reference)) if 0.0 < value < math.inf else 1.0
+
+
+def vehicle_size(vehicle: Vehicle) -> Size:
+    """Size of a vehicle as its sheet tells: by the sliding friction of one track."""
+    axle, track, friction = vehicle.axle, vehicle.track, vehicle.friction
+    if axle is None or track is None or friction is None or friction.coulomb is None:
+        return VEHICLE
+    return Size(decade(friction.coulomb * load_moment(axle, track), FRICTION_NM), tracked=True)
 
 
 def acceleration_unit(vehicle: Vehicle) -> float:

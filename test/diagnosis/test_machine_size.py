@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ import pytest
 from lugre_steering import vehicle as vehicle_file
 from lugre_steering.diagnosis.engine import diagnose_recordings
 from lugre_steering.effects.registry import CATALOGUE
-from lugre_steering.fitting.problem import resized
+from lugre_steering.errors import VehicleFileError
+from lugre_steering.fitting.problem import resized, size_of
 from lugre_steering.recording import Recording, Signal
 from lugre_steering.simulate.manoeuvres import Hold, Manoeuvre, Sweep, motion_of
 from lugre_steering.simulate.run import sensing_of, simulate
@@ -99,6 +101,25 @@ def test_the_answer_does_not_depend_on_the_size_of_the_machine(
 def test_units_tell_how_a_number_grows_with_the_machine(unit: str, torque: int, angle: int) -> None:
     """Exponents by hand."""
     assert Size(1e4, 1e-3).of(unit) == pytest.approx(1e4**torque * 1e-3**angle, rel=1e-12)
+
+
+@pytest.mark.parametrize(("share", "most", "typical"), [(0.1, 5e-5, 3e-6), (1.0, 5e-6, 3e-7), (10.0, 5e-6, 3e-8)])
+@pytest.mark.filterwarnings("ignore::lugre_steering.errors.ImplausibleWarning")
+def test_ranges_of_a_vehicle_follow_its_size_and_become_no_narrower(share: float, most: float, typical: float, tmp_path: Path) -> None:
+    """A linkage gives ten times as much per torque where all torques are a tenth; a file may say so, and no other."""
+    vehicle = vehicle_file.load(Path(__file__).parents[2] / "config" / "test_vehicle.yaml")
+    axle, track = vehicle.axle, vehicle.track
+    assert axle is not None
+    assert track is not None
+    axle, track = dataclasses.replace(axle, load_N=share * axle.load_N), dataclasses.replace(track, weight_N=share * track.weight_N)
+    sized = vehicle.replace(axle=axle, track=track)
+    gives = next(p for p in resized(CATALOGUE["linkage_compliance"], size_of(sized, [])).parameters if p.name == "compliance")
+    assert (gives.scale, gives.high) == pytest.approx((typical, most))
+    for compliance, allowed in ((0.9 * most, True), (1.1 * most, False)):
+        file = tmp_path / "vehicle.yaml"
+        vehicle_file.save(sized.replace(effects=(EffectEntry("linkage_compliance", {"compliance": compliance}),)), file)
+        with contextlib.nullcontext() if allowed else pytest.raises(VehicleFileError, match=f"a number from 0 to {most:g}"):
+            vehicle_file.load(file)
 
 
 def test_every_unit_of_the_catalogue_is_known() -> None:
