@@ -116,7 +116,11 @@ def search(
         plain = problem.doubted(there.doubt, there.typical)
         there, found, current = (there, both, step.fit) if step.short else _pruned(plain, there, weight, both, step.fit)
         if len(found) == len(both) > given + 1:
+            latest = found[-1]
             there, found, current = _exchanged(there, noise, weight, split, found, current, given, progress)
+            if found[-1] is not latest and not step.short:
+                plain = problem.doubted(there.doubt, there.typical)
+                there, found, current = _pruned(plain, there, weight, found, current)
         if len(found) < len(both):
             found[-1] = _told(found[-1], _rivals(there, noise, weight, split, current, found[-1], len(found) - 1))
         now, current = _freed(plain, there, weight, current, given)
@@ -163,9 +167,11 @@ def _exchanged(
         rest = [effect for effect, item in zip(current.effects, found, strict=True) if item is not old]
         own = _round(problem, noise, weight, replace(current, effects=tuple(rest)), True, progress)
         if own.trials and own.before - own.trials[0].cost > (1.0 + PARTIAL) * (own.before - current.cost):
-            problem, current, name = _closest([problem], weight, split, [own], own.current)
-            waiting = [item for item in reversed(found[given:]) if item is not old]
-            found = [*(item for item in found if item is not old), name]
+            there, fitted, name = _closest([problem], weight, split, [own], own.current)
+            if not as_far_as_it_may(fitted, 1):
+                problem, current = there, fitted
+                waiting = [item for item in reversed(found[given:]) if item is not old]
+                found = [*(item for item in found if item is not old), name]
     return problem, found, current
 
 
