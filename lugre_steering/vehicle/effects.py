@@ -15,7 +15,7 @@ from lugre_steering.effects.registry import CATALOGUE, ORIGINS
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.schema import Reader, suggestion
 from lugre_steering.vehicle.sections import EffectEntry, Vehicle
-from lugre_steering.vehicle.size import Size, vehicle_size
+from lugre_steering.vehicle.size import RECALIBRATED, Size, vehicle_size
 
 OF_CYLINDERS = frozenset({"arm", "line"})
 """Hooks that nothing reads where the torque itself is measured."""
@@ -71,7 +71,8 @@ def _check_machine(vehicle: Vehicle, effect: Effect, fail: Fail) -> None:
 def _range(vehicle: Vehicle, parameter: Parameter) -> tuple[float, float]:
     """What a value may be. Of what has the size of a machine that is no vehicle only the sign is known beforehand."""
     if vehicle.contact is None:
-        return vehicle_size(vehicle).range_of(parameter)
+        ranges = [vehicle_size(vehicle, times).range_of(parameter) for times in (1.0 / RECALIBRATED, RECALIBRATED)]
+        return min(low for low, _ in ranges), max(high for _, high in ranges)
     low, high = parameter.low, parameter.high
     if _OTHER[vehicle.coordinate.unit].of(parameter.unit) == 1.0:
         return low, high

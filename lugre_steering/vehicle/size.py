@@ -22,6 +22,9 @@ AXIS_ACCELERATION = 10.0
 SPARE = 5.0
 """By how much the torque of a rig is overstated, so that ranges written for a vehicle, which rests on friction, are wide enough for it."""
 
+RECALIBRATED = 2.0
+"""By how much recalibration may move the friction of a vehicle: its file holds what was found when it was that much more or less."""
+
 _DIMENSIONS = {"N m": (1, 0), "rad": (0, 1), "W": (1, 1), "J": (1, 1), "kg m2": (1, -1)}
 """Exponents of torque and angle; power and energy are torque times angle, so a linear axis has them right too."""
 _UNIT = re.compile(r"(N m|kg m2|rad|W|J)(?![A-Za-z])(?:\^?(\d))?")
@@ -70,12 +73,12 @@ def decade(value: float, reference: float) -> float:
     return 10.0 ** round(math.log10(value / reference)) if 0.0 < value < math.inf else 1.0
 
 
-def vehicle_size(vehicle: Vehicle) -> Size:
-    """Size of a vehicle as its sheet tells: by the sliding friction of one track."""
+def vehicle_size(vehicle: Vehicle, times: float = 1.0) -> Size:
+    """Size of a vehicle as its sheet tells: by the sliding friction of one track, or so many times that."""
     axle, track, friction = vehicle.axle, vehicle.track, vehicle.friction
     if axle is None or track is None or friction is None or friction.coulomb is None:
         return VEHICLE
-    return Size(decade(friction.coulomb * load_moment(axle, track), FRICTION_NM), tracked=True)
+    return Size(decade(times * friction.coulomb * load_moment(axle, track), FRICTION_NM), tracked=True)
 
 
 def acceleration_unit(vehicle: Vehicle) -> float:

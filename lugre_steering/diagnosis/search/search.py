@@ -47,8 +47,10 @@ from lugre_steering.fitting.split import Split
 from lugre_steering.fitting.trial import PARTIAL, TRIAL_TOLERANCE, Round, Trial, ranked, refine, without_part
 from lugre_steering.recording import Array
 
-MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS, EXCHANGES = 3, 6, 3, 3
+MAX_EFFECTS, MOST_RIVALS, FINGERPRINTS = 3, 6, 3
 """Most names, most rivals told of one, and how many of the best fingerprints are tried in place of what every joint has."""
+EXCHANGES = 3
+"""How often, on the average, each name is looked for anew at most."""
 HOPELESS = 0.3
 """Share of the energy needed below which no closer look is taken."""
 REST = 0.05
