@@ -338,6 +338,36 @@ def test_a_stand_in_that_was_chosen_first_is_exchanged_for_what_is_there(slower:
         assert (found == names) == stays
 
 
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_a_name_that_an_exchange_makes_superfluous_goes(slower: Problem, monkeypatch: pytest.MonkeyPatch, exchanged: bool) -> None:
+    """A loss of the wrong power stands beside a load, and goes where the right one comes in place of that."""
+    first, right = effect("line_loss_linear", b=2e4), effect("line_loss_quadratic", c=2e5)
+    other = effect("kingpin_jacking", amplitude=400.0)
+    hidden = with_torque(slower, slower.predict_all(slower.start(), [right, other] if exchanged else [first, other]))
+
+    def named(one: tuple[Candidate, dict[str, float]]) -> search.Found:
+        score = Score(one[0], 1.0, 1.0, 0.0, 1.0, (1.0,), np.ones(4))
+        return search.Found(score, (), (trial.Trial(score, fit(hidden, weight(hidden), [one]), 0.0),), 1e3)
+
+    def step(_: object, current: Fit, names: Sequence[search.Found], weight: Array, *__: object) -> search._Step | None:
+        both = [first, other][: len(names) + 1]
+        result = fit(hidden, weight, both, current.x[: hidden.nuisances])
+        done = len(names) == 2 or (names and names[0].score.candidate is right[0])
+        return None if done else search._Step(hidden, result, named(both[-1]), short=False)
+
+    def swap(there: Problem, _: object, weight: Array, __: object, found: Sequence[search.Found], current: Fit, *___: object) -> object:
+        if not exchanged:
+            return there, list(found), current
+        return hidden, [found[0], named(right)], fit(hidden, weight, [first, right], current.x[: hidden.nuisances])
+
+    monkeypatch.setattr(search, "_step", step)
+    monkeypatch.setattr(search, "_exchanged", swap)
+    monkeypatch.setattr(search, "_of_sensors", lambda *_: None)  # which would take it away at the end
+    monkeypatch.setattr(search, "_round", lambda problem, *_: propose.Proposal(problem, fit(problem, weight(problem)), (), []))
+    told = [item.score.candidate.effect.id for item in searched(hidden).found]
+    assert told == (["line_loss_quadratic"] if exchanged else ["line_loss_linear", "kingpin_jacking"])
+
+
 def test_a_name_does_not_go_because_its_own_bends_could_stand_in_for_it(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "BENT", 1.0)
     linear, slow = effect("line_loss_linear", b=2e4), effect("pressure_lag", tau=0.05)
