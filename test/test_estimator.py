@@ -468,6 +468,50 @@ def test_stray_stamps_of_one_side_do_not_wipe_the_model(ahead_s: int) -> None:
     assert torque_error(estimates, clean) < 0.01 * np.abs(clean["total"]).max()
 
 
+@pytest.mark.parametrize("ahead_ms", [500, 900, 1900, 9000])
+def test_one_stray_stamp_costs_one_sample(ahead_ms: int) -> None:
+    """Of a topic that both joints share."""
+    sound, at = messages(), T0 + 2000 * MS
+    stray = [(k, s + (ahead_ms * MS if s == at and k in (LEFT, RIGHT) else 0), v) for k, s, v in sound]
+    estimator, estimates, _ = feed(stray)
+    _, clean, _ = feed(sound)
+    assert rejected(estimator) == {"angle/left": {"time_jump": 1}, "angle/right": {"time_jump": 1}}
+    assert estimates.size == clean.size - 1
+    assert torque_error(estimates, clean) < 0.02 * np.abs(clean["total"]).max()
+
+
+@pytest.mark.parametrize("back_ms", [600, 1500, 1900])
+def test_a_clock_set_back_by_less_than_a_jump_costs_half_a_second(back_ms: int) -> None:
+    """So long it may be a sensor that catches up; from then on all samples are used."""
+    stream = [(k, s - (back_ms * MS if i > 3000 else 0), v) for i, (k, s, v) in enumerate(messages(12.0))]
+    estimator, estimates, _ = feed(stream)
+    assert estimator.restarts == 1
+    assert estimates.size == 1150
+
+
+def test_a_flood_of_old_samples_sets_no_clock_back() -> None:
+    """What a sensor sends once more, four tenths of a second of it at once, is refused."""
+    sound = messages()
+    k = next(i for i, m in enumerate(sound) if m[1] >= T0 + 3000 * MS)
+    old = [m for m in sound[:k] if m[1] > T0 + 2600 * MS and m[0] in (LEFT, RIGHT)]
+    estimator, estimates, _ = feed([*sound[:k], *old, *sound[k:]])
+    _, clean, _ = feed(sound)
+    assert estimator.restarts == 0
+    assert np.array_equal(estimates["total"], clean["total"])
+
+
+def test_heat_of_a_time_that_was_none_is_forgotten() -> None:
+    """Stamps an hour ahead for a second, then right again: the rubber has not cooled in that hour."""
+    hot = VEHICLE.replace(initial=dataclasses.replace(VEHICLE.initial, rubber_temperature_degC=60.0))
+    sound = [m for m in messages(12.0) if m[0] in (LEFT, RIGHT)]
+    false = [(k, s + (3_600_000 * MS if T0 + 4000 * MS < s < T0 + 5000 * MS else 0), v) for k, s, v in sound]
+    _, estimates, _ = feed(false, hot)
+    _, clean, _ = feed(sound, hot)
+    during = estimates["stamp_ns"] > T0 + 3_600_000 * MS
+    assert estimates["temperature"][during].max() < 40.0
+    assert estimates["temperature"][-1] == pytest.approx(clean["temperature"][-1], abs=1.0)
+
+
 def test_one_side_set_back_is_refused_until_its_clock_has_caught_up() -> None:
     stream = [(k, s - (2500 * MS if k == RIGHT and s >= T0 + 2000 * MS else 0), v) for k, s, v in messages()]
     estimator, estimates, _ = feed(stream)
@@ -528,7 +572,7 @@ def test_gap_is_counted_and_no_residual_is_interpolated_across_it() -> None:
     stream = [m for m in messages() if not (m[0] == MAIN_A and T0 + 2000 * MS < m[1] < T0 + 3000 * MS)]
     estimator, estimates, residuals = feed(stream)
     assert estimates.size == 600
-    assert rejected(estimator) == {"pressure/main_a": {"gap": 1}}
+    assert rejected(estimator) == {"pressure/main_a": {"time_jump": 1, "gap": 1}}  # the first sample after it had to be confirmed
     inside = (residuals["stamp_ns"] > T0 + 2010 * MS) & (residuals["stamp_ns"] < T0 + 2980 * MS)
     assert not inside.any()
     assert residuals["stamp_ns"].max() > T0 + 5900 * MS

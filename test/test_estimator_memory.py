@@ -52,7 +52,7 @@ def test_a_restart_of_a_second_is_as_if_a_second_of_samples_were_lost(tmp_path: 
     write_state(tmp_path / "state.json", VEHICLE, first.memory)
     second = Estimator(VEHICLE)
     second.resume(read_state(tmp_path / "state.json", VEHICLE, T0 + 11 * SECOND, 3600.0))
-    rows = steer(second, 1100, 1200)
+    rows = steer(second, 1101, 1200)  # after the silence, a stamp so far ahead had to be confirmed
     np.testing.assert_allclose([row["total"] for row in rows], [row["total"] for row in expected], rtol=1e-12)
     assert list(tmp_path.iterdir()) == [tmp_path / "state.json"]
     assert not (tmp_path / "state.json").stat().st_mode & 0o077  # for its user alone
@@ -297,4 +297,22 @@ def test_a_bristle_that_is_relaxed_but_for_noise_stays_so_and_one_that_is_rememb
     for i in range(20, 80):
         (row,) = again.push(0, T0 + i * 10_000_000, 0.4)[0]
         again.push(1, T0 + i * 10_000_000, 40.0)
+    first.push(0, T0 + 79 * 10_000_000, 0.4)  # a stamp so far ahead has to be confirmed
     assert row["total"] == pytest.approx(first.push(0, T0 + 80 * 10_000_000, 0.4)[0]["total"][0], abs=1e-9)
+
+
+def test_one_stray_torque_at_the_start_tells_nothing_of_the_bristle() -> None:
+    """Of a pressure, which has no other before it: what comes next shows that it was none."""
+    parked = [pressure for line in range(4) for pressure in ((line, 1e6 if line % 2 else 2e6),)]
+    totals = []
+    for stray in (1.0, 8.0):
+        estimator = Estimator(VEHICLE)
+        for i in range(100):
+            stamp_ns = T0 + i * 10_000_000
+            for line, pressure in parked:
+                estimator.push(2 + line, stamp_ns - 1_000_000, pressure * (stray if line == 0 and i == 0 else 1.0))
+            for side in (0, 1):
+                rows, _ = estimator.push(side, stamp_ns, 0.1)
+        totals.append(rows["total"][0])
+    assert totals[0] != 0.0
+    assert totals[1] == pytest.approx(totals[0], rel=0.05)

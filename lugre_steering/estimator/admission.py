@@ -29,6 +29,11 @@ from lugre_steering.recording import Kind
 HOTTEST_AIR_DEGC = 75.0
 """No air about a vehicle is warmer, or colder the other way; the one in a compartment is not what the tracks meet."""
 CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
+LEAD_PERIODS = 10
+"""A sample that comes later than so many periods of its channel, and than a gap, has to be confirmed: its stamp may be astray, and those
+that follow would all lie before it."""
+BACK_NS = 500_000_000
+"""Samples from the past for so long, in a row: the clock was set back. A sensor that catches up sends fewer."""
 
 
 REJECTED, ACCEPTED, JUMPED, RUNNING = range(4)
@@ -48,6 +53,7 @@ def _clear(ch):
     ch.head = 0
     ch.cursor = 0
     ch.wrong_from_ns = ch.wrong_until_ns = 0
+    ch.back_ns = ch.back_last_ns = 0
     ch.below = False
 
 
@@ -65,13 +71,31 @@ def _begin_side(core, side):
 
 
 @inner
-def _set_side_back(core, side):
-    """Forget the samples of one side. What it has been through stays, in doubt that which is trusted, but for the bristle."""
+def _keep_earlier(core, side, stamp_ns):
+    """The time of a side jumps forward to a stamp: keep what it was before, in case that this was no time."""
+    g = core.guard[side]
+    copy_row(core.earlier, side, core.state, side)
+    g.jumped_ns, g.jumped_to_ns = core.channels[side].last_ns, stamp_ns
+
+
+@inner
+def _comes_back(core, side, stamp_ns):
+    """Whether the time is again what it would be had it not jumped forward."""
+    c, g = core.config[0], core.guard[side]
+    return g.jumped_ns != 0 and abs(stamp_ns - g.jumped_ns - (core.channels[side].last_ns - g.jumped_to_ns)) < c.backward_jump_ns
+
+
+@inner
+def _set_side_back(core, side, stamp_ns):
+    """Forget the samples of one side. What it has been through stays, in doubt that which is trusted, but for the bristle; of a time that
+    was none only what was before it."""
     state, g, nothing = row(core.state, side, STATE), core.guard[side], core.nothing[0]
-    if g.shadow_ns != 0:
-        saturated = state.saturated
+    saturated = state.saturated
+    if _comes_back(core, side, stamp_ns):
+        copy_row(core.state, side, core.earlier, side)
+    elif g.shadow_ns != 0:
         copy_row(core.state, side, core.shadow, side)
-        state.saturated = saturated
+    state.saturated = saturated
     fastest = g.fastest
     core.motion[side], core.trust[side], core.guard[side] = nothing.motion, nothing.trust, nothing.guard
     g.fastest, g.set_back = fastest, state.started != 0.0
@@ -106,10 +130,10 @@ def restart(core, k):
 
 
 @inner
-def _set_back(core, k):
+def _set_back(core, k, stamp_ns):
     """Begin anew with the time of channel ``k``."""
     for side in range(core.motion.size):
-        _set_side_back(core, side)
+        _set_side_back(core, side, stamp_ns)
     _forget_samples(core, k)
 
 
@@ -171,16 +195,43 @@ def _suspect(ch, reason, stamp_ns, value):
 
 
 @inner
+def _farthest_ahead(c, ch):
+    """How far [ns] ahead of the last one the stamp of a sample is believed at once."""
+    if ch.period_ns == 0:
+        return c.forward_jump_ns
+    return min(c.forward_jump_ns, max(c.max_gap_ns, LEAD_PERIODS * ch.period_ns))
+
+
+@inner
+def _all_from_the_past(core, k, stamp_ns):
+    """Whether a sample from the past of angle channel ``k`` is one of so many in a row that the clock was set back: if there is another
+    side, it says so too."""
+    ch = core.channels[k]
+    follows = ch.back_ns != 0 and 0 < stamp_ns - ch.back_last_ns < CONFIRM_NS
+    ch.back_ns, ch.back_last_ns = ch.back_ns if follows else stamp_ns, stamp_ns
+    if ch.kind != Kind.ANGLE or stamp_ns - ch.back_ns < BACK_NS:
+        return False
+    for side in range(core.motion.size):
+        other = core.channels[side]
+        if other.last_ns != 0 and (other.back_ns == 0 or abs(stamp_ns - other.back_last_ns) >= CONFIRM_NS):
+            return False
+    return True
+
+
+@inner
 def _jump_in_time(core, k, stamp_ns, value, follows_suspect):
     """What a stamp far from the last one means: refused, a new beginning, or ``_GOES_ON``."""
-    ch = core.channels[k]
-    other_side = _other_side(core, k, stamp_ns) if ch.kind == Kind.ANGLE else _THERE
+    c, ch = core.config[0], core.channels[k]
+    far = stamp_ns < ch.last_ns or stamp_ns - ch.last_ns > c.forward_jump_ns
+    other_side = _other_side(core, k, stamp_ns) if far and ch.kind == Kind.ANGLE else _THERE
     if not follows_suspect or other_side == _DOUBTED:
         return _suspect(ch, JUMP, stamp_ns, value)
     if stamp_ns > ch.last_ns:
+        if ch.kind == Kind.ANGLE:
+            _keep_earlier(core, ch.index, stamp_ns)
         return _GOES_ON
     if other_side == _SHARED:
-        _set_back(core, k)
+        _set_back(core, k, stamp_ns)
         return ACCEPTED
     if ch.kind != Kind.ANGLE:
         _clear(ch)
@@ -267,6 +318,9 @@ def admit(core, k, stamp_ns, value):
     reason = _unusable(c, ch, stamp_ns, value)
     if reason != _SOUND:
         ch.reasons[reason] += 1
+        if reason == BACKWARD and _all_from_the_past(core, k, stamp_ns):
+            _set_back(core, k, stamp_ns)
+            return ACCEPTED
         if reason == ABSURD and ch.kind == Kind.ANGLE:
             core.guard[ch.index].calm = 0.0
             core.guard[ch.index].absurd = True
@@ -275,9 +329,10 @@ def admit(core, k, stamp_ns, value):
         ch.goes_below = ch.kind == Kind.PRESSURE and below_range(c, value)
         return ACCEPTED  # air may come as rarely as it likes, and no sample of it is needed at any instant
     verdict = _GOES_ON
+    ch.back_ns = 0
     follows_suspect = ch.suspect_ns != 0 and 0 < stamp_ns - ch.suspect_ns < CONFIRM_NS
     ahead = stamp_ns - ch.last_ns
-    if ahead < 0 or ahead > c.forward_jump_ns:
+    if ahead < 0 or ahead > _farthest_ahead(c, ch):
         verdict = _jump_in_time(core, k, stamp_ns, value, follows_suspect)
     # Only what may be a jump is worth the call: to hand over the whole core costs 0.1 us.
     if verdict == _GOES_ON and ch.kind == Kind.ANGLE and (

@@ -113,6 +113,8 @@ GUARD = np.dtype(
         ("begun", np.bool_),  # whether its bristle holds what the first torque has told (see ``unseen``)
         ("unseen_ns", np.int64),  # stamp of the end of unseen motion after which the bristle is not known yet; 0: it is
         ("set_back", np.bool_),  # it is not known because the clock was set back
+        ("jumped_ns", np.int64),  # stamp of the sample before the time last jumped forward; 0: it never did
+        ("jumped_to_ns", np.int64),  # stamp that it jumped to
         ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not
         ("frozen_at", np.float64),  # reading then [rad]
         ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault

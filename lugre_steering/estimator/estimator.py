@@ -106,6 +106,7 @@ def _process(core, first_line, channel, stamp_ns, value, rate, estimates, residu
         else:
             line = ch.index
             watch_line(ch, stamp_ns[i], value[i])
+            ch.period_ns = stamp_ns[i] - ch.last_ns if ch.last_ns != 0 else 0
             ch.last_ns = stamp_ns[i]
             core.line_ns[line, ch.head % core.line_ns.shape[1]] = stamp_ns[i]
             core.line_value[line, ch.head % core.line_ns.shape[1]] = value[i]
@@ -460,6 +461,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
         guard=np.zeros(sides, GUARD),
         nothing=np.zeros(1, [("motion", MOTION), ("trust", TRUST), ("guard", GUARD)]),
         shadow=rows_of(np.zeros(sides, composition.state)),
+        earlier=rows_of(np.zeros(sides, composition.state)),
         bounds=rows_of(np.zeros(2 * sides, composition.state)),
         released=np.zeros(sides),
         output=np.zeros(sides, OUTPUT),

@@ -56,6 +56,8 @@ CONFIG = np.dtype(
         ("horizon", np.float64),
         ("start_ns", np.int64),
         ("start_known", np.bool_),  # whether it has been seen, or is remembered, what the bristles held at the start
+        ("start_residual", np.float64),  # the first residual [N m], until the next one is believed too, and its stamp
+        ("start_residual_ns", np.int64),
         ("start_share", np.float64),  # of what they can hold, where that differs from the estimate
         ("begin_ns", np.int64),  # stamp from which on they hold it; 0: nothing differs
         ("lagged", np.float64),
@@ -113,6 +115,8 @@ CHANNEL = np.dtype(
         ("repeats", np.float64),  # share of samples of late that were equal to the one before
         ("still", np.int64),  # samples equal to the one before, in a row
         ("still_ns", np.int64),  # stamp of the first of them
+        ("back_ns", np.int64),  # stamp of the first of the samples in a row, up to the last one, that came from the past; 0: it did not
+        ("back_last_ns", np.int64),  # stamp of the last of them
         ("lived", np.int64),  # readings of a line that differed from the one before
         ("frozen", np.bool_),  # a line whose readings hardly ever repeat has given the same one for a while
         ("below", np.bool_),  # the last reading of a line was refused as below its range
@@ -166,6 +170,8 @@ class Core(NamedTuple):
     nothing: Records
     """What motion, trust and guard are before anything was seen; never written."""
     shadow: Array
+    earlier: Array
+    """States of the sides before their time last jumped forward."""
     bounds: Array
     released: Array
     output: Records

@@ -18,13 +18,13 @@ Memory = Mapping[str, Any]
 """Per side ``stamp_ns`` and ``angle`` [rad] of its last sample, the fastest rate [rad/s] that it has shown, whether its bristle is
 not known after unseen motion, the records ``state`` and ``motion``; JSON can hold it."""
 
-_STATES = ("state", "shadow", "bounds")
+_STATES = ("state", "shadow", "earlier", "bounds")
 _HANDED_OVER = (
     "motion", "trust", "guard", "output", "waiting", "pending", "line_ns", "line_value", "plan_ns", "plan_theta", "released",
 )  # fmt: skip
 _ONGOING = (
-    "start_ns", "start_known", "start_share", "begin_ns", "lagged", "lag_input", "lagged_ns", "pending_first",
-    "pending_count", "plan_size", "plan_refused_ns", "swing_ns", "swing_from", "residual_ns", "agreed_ns",
+    "start_ns", "start_known", "start_residual", "start_residual_ns", "start_share", "begin_ns", "lagged", "lag_input",
+    "lagged_ns", "pending_first", "pending_count", "plan_size", "plan_refused_ns", "swing_ns", "swing_from", "residual_ns", "agreed_ns",
     "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now", "beyond",
     "released_ns", "weight", "message",
 )  # fmt: skip

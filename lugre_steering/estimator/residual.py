@@ -52,8 +52,11 @@ def form_residuals(core, first_line, residuals, count):
             continue
         measured, believed = measured_torque(core, e, value), believed_at(core, at_ns)
         look_for_exchange(core, e, at_ns, value, measured)
-        if believed and c.exchanged == 0 and not c.start_known:
-            learn_start(core, e.stamp_ns, measured - e.predicted)
+        if not c.start_known:
+            if believed and c.exchanged == 0:
+                learn_start(core, e.stamp_ns, measured - e.predicted)
+            else:
+                c.start_residual_ns = 0
         if before_start(c, e.stamp_ns):
             continue
         # As well of a line that has jumped: that the torque is not what it should be is told, though not shown.

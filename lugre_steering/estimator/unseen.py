@@ -94,18 +94,22 @@ def drive_bounds(core, side, dt):
 def learn_start(core, stamp_ns, residual):
     """The first measured torque is ``residual`` [N m] more than the estimate of that instant: how much bristles held at the start.
 
-    All sides hold the same share of what they can, as one torque does not tell them apart.
+    Pressures tell only by their next samples whether the first ones were astray, so it is believed at the next residual. All sides hold
+    the same share of what they can, as one torque does not tell them apart.
     """
     c, most = core.config[0], 0.0
-    c.start_known = True
-    if abs(residual) <= AGREED_SHARE * c.friction:
+    first, first_ns = c.start_residual, c.start_residual_ns
+    if first_ns == 0:
+        c.start_residual, c.start_residual_ns = residual, stamp_ns
+        c.start_known = abs(residual) <= AGREED_SHARE * c.friction
         return
+    c.start_known = True
     for side in range(core.motion.size):
         p = row(core.parameters, side, BASELINE)
         most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, p.rubber_temperature)[0]
     if most > 0.0:
-        c.start_share = max(-1.0, min(1.0, residual / most))
-        c.begin_ns = stamp_ns + BEGIN_NS
+        c.start_share = max(-1.0, min(1.0, first / most))
+        c.begin_ns = first_ns + BEGIN_NS
 
 
 @inner
@@ -120,5 +124,5 @@ def begin_held(core, side):
 
 @inner
 def before_start(c, stamp_ns):
-    """Whether the bristles of that time did not hold yet what they do."""
-    return c.begin_ns != 0 and stamp_ns < c.begin_ns + int(SETTLED_LAGS * c.lag * 1e9)
+    """Whether the bristles of that time did not hold yet what they do, or that is not known."""
+    return not c.start_known or (c.begin_ns != 0 and stamp_ns < c.begin_ns + int(SETTLED_LAGS * c.lag * 1e9))
