@@ -468,7 +468,7 @@ def test_stray_stamps_of_one_side_do_not_wipe_the_model(ahead_s: int) -> None:
     assert torque_error(estimates, clean) < 0.01 * np.abs(clean["total"]).max()
 
 
-@pytest.mark.parametrize("ahead_ms", [500, 900, 1900, 9000])
+@pytest.mark.parametrize("ahead_ms", [600, 900, 1900, 9000])
 def test_one_stray_stamp_costs_one_sample(ahead_ms: int) -> None:
     """Of a topic that both joints share."""
     sound, at = messages(), T0 + 2000 * MS

@@ -69,6 +69,20 @@ def test_the_watch_learns_tells_once_and_knows_since_when() -> None:
     assert since_s == pytest.approx(1500.0, abs=60.0)
 
 
+def test_a_change_that_lasts_is_not_what_is_usual_and_is_over_when_it_is_mended() -> None:
+    watch, rng = Watch(VEHICLE), np.random.default_rng(5)
+    unlike = []
+    for i in range(50_000):
+        t = 0.15 * i
+        watch.turned(0.3 * math.sin(0.9 * t))
+        watch.add(T0 + round(t * 1e9), (2000.0 if 1000.0 < t < 6900.0 else 400.0) * float(rng.standard_normal()))
+        unlike.append(watch.since_ns != 0)
+    told = 0.15 * np.flatnonzero(unlike)
+    assert told.min() == pytest.approx(1050.0, abs=50.0)
+    assert told.size == pytest.approx((told.max() - told.min()) / 0.15, abs=2)  # all the time, though it is five times as long
+    assert told.max() == pytest.approx(7000.0, abs=100.0)
+
+
 def test_a_standing_vehicle_is_not_judged() -> None:
     watch, rng = Watch(VEHICLE), np.random.default_rng(4)
     for i in range(20_000):

@@ -29,9 +29,9 @@ from lugre_steering.recording import Kind
 HOTTEST_AIR_DEGC = 75.0
 """No air about a vehicle is warmer, or colder the other way; the one in a compartment is not what the tracks meet."""
 CONFIRM_NS = 1_000_000_000  # a sample this soon after a suspect one can confirm it
-LEAD_PERIODS = 10
-"""A sample that comes later than so many periods of its channel, and than a gap, has to be confirmed: its stamp may be astray, and those
-that follow would all lie before it."""
+LEAD_NS, LEAD_PERIODS = 500_000_000, 10
+"""A sample so far ahead of the last one, and so many periods of its channel, has to be confirmed: its stamp may be astray, and those that
+follow would all lie before it."""
 BACK_NS = 500_000_000
 """Samples from the past for so long, in a row: the clock was set back. A sensor that catches up sends fewer."""
 
@@ -199,7 +199,7 @@ def _farthest_ahead(c, ch):
     """How far [ns] ahead of the last one the stamp of a sample is believed at once."""
     if ch.period_ns == 0:
         return c.forward_jump_ns
-    return min(c.forward_jump_ns, max(c.max_gap_ns, LEAD_PERIODS * ch.period_ns))
+    return min(c.forward_jump_ns, max(LEAD_NS, LEAD_PERIODS * ch.period_ns))
 
 
 @inner

@@ -121,7 +121,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         """Outputs to zero and silent; the state goes on."""
         assert self.session is not None
         self.session.deactivate()
-        self.save()
+        self._begin_saving()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -198,7 +198,8 @@ class SteeringTorqueEstimator(LifecycleNode):
         if session is None:
             if waited_s >= REPORT_S:
                 self._reported_ns = now_ns
-                self._diagnose([DiagnosticStatus(level=DiagnosticStatus.WARN, name=f"{NODE}: outputs", message="not configured")])
+                name = f"{self.get_name()}: outputs"
+                self._diagnose([DiagnosticStatus(level=DiagnosticStatus.WARN, name=name, message="not configured")])
             return
         session.tick()
         self._ticks = (self._ticks + 1) % LOOK_TICKS
@@ -254,10 +255,8 @@ class SteeringTorqueEstimator(LifecycleNode):
         self._reporting = None
         self._diagnose(self._statuses)
         self._console.tell(self._statuses, (monotonic_ns - self._began_ns) * 1e-9)
-        due = monotonic_ns - self._saved_ns >= self.settings.state_period_s * 1e9
-        if due and (self._writer is None or not self._writer.is_alive()):
-            self._writer = threading.Thread(target=self._to_write(), daemon=True)  # a disk may be slow
-            self._writer.start()
+        if monotonic_ns - self._saved_ns >= self.settings.state_period_s * 1e9:
+            self._begin_saving()
         return False
 
     def _diagnose(self, statuses: list[DiagnosticStatus]) -> None:
@@ -355,6 +354,12 @@ class SteeringTorqueEstimator(LifecycleNode):
         if self._writer is not None:
             self._writer.join()
         self._to_write()()
+
+    def _begin_saving(self) -> None:
+        """Write the state file in a thread, unless it is being written: a disk may be slow."""
+        if self._writer is None or not self._writer.is_alive():
+            self._writer = threading.Thread(target=self._to_write(), daemon=True)
+            self._writer.start()
 
     def _to_write(self) -> Callable[[], None]:
         """What writes the present state, if there is to be a file and anything to keep; a failure is told, not raised."""

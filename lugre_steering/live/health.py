@@ -25,6 +25,8 @@ RESIDUAL_SECONDS = 10
 SHEET_SECONDS = 60
 PERIOD_S = 0.5
 """Rates and levels are taken over at least so long, however soon after the last one a report comes."""
+AIR_LOST_S = 600.0
+"""No sensor of the air's temperature says nothing for so long, however slow it is."""
 FAR_NS = 10_000_000_000
 """A clock that is wrong by more than that is another clock."""
 OTHER_CLOCK = "is use_sim_time to be set, or a bag played at another rate?"
@@ -59,8 +61,9 @@ class Latencies:
 class Health:
     """Arrivals, latencies, residual level and faults; all cheap to update in a callback."""
 
-    def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int) -> None:
-        self._node = NODE
+    def __init__(self, vehicle: Vehicle, angle_timeout_s: float, pressure_timeout_s: float, window: int, node: str = NODE) -> None:
+        """``node``: its name."""
+        self._node = node
         self.active = True
         self.leaving = False
         self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
@@ -233,8 +236,11 @@ class Health:
             values[f"{label} age [s]"] = age_s
             if self.arrivals[i]:
                 values[f"{label} stamp behind clock [s]"] = self.behind_ns[i] * 1e-9
-            if self._kinds[i] is Kind.AIR_TEMPERATURE:
-                continue  # optional and slow
+            if self._kinds[i] is Kind.AIR_TEMPERATURE:  # optional and slow
+                if self.arrivals[i] and not age_s <= AIR_LOST_S:
+                    having.setdefault(STALE, []).append(label)
+                    level = max(level, WARN)
+                continue
             if not 0.0 <= age_s <= self._timeouts_s[i]:
                 having.setdefault(STALE if self.arrivals[i] else "missing", []).append(label)
                 level = max(level, ERROR if self._kinds[i] is Kind.ANGLE else WARN)

@@ -29,7 +29,8 @@ from lugre_steering.vehicle import Vehicle
 
 PLAN_SHARE = 0.1
 PLAN_BURST_S = 0.02
-"""Of the time so much, at most, goes into plans, and so much at once: what comes beyond is refused, and the next one is heard."""
+"""Of the time so much, at most, goes into plans, and so much at once: what comes beyond is not read, and the plan in force stays until the
+next one that is, some hundredths of a second later."""
 SECOND_NS = 1_000_000_000
 
 _SCALARS: Mapping[Kind, tuple[type, Callable[[Any], float]]] = {
@@ -59,7 +60,7 @@ class Inputs:
         self._set_plan, self._refuse_plan = set_plan, refuse_plan
         self._joints = [getattr(vehicle.topics, f"{side}_joint") for side in vehicle.sides]
         self._frames: dict[int, str] = {}  # of the first message of each channel
-        self._spent_s, self._spent_at = 0.0, 0.0  # time that plans have taken of late, and when that was so (monotonic)
+        self._spent_s, self._spent_at = 0.0, 0.0  # processor time that plans have taken of late, and when that was so (monotonic)
         overrides = QoSOverridingOptions.with_default_policies()
 
         def subscribe(message: type, topic: str, handle: Callable[..., None], raw: bool = False) -> Any:
@@ -152,11 +153,11 @@ class Inputs:
         return int(stamp.sec * SECOND_NS + stamp.nanosec)
 
     def _command(self, raw: bytes) -> None:
-        begin = time.monotonic()
-        self._spent_s = max(0.0, self._spent_s - PLAN_SHARE * (begin - self._spent_at))
-        self._spent_at = begin
+        now, begin = time.monotonic(), time.thread_time()
+        self._spent_s = max(0.0, self._spent_s - PLAN_SHARE * (now - self._spent_at))
+        self._spent_at = now
         if self._spent_s > PLAN_BURST_S:
-            self._refuse("too many to read them all")
+            self._health.unused[f"{COMMAND}: too many to read them all"] += 1
             return
         try:
             if len(raw) > PLAN_BYTES:
@@ -169,7 +170,7 @@ class Inputs:
         except DataError as error:
             self._refuse(str(error))
         finally:
-            self._spent_s += time.monotonic() - begin
+            self._spent_s += time.thread_time() - begin
 
     def _refuse(self, reason: str) -> None:
         self._health.unused[f"{COMMAND}: {reason}"] += 1

@@ -6,7 +6,7 @@ message."""
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,7 +87,7 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
     given["vehicle_file"] = Path(given["vehicle_file"])
     given["effects_files"] = tuple(Path(name) for name in given["effects_files"].split(os.pathsep) if name)
     given["watch_folder"] = Path(given["watch_folder"]) if given["watch_folder"] else None
-    if given["watch_folder"] is not None and not given["watch_folder"].is_dir():
+    if given["watch_folder"] is not None and not _there(given["watch_folder"].is_dir):
         raise ParameterError(f"parameter 'watch_folder': got '{given['watch_folder']}', expected a folder that is there, or nothing")
     given["state_file"] = Path(given["state_file"]) if given["state_file"] else None
     return Settings(**given, options=Options(**{parameter.name: values[parameter.name] for parameter in OPTION_TABLE}))
@@ -98,14 +98,22 @@ def undeclared(node: Node) -> list[str]:
     return sorted(name for name in node._parameter_overrides if name.startswith(QOS) and not node.has_parameter(name))
 
 
+def _there(check: Callable[[], bool]) -> bool:
+    """What a check of a path says; no for one that cannot be, or that may not be looked at."""
+    try:
+        return check()
+    except OSError:
+        return False
+
+
 def check_files(settings: Settings, names: Collection[str]) -> None:
     """``ParameterError`` if one of the newly named files cannot be what it is to be."""
-    if "vehicle_file" in names and not settings.vehicle_file.is_file():
+    if "vehicle_file" in names and not _there(settings.vehicle_file.is_file):
         raise ParameterError(f"parameter 'vehicle_file': got '{settings.vehicle_file}', expected a vehicle file that is there")
     file = settings.state_file
     if "state_file" in names and file is not None:
-        irregular = file.exists() and not file.is_file()
-        if irregular or not file.parent.is_dir() or not os.access(file.parent, os.W_OK | os.X_OK):
+        irregular = _there(file.exists) and not _there(file.is_file)
+        if irregular or not _there(file.parent.is_dir) or not os.access(file.parent, os.W_OK | os.X_OK):
             raise ParameterError(f"parameter 'state_file': got '{file}', expected a file in a folder that can be written, or nothing")
 
 

@@ -23,7 +23,7 @@ from lugre_steering.live.inputs import Inputs
 from lugre_steering.live.outputs import Outputs
 from lugre_steering.live.parameters import Settings
 from lugre_steering.provenance import source
-from lugre_steering.recording import Array, IntArray
+from lugre_steering.recording import COMMAND, Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.watch import detector
 from lugre_steering.watch.detector import Watch
@@ -52,7 +52,7 @@ class Session:
         tell_compiling(node.get_logger().info)
         warm_up(vehicle, settings.options)
         self.estimator = Estimator(vehicle, settings.options)
-        self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window)
+        self.health = Health(vehicle, settings.angle_timeout_s, settings.pressure_timeout_s, latency_window, node.get_name())
         self.outputs = Outputs(node, vehicle, settings, self.estimator.rate_limit)
         self.watch = Watch(vehicle)
         self.samples = SampleRing() if settings.watch_folder is not None else None
@@ -177,6 +177,8 @@ class Session:
     def _set_plan(self, plan: Callable[[int], tuple[IntArray, Array]]) -> None:
         latest_ns = max(self.estimator.latest_ns[f"angle/{side}"] for side in self.vehicle.sides)
         self.estimator.set_plan(*plan(latest_ns))
+        if self.settings.options.feed_forward_horizon_s == 0.0:
+            self.health.unused[f"{COMMAND}: not looked at, as 'feed_forward_horizon_s' is 0"] += 1
 
     def _refuse_plan(self) -> None:
         self.estimator.refuse_plan()

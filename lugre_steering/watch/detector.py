@@ -6,8 +6,8 @@ A manoeuvre is a stretch of motion over ``MANOEUVRE`` breakaway angles; standing
 of the root mean square and of the largest residual, and the mean residual in the direction of motion as a share of the static
 friction: more error, a kick at some place, another level. What is usual of each (level, scatter and the memory of one manoeuvre for
 the next) is learned from the machine itself: robustly, from the latest ``KEPT`` manoeuvres but for the newest ``LAG``, which an onset
-may already have spoiled. The squares of the innovations, cut at ``CUT`` standard deviations, go into a cumulative sum (Page 1954,
-Biometrika 41, 100-115), which forgets ``SLACK`` a manoeuvre.
+may already have spoiled, and nothing while the model does not match. The squares of the innovations, cut at ``CUT`` standard
+deviations, go into a cumulative sum (Page 1954, Biometrika 41, 100-115), which forgets ``SLACK`` a manoeuvre.
 
 How often it speaks although nothing has changed is measured, not computed: ``python -m lugre_steering.bench watch``.
 """
@@ -36,6 +36,8 @@ LEAST_SCATTER = (0.1, 0.01, 0.1)
 """A tenth more or less error, or a hundredth of the friction, is never unusual."""
 THRESHOLD = 40.0
 """Of the cumulative sum, for one false alarm in about 1000 h; see ``bench watch``."""
+MOST = 2.0
+"""Times the threshold that the sum reaches at most, so that some dozens of manoeuvres as usual end an alarm."""
 
 RING = KEPT + LAG
 STATE = np.dtype(
@@ -47,6 +49,8 @@ STATE = np.dtype(
         ("memory", np.float64, (SCORES,)),
         ("sum", np.float64),
         ("raised", np.int64),  # manoeuvres since the sum left zero
+        ("held", np.bool_),  # the model does not match: what comes is not what is usual
+        ("last", np.float64, (SCORES,)),
     ]
 )
 
@@ -71,18 +75,20 @@ def _learn(s):
 @njit(cache=True)
 def weigh(s, scores):
     """The cumulative sum after the scores of one more manoeuvre; 0 while the usual is not known."""
-    now, before = s.count % RING, (s.count - 1) % RING
+    if not s.held:
+        for k in range(SCORES):
+            s.scores[s.count % RING, k] = scores[k]
+        s.count += 1
+        if s.count == LEARN or (s.count > LEARN and s.count % AGAIN == 0):
+            _learn(s)
+    squares, known = 0.0, s.count >= LEARN
     for k in range(SCORES):
-        s.scores[now, k] = scores[k]
-    s.count += 1
-    if s.count < LEARN:
+        if known:
+            innovation = scores[k] - s.level[k] - s.memory[k] * (s.last[k] - s.level[k])
+            squares += min(CUT**2, innovation**2 / (s.scatter[k] ** 2 * (1.0 - s.memory[k] ** 2)))
+        s.last[k] = scores[k]
+    if not known:
         return 0.0
-    if s.count == LEARN or s.count % AGAIN == 0:
-        _learn(s)
-    squares = 0.0
-    for k in range(SCORES):
-        innovation = s.scores[now, k] - s.level[k] - s.memory[k] * (s.scores[before, k] - s.level[k])
-        squares += min(CUT**2, innovation**2 / (s.scatter[k] ** 2 * (1.0 - s.memory[k] ** 2)))
     s.sum = max(0.0, s.sum + squares / SCORES - SLACK)
     s.raised = s.raised + 1 if s.sum > 0.0 else 0
     return s.sum
@@ -143,11 +149,14 @@ class Watch:
     def _judge(self, stamp_ns: int, scores: tuple[float, ...]) -> bool:
         state = self._state[0]
         level = float(weigh(state, scores))
+        state["sum"] = min(level, MOST * self._threshold)
         self._begins = [*self._begins[-RING:], stamp_ns]
         if level == 0.0:
             self.since_ns = 0
         elif level > self._threshold and not self.since_ns:
             raised = min(int(state["raised"]), len(self._begins) - 1)
             self.since_ns = self._begins[-1 - raised]
+            state["held"] = True
             return True
+        state["held"] = self.since_ns != 0
         return False

@@ -266,6 +266,7 @@ def test_commands_stay_silent_on_stale_inputs_and_come_back_without_a_jump() -> 
         before, last = len(commands), list(commands[-1].data)
         time.sleep(timeout_s + 0.5)  # nothing comes in: nothing goes out
         assert len(commands) == before
+        steady.pairs -= 1  # the first stamp after it has to be confirmed
 
         steady.angle = 0.25
         steer_until_the_ramp_is_over()
@@ -369,6 +370,15 @@ def test_silence_of_all_pressures_is_told_as_what_it_means() -> None:
         assert status.level == WARN
         values = {pair.key: pair.value for pair in status.values}
         assert ("no measured torque" in values.get("plausibility", "")) == (len(silent) == 4)
+
+
+@pytest.mark.parametrize(("silent_s", "told"), [(599, False), (601, True)])
+def test_an_air_temperature_that_has_come_and_comes_no_more_is_told(silent_s: int, told: bool) -> None:
+    health, now_ns = Health(load(VEHICLE), 0.2, 0.5, 16), 1000 * SECOND
+    labels = {f"input {i}": {"accepted": 0} for i in range(7)}
+    health.arrivals, health.arrived_ns = [1] * 7, [now_ns] * 6 + [now_ns - silent_s * SECOND]
+    status = next(health.statuses(now_ns, 1, 1.0, labels, 0))
+    assert ("input 6 stale" in status.message) == told
 
 
 def test_a_pressure_line_that_is_not_believed_is_told_by_its_name() -> None:

@@ -19,6 +19,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import WrenchStamped
 from live_harness import OWN_DOMAIN, PATIENCE_S, VEHICLE
 from rclpy.executors import SingleThreadedExecutor
@@ -210,6 +211,7 @@ def test_a_feed_forward_that_is_no_number_is_withheld_and_told_while_the_torque_
 
 def test_plans_of_rubbish_and_a_flood_of_them_are_told_and_cost_nothing(node: SteeringTorqueEstimator) -> None:
     node.start()
+    steer(node)
     assert node.session is not None
     unused = node.session.health.unused
     publisher = node.create_publisher(JointTrajectory, "steering/command", 10)
@@ -219,9 +221,12 @@ def test_plans_of_rubbish_and_a_flood_of_them_are_told_and_cost_nothing(node: St
         return bool(unused[f"steering/command: {reason}"])
 
     spin_until(node, lambda: sent(b"\0\1\0\0" + b"\xff" * 60, "malformed"))
-    points = [JointTrajectoryPoint(positions=[ANGLE, ANGLE]) for _ in range(1000)]
+    points = [JointTrajectoryPoint(positions=[ANGLE, ANGLE], time_from_start=Duration(sec=i)) for i in range(1000)]
     flood = JointTrajectory(joint_names=["left_track_steer_joint", "right_track_steer_joint"], points=points)
     spin_until(node, lambda: sent(flood, "too many to read them all"))
+    plan = node.session.estimator._core.config[0]
+    assert (plan["plan_size"], plan["plan_refused_ns"]) == (1000, 0)  # that not all are read says nothing against the last one
+    assert unused["steering/command: not looked at, as 'feed_forward_horizon_s' is 0"] > 0
     assert not node.session.health.exceptions
 
 
@@ -231,7 +236,8 @@ def test_a_parameter_is_changed_to_what_it_may_be_or_not_at_all(node: SteeringTo
     (result,) = node.set_parameters([Parameter("when_stale", value="perhaps")])
     assert not result.successful
     assert "expected one of silent, zero" in result.reason
-    for name, value in (("vehicle_file", "/none.yaml"), ("state_file", "/none/s.json"), ("state_file", str(VEHICLE.parent))):
+    files = ("vehicle_file", "/none.yaml"), ("vehicle_file", "v" * 300), ("state_file", "/none/s.json"), ("state_file", str(VEHICLE.parent))
+    for name, value in files:
         (result,) = node.set_parameters([Parameter(name, value=value)])
         assert not result.successful
         assert f"parameter '{name}': got '{value}', expected a" in result.reason
