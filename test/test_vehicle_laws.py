@@ -92,5 +92,5 @@ def test_widths_of_nothing_make_jumps_without_a_word(form: str, values: dict[str
 
 
 def test_too_many_laws_are_refused() -> None:
-    with pytest.raises(VehicleFileError, match=r"laws.*at most 8"):
-        made(*[LAW] * 9)
+    with pytest.raises(VehicleFileError, match=r"laws.*at most 16"):
+        made(*[LAW] * 17)

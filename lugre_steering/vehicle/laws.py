@@ -8,14 +8,14 @@ from lugre_steering.effects.law_entry import check_law
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.sections import Vehicle
 
-MOST_LAWS = 8
+MOST_IN_FILE = 16
 THERMAL = ("rubber_temperature", "air_temperature")
 
 
 def check_laws(vehicle: Vehicle, reader: Reader) -> None:
     """Refuse laws that mean nothing, by file and key."""
-    if len(vehicle.laws) > MOST_LAWS:
-        raise reader.fail("laws", f"{len(vehicle.laws)} laws", f"at most {MOST_LAWS}")
+    if len(vehicle.laws) > MOST_IN_FILE:
+        raise reader.fail("laws", f"{len(vehicle.laws)} laws", f"at most {MOST_IN_FILE}")
     for i, entry in enumerate(vehicle.laws):
         check_law(entry, reader, f"laws[{i}]")
         if entry.coordinate in THERMAL and vehicle.rubber is None:

@@ -28,6 +28,7 @@ from lugre_steering.fitting.problem import Candidate, Problem, Values
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import LawEntry
+from lugre_steering.vehicle.laws import MOST_IN_FILE
 
 LINEARISATIONS, KNOTS = 4, 257
 """Of the fit in the chain, which begins where the linear freedoms end; knots of a written law, near enough for the presliding."""
@@ -81,6 +82,8 @@ def _formed(
     before = MOST_LAWS if laws else 0
     sought = _with_places(there.problem, before + len(shapes), names).doubted(there.problem.doubt, there.problem.typical)
     form = _laws(sought, shapes, linear.x[first_bend:], before)
+    if len(there.problem.vehicle.laws) + len(laws) + len(form) > MOST_IN_FILE:
+        return None
     start = linear.x[:first_bend]
     inside = fit(sought, there.fitted, [*names, *form, *laws], start, linearisations=LINEARISATIONS, tolerance=TRIAL_TOLERANCE)
     problem, free = _with_places(done.problem, before + len(shapes), names), len(names) + len(form)

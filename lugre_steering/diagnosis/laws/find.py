@@ -21,6 +21,7 @@ from lugre_steering.fitting.doubt import doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.problem import Effects, Problem, is_rig
 from lugre_steering.recording import Array
+from lugre_steering.vehicle.laws import MOST_IN_FILE
 
 MOST_LAWS = 2
 SHORTLIST, CLOSE, SIMPLIFIED, TRIED = 8, 0.75, 3, 16
@@ -63,7 +64,8 @@ class FoundLaws:
     """Laws that stand, in ``fit`` (all valid data) of ``problem``, which has places for them, after the names that they stand beside;
     ``judged`` on samples held out, against these alone.
 
-    ``gains``: energy that each took away when it was added; ``ties``: laws that fit as well as the first; ``bar``: the largest gain
+    ``heldout``: share of what is missing of held-out data without it that each foretells; ``gains``: energy that each took away when it
+    was added; ``ties``: laws that fit as well as the first; ``bar``: the largest gain
     in errors that hide nothing; ``foretold``: energy of blocks left out that they take together; ``ceiling``: that which a smooth function
     of all coordinates takes in their place, if it is more.
     """
@@ -72,6 +74,7 @@ class FoundLaws:
     fitted: Fit
     fit: Fit
     judged: verify.Judged
+    heldout: tuple[float, ...]
     gains: tuple[float, ...]
     ties: tuple[Tried, ...]
     bar: float
@@ -108,7 +111,7 @@ def find(
     ties: tuple[Tried, ...] = ()
     x = np.append(before.x, np.zeros(sought.nuisances - before.x.size))
     current, first_bar, ceiling = fit(sought, weight, before.effects, x), 0.0, 0.0
-    for index in range(MOST_LAWS):
+    for index in range(min(MOST_LAWS, MOST_IN_FILE - len(problem.vehicle.laws))):
         place = len(problem.vehicle.laws) + index
         progress("screening laws" if not index else "screening for a second law")
         screen = Screen(sought, current, weight, roles, there.noise.draws, trace(sought, current, place, axes_of(sought)), seed)
@@ -138,10 +141,28 @@ def find(
     current = steps[-1]
     fitted, whole = (fit(problem, w, current.effects, current.x[: problem.nuisances], linearisations=6) for w in (done.fitted, done.weight))
     judged = verify.verify(problem, done.weight, before, fitted, done.roles, seed)
-    if judged.interval[0] <= 0.0:
+    if not judged.interval[0] > 0.0:  # nor if nothing was held out
         return None
-    own = doubt(problem, whole, done.weight)
-    return FoundLaws(problem, fitted, whole, judged, tuple(gains), ties, first_bar, sum(foretold), max(ceiling, sum(foretold)), own)
+    own, held = doubt(problem, whole, done.weight), heldout_gains(done, problem, fitted, len(before.effects), judged, seed)
+    return FoundLaws(problem, fitted, whole, judged, held, tuple(gains), ties, first_bar, sum(foretold), max(ceiling, sum(foretold)), own)
+
+
+def heldout_gains(done: Finished, problem: Problem, fitted: Fit, names: int, judged: verify.Judged, seed: int) -> tuple[float, ...]:
+    """Share of the energy that is missing on held-out data without it that each law foretells, of a fit with laws after so many ``names``;
+    ``judged``: with all of them against none."""
+    laws = len(fitted.effects) - names
+    if laws == 1:
+        return (_foretold(judged),)
+    gains = []
+    for index in range(names, names + laws):
+        rest = [effect for i, effect in enumerate(fitted.effects) if i != index]
+        without = fit(problem, done.fitted, rest, fitted.x, linearisations=6)
+        gains.append(_foretold(verify.judged_once(problem, without, fitted, done.roles, seed)))
+    return tuple(gains)
+
+
+def _foretold(judged: verify.Judged) -> float:
+    return 1.0 - (judged.after / judged.before) ** 2
 
 
 def _sure(there: Finished, found: Fit, names: int) -> bool:

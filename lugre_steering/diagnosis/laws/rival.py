@@ -12,7 +12,7 @@ import numpy as np
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.laws.cells import Axis
-from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, with_freedoms
+from lugre_steering.diagnosis.laws.find import MOST_LAWS, FoundLaws, heldout_gains, with_freedoms
 from lugre_steering.diagnosis.laws.refine import given_law, law_of
 from lugre_steering.diagnosis.loudness import excess
 from lugre_steering.diagnosis.search.compare import MARGIN, PER_VALUE, SURE, left, needed, settled
@@ -156,7 +156,8 @@ def _swapped(done: Finished, alone: FoundLaws, index: int, seed: int) -> FoundLa
     judged = verify.verify(problem, done.weight, names, fitted, done.roles, seed)
     gains = tuple(gain for i, gain in enumerate(alone.gains) if i != index)
     ties, own = alone.ties if index else (), doubt(problem, whole, done.weight)
-    return replace(alone, problem=problem, fitted=fitted, fit=whole, judged=judged, gains=gains, ties=ties, doubt=own)
+    held = heldout_gains(done, problem, fitted, len(names.effects), judged, seed)
+    return replace(alone, problem=problem, fitted=fitted, fit=whole, judged=judged, heldout=held, gains=gains, ties=ties, doubt=own)
 
 
 def _more_evident(done: Finished, laws: FoundLaws) -> bool:

@@ -24,6 +24,8 @@ from lugre_steering.vehicle import LawEntry, Vehicle
 
 WRITTEN_KNOTS = 65
 """Knots of a table in a file; of a fine one more."""
+SHOWN_TIES = 2
+"""Laws that fit as well as one, told in its sentence at most."""
 POINTS = 24
 """Steps of the coordinate in which the data are shown beside f."""
 CHANNEL_WORDS = {
@@ -46,7 +48,6 @@ def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
     """The laws as a vehicle file has them."""
     made, first = [], found.problem.nuisances
     spread = np.sqrt(np.maximum(np.diag(found.spread), 0.0))
-    gain = 1.0 - (found.judged.after / found.judged.before) ** 2
     for index, (candidate, values) in enumerate(found.fit.effects):
         deviations = dict(zip(candidate.free, spread[first:], strict=False))
         first += len(candidate.free)
@@ -68,7 +69,7 @@ def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
         }
         made.append(LawEntry(
             cell.channel, cell.axis.coordinate, law.form, (cell.low, cell.high), numbers, knots, cell.axis.memory, cell.axis.memory_size,
-            law_words(law, values, found.problem.vehicle), intervals, round(gain, 4),
+            law_words(law, values, found.problem.vehicle), intervals, round(found.heldout[index - found.names], 4),
         ))  # fmt: skip
     return tuple(made)
 
@@ -144,7 +145,7 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
             "range": list(entry.range), "largest_Nm": largest, "largest_share": largest / torque,
             "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
             "share_of_ceiling": found.foretold / found.ceiling,
-            "ties": [_tie(tie) for tie in found.ties] if not index else [], "nearest_listed": list(nearest),
+            "ties": [_tie(tie, found.problem.vehicle) for tie in found.ties] if not index else [], "nearest_listed": list(nearest),
             "f": {
                 **_picture(found, place, law, values), **_points(found, place, traces, law, values),
             },
@@ -152,9 +153,12 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
     return made
 
 
-def _tie(tie: Tried) -> dict[str, Any]:
-    cell = cell_of(tie)
-    return {"channel": cell.channel, "coordinate": cell.axis.coordinate, "memory": cell.axis.memory, "memory_size": cell.axis.memory_size}
+def _tie(tie: Tried, vehicle: Vehicle) -> dict[str, Any]:
+    cell, title = cell_of(tie), law_words(tie.law, tie.fit.effects[-1][1], vehicle)
+    return {
+        "title": title, "channel": cell.channel, "coordinate": cell.axis.coordinate, "memory": cell.axis.memory,
+        "memory_size": cell.axis.memory_size,
+    }  # fmt: skip
 
 
 def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
@@ -208,14 +212,31 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
     if form == "sinusoid":
         phase = f"2 pi {place} / {v['period']:.4g} {laws.COORDINATES[law['coordinate']]}"
         return f"({level}{v['sine']:+.4g} sin({phase}) {v['cosine']:+.4g} cos({phase}))"
+    if form == "hinge":
+        away = f"{place} - {v['at']:.4g}"
+        arms = [f"{v[side]:+.4g} {least}({away}, 0)" for side, least in (("below", "min"), ("above", "max")) if v[side]]
+        return f"({level}{' '.join(arms)})"
+    if form == "step":
+        return f"({v['before']:.4g} {0.5 * (v['after'] - v['before']):+.4g} (1 + tanh(({place} - {v['at']:.4g}) / {v['width']:.4g})))"
+    if form == "window":
+        return f"({v['inside']:.4g} from {place} = {v['start']:.4g} to {v['end']:.4g}, else {v['outside']:.4g})"
+    if form == "bump":
+        return f"({level}{v['height']:+.4g} exp(-(({place} - {v['at']:.4g}) / {v['width']:.4g})^2 / 2))"
+    if form == "exponential":
+        return f"({v['end']:.4g} {v['start'] - v['end']:+.4g} exp(-({place} - {law['range'][0]:.4g}) / {v['length']:.4g}))"
     return f"f({place})"
 
 
 def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:
-    """Laws with their sizes; ``torque`` writes a torque with its unit."""
-    return " and ".join(
-        f"{law['title']} (up to {torque(law['largest_Nm'])}, {words.percent(law['largest_share'])} of the torque)" for law in described
-    )
+    """Laws with their sizes, and what fits as well; ``torque`` writes a torque with its unit."""
+
+    def told(law: Mapping[str, Any]) -> str:
+        size = f"up to {torque(law['largest_Nm'])}, {words.percent(law['largest_share'])} of the torque"
+        others = " or ".join(tie["title"] for tie in law["ties"][:SHOWN_TIES])
+        as_well = f"; not to be told from {others}" if others else ""
+        return f"{law['title']} ({size}{as_well})"
+
+    return " and ".join(map(told, described))
 
 
 def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
