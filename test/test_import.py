@@ -63,7 +63,7 @@ def seconds(message) -> float:
         ("rad", 1.0), ("m", 1.0), ("Pa", 1.0), ("N", 1.0), ("N m", 1.0), ("s", 1.0), ("rad/s", 1.0), ("m/s", 1.0), ("degC", 1.0),
         ("d", 86400.0), ("0.1 deg", np.pi / 1800), ("0.01 deg", np.pi / 18000), ("rev", 2 * np.pi), ("um", 1e-6), ("in", 0.0254),
         ("kg/cm2", 9.80665e4), ("lbf", 0.45359237 * 9.80665), ("mN m", 1e-3), ("lbf ft", 0.45359237 * 9.80665 * 0.3048),
-        ("lbf in", 0.45359237 * 9.80665 * 0.0254),
+        ("lbf in", 0.45359237 * 9.80665 * 0.0254), ("degF", (1.0 - 32.0) / 1.8),
     ],
 )  # fmt: skip
 def test_a_unit_is_what_its_definition_says(unit: str, one: float) -> None:

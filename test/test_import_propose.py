@@ -411,3 +411,46 @@ def test_tables_that_are_no_text_are_told_what_to_do(tmp_path: Path, name: str, 
     (tmp_path / name).write_bytes(begin + bytes(100))
     with pytest.raises(MapFileError, match=wanted):
         propose(tmp_path / name, tmp_path / "map.yaml")
+
+
+TIME_ANGLE = {"time_s": T, "angle_left_deg": np.degrees(ANGLE)}
+DIGITS = 1 << 16
+
+
+@pytest.mark.parametrize(
+    ("columns", "key", "wanted"),
+    [
+        ({"latitude_deg": T, "heading [deg]": T, "wheel_angle_deg": T} | TIME_ANGLE, "angle/left", ("angle_left_deg", "deg")),
+        (TIME_ANGLE | {"gyro_z_deg_s": T, "angle_left_rate": RATE}, "rate/left", ("angle_left_rate", "rad/s")),
+        (TIME_ANGLE | {"engine_torque_Nm": T, "steer_torque_Nm": RATE}, "measured_torque", ("steer_torque_Nm", "N m")),
+        (TIME_ANGLE | {"engine_rpm": 1500.0 + T, "vehicle_speed_mps": T, "vehicle_speed": T}, "rate/left", None),
+        (TIME_ANGLE | {"vehicle_speed": T, "gyro": RATE}, "rate/left", ("gyro", "rad/s")),
+        ({"t": T, "pitch [deg]": ANGLE}, "angle/left", None),
+        ({"t": T, "angle_left": np.round(1e4 * RATE) % DIGITS}, "angle/left", ("angle_left", "0.01 deg")),
+        ({"t": T, "angle_left": np.round(np.degrees(ANGLE)) % DIGITS, "rate_left": np.round(np.degrees(RATE)) % DIGITS},
+         "rate/left", ("rate_left", "deg/s")),
+        ({"t": T, "p_raw": np.round(500.0 * ANGLE) % DIGITS}, "pressure/raw", ("p_raw", "bar")),
+        ({"t": T, "angle_left_cdeg": np.round(1e4 * ANGLE) / 2.0}, "angle/left", ("angle_left_cdeg", "0.01 deg")),
+        ({"t": T, "p_main": 180.0 + T, "p_tank": 2.0 + 0.01 * T}, "pressure/tank", ("p_tank", "bar")),
+        ({"t": T, "angle_left": np.degrees(ANGLE), "angle_right": 6.0 * ANGLE}, "angle/right", ("angle_right", "deg")),
+        ({"t": T, "theta_left_m": np.degrees(ANGLE)}, "angle/left", ("theta_left_m", "deg")),
+        ({"t": T, "position_m": 20.0 * ANGLE, "force_N": RATE}, "angle/left", ("position_m", "m")),
+        ({"t": T, "cylinder_position_left_mm": 200.0 * ANGLE}, "angle/left", None),
+        ({"t": T, "air_temp_F": 70.0 + T}, "air_temperature", ("air_temp_F", "degF")),
+    ],
+)  # fmt: skip
+def test_which_column_and_unit_are_proposed(
+    tmp_path: Path, columns: dict[str, np.ndarray], key: str, wanted: tuple[str, str] | None
+) -> None:
+    found = propose(csv_of(tmp_path, columns), tmp_path / "map.yaml")
+    assert units(found).get(key) == wanted
+    if wanted is not None:
+        assert found["problem"] is None
+
+
+@pytest.mark.parametrize("name", ["p_tank", "angle_right", "air temperature", "angle_left"])
+def test_units_that_nothing_states_are_marked_as_guessed(tmp_path: Path, name: str) -> None:
+    angles = {"angle_left": np.round(1e4 * ANGLE), "angle_right": ANGLE}
+    columns = {"t": T, "p_main": 180.0 + T, "p_tank": 0.1 * T, "air temperature": T} | angles
+    found = propose(csv_of(tmp_path, columns), tmp_path / "map.yaml")
+    assert "GUESSED" in next(guess["why"] for guess in found["channels"] if guess["column"] == name)
