@@ -221,6 +221,10 @@ def test_a_stated_unit_that_is_none_of_the_quantity_is_never_taken_for_another(t
         ({"header.stamp.sec": 1.7e9 + np.floor(T + 0.5), "header.stamp.nanosec": np.round((T + 0.5) % 1.0 * 1e9)}, 0.0),
         ({"timestamp": np.floor(1.7e9 + T)}, 0.0),
         ({"time": np.repeat(T[::2], 2)}, 1e9),
+        ({"time_h": T / 3600.0}, 1e9),
+        ({"time": 134192231900000000 + 1e7 * T}, 0.0),
+        ({"time": 639000000000000000 + 1e7 * T}, 0.0),
+        ({"time": 3850000000 + T}, 0.0),
     ],
 )
 def test_clocks_of_spreadsheets_of_messages_and_of_coarse_stamps(tmp_path: Path, columns: dict[str, np.ndarray], epoch_s: float) -> None:
@@ -251,6 +255,8 @@ def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
         ({"time": T[::-1]}, "key 'time'"),
         ({"sample": np.arange(T.size)}, "key 'time'"),
         ({"time [ticks]": T}, "key 'time'"),
+        ({"time_daq_s": 1.78e9 + T, "p_bar": 100.0 + T, "time_can_s": T}, "key 'epoch_s'"),
+        ({"time": 20260329015950.0 + T}, "key 'epoch_s'"),
     ],
 )
 def test_a_time_that_cannot_be_is_a_problem(tmp_path: Path, time: dict[str, np.ndarray], wanted: str) -> None:
@@ -290,6 +296,23 @@ def test_stamps_of_loggers(tmp_path: Path, titles: list[str], forms: list[str], 
     assert (row["from_s"], row["to_s"]) == (pytest.approx(from_s, abs=1e-3), pytest.approx(from_s + 19.99, abs=1e-3))
     assert row["samples"] == T.size
     assert ("epoch_s: 0" in found["text"]) == (from_s > 1e8)
+
+
+@pytest.mark.parametrize(
+    ("title", "every_s", "seconds", "rate_Hz"),
+    [("Time [hh:mm:ss]", 1.0, 200, 1.0), ("Time", 0.5, 100, 2.0), ("Uhrzeit", 0.1, 20, 10.0), ("Time", 0.01, 3, 100.0)],
+)
+def test_times_of_the_day_are_seconds(tmp_path: Path, title: str, every_s: float, seconds: int, rate_Hz: float) -> None:
+    form = "%H:%M:%S.%f" if every_s == 0.5 else "%H:%M:%S"
+    rows = [[(NOON + timedelta(seconds=i * every_s)).strftime(form), f"{i % 90}"] for i in range(round(seconds / every_s))]
+    proposal(written(tmp_path, [title, "angle left"], rows))
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["rate_Hz"] == pytest.approx(rate_Hz)
+
+
+def test_a_time_is_in_a_guessed_unit_where_another_could_be(tmp_path: Path) -> None:
+    found = propose(csv_of(tmp_path, {"time": np.arange(200.0), "angle": np.arange(200.0)}), tmp_path / "map.yaml")
+    assert "GUESSED: steps of 1: 1000 samples per second; if not, then s" in found["clocks"][0]["why"]
 
 
 def test_dates_whose_order_nothing_tells_are_left_to_the_user(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
 from lugre_steering.importing.words import WORDS, parts_of, remark_in, side_alone, spaced, tells, unit_in
+from lugre_steering.importing.write import header_stamps
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
@@ -93,7 +94,10 @@ def _problem(file: Path, map_file: Path) -> str | None:
     """What still keeps the map from working."""
     try:
         mapping = load_map(map_file)
-        check_units(file, mapping, read_channels(read_table(file, mapping.csv), mapping))
+        channels = read_channels(read_table(file, mapping.csv), mapping)
+        check_units(file, mapping, channels)
+        for channel in channels.values():
+            header_stamps(file, map_file, mapping, channel)
     except LugreSteeringError as error:
         return str(error)
     return None

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.errors import MapFileError
+from lugre_steering.importing.stamps import is_stamp
 from lugre_steering.importing.table import MAX_DEPTH, Gathering, Table
 from lugre_steering.importing.text import number
 from lugre_steering.recording import Array
@@ -111,6 +112,8 @@ def _numbers(found: Gathering, name: str, values: Sequence[Any]) -> Array | None
     """Values (n,); nothing if one of them is no number, which is noted."""
     if set(map(type, values)) == {float}:
         return np.array(values)
+    if any(isinstance(value, str) and is_stamp(value) for value in values):
+        found.titles[name] = ("s",)
     numbers = np.empty(len(values))
     for place, value in enumerate(values):
         single = _number(value)
