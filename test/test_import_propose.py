@@ -477,3 +477,23 @@ def test_units_that_nothing_states_are_marked_as_guessed(tmp_path: Path, name: s
     columns = {"t": T, "p_main": 180.0 + T, "p_tank": 0.1 * T, "air temperature": T} | angles
     found = propose(csv_of(tmp_path, columns), tmp_path / "map.yaml")
     assert "GUESSED" in next(guess["why"] for guess in found["channels"] if guess["column"] == name)
+
+
+def test_units_that_structures_and_attributes_state(tmp_path: Path) -> None:
+    parts = {
+        "t": {"unit": "ms", "data": 1e3 * T}, "p_main_a": {"unit": "psi", "time": T, "data": 900.0 + T},
+        "angle_left": {"Units": "deg", "values": ANGLE},
+    }  # fmt: skip
+    savemat(tmp_path / "log.mat", parts)
+    (tmp_path / "log.json").write_text(json.dumps(parts, default=list))
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["t"], file["p_main_a"], file["angle_left"] = 1e3 * T, 900.0 + T, ANGLE
+        for name, unit in (("t", "ms"), ("p_main_a", "psi"), ("angle_left", np.bytes_("deg"))):
+            file[name].attrs["units"] = unit
+    for ending in ("mat", "json", "h5"):
+        found = propose(tmp_path / f"log.{ending}", tmp_path / f"{ending}.yaml")
+        assert found["problem"] is None
+        assert found["clocks"][0]["why"] == "named so; unit as stated"
+        assert {guess["key"]: guess["unit"] for guess in found["channels"]} == {"pressure/main_a": "psi", "angle/left": "deg"}
+        assert not any("unit" in row["column"] for row in found["unused"])

@@ -63,6 +63,7 @@ def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
     if isinstance(value, dict):
         for key, inner in value.items():
             _collect(found, _join(name, key), inner, depth + 1)
+        found.state(name, value)
     elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
         _collect_records(found, name, value)
     elif isinstance(value, list) and value and all(isinstance(item, list) for item in value):
