@@ -310,6 +310,11 @@ def test_times_of_the_day_are_seconds(tmp_path: Path, title: str, every_s: float
     assert row["rate_Hz"] == pytest.approx(rate_Hz)
 
 
+def test_a_column_that_only_rises_is_guessed_to_be_the_time(tmp_path: Path) -> None:
+    found = propose(csv_of(tmp_path, {"foo": T, "angle": ANGLE}), tmp_path / "map.yaml")
+    assert found["clocks"][0]["why"].startswith("GUESSED: the first column that only rises")
+
+
 def test_a_time_is_in_a_guessed_unit_where_another_could_be(tmp_path: Path) -> None:
     found = propose(csv_of(tmp_path, {"time": np.arange(200.0), "angle": np.arange(200.0)}), tmp_path / "map.yaml")
     assert "GUESSED: steps of 1: 1000 samples per second; if not, then s" in found["clocks"][0]["why"]
@@ -449,6 +454,7 @@ DIGITS = 1 << 16
         (TIME_ANGLE | {"engine_rpm": 1500.0 + T, "vehicle_speed_mps": T, "vehicle_speed": T}, "rate/left", None),
         (TIME_ANGLE | {"vehicle_speed": T, "gyro": RATE}, "rate/left", ("gyro", "rad/s")),
         ({"t": T, "pitch [deg]": ANGLE}, "angle/left", None),
+        ({"t": T, "wheel_angle_deg": T, "angle_right_deg": T}, "angle/left", None),
         ({"t": T, "angle_left": np.round(1e4 * RATE) % DIGITS}, "angle/left", ("angle_left", "0.01 deg")),
         ({"t": T, "angle_left": np.round(np.degrees(ANGLE)) % DIGITS, "rate_left": np.round(np.degrees(RATE)) % DIGITS},
          "rate/left", ("rate_left", "deg/s")),

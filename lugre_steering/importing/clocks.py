@@ -100,7 +100,7 @@ def clocks(table: Table) -> list[ClockGuess]:
     if joined or named:
         return joined + [_clock(table, name, "named so", f"count_{i}" if i > 1 else "count") for i, name in enumerate(named, 1)]
     rising = [name for name in fit if _rises(table.columns[name]) and not counts(table.columns[name])]
-    return [_clock(table, name, "the first column that only rises", "count") for name in rising[:1]]
+    return [_clock(table, name, "GUESSED: the first column that only rises", "count") for name in rising[:1]]
 
 
 def is_named(name: str) -> bool:

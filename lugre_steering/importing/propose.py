@@ -122,10 +122,9 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     kinds = {name: _kind(table, name) for name in table.columns if name not in of_time}
     # What tells a side, and an angle, before what may be of anything; what tells a side alone after what tells a quantity.
     ordered = sorted(kinds, key=lambda name: (kinds[name] is None, _side(name) is None, not tells(name, "angle")))
-    rates = [name for name in ordered if kinds[name] == "rate"]
-    for names in ([name for name in ordered if name not in rates], rates):  # rates after the angles they belong to
+    for rates in (False, True):  # rates after the angles they belong to
         chosen: dict[str, tuple[str, str]] = {}
-        for name in names:
+        for name in (name for name in ordered if (kinds[name] == "rate") is rates):
             key, why = _key(table, name)
             if key is not None and (obstacle := _obstacle(table, name, key, chosen, taken)):
                 key, why = None, obstacle
@@ -147,6 +146,8 @@ def _obstacle(table: Table, name: str, key: str, chosen: Mapping[str, tuple[str,
     if key in chosen:
         return f"may be {key} too, as '{chosen[key][0]}'"
     kind, _, side = key.partition("/")
+    if kind == "angle" and _side(name) is None and "angle/right" in chosen:
+        return f"of no side, while '{chosen['angle/right'][0]}' is of the right"
     dimensions, angle = DIMENSIONS[kind], taken.get(f"angle/{side}")
     if kind == "rate":
         if angle is None:
@@ -155,14 +156,19 @@ def _obstacle(table: Table, name: str, key: str, chosen: Mapping[str, tuple[str,
     fitting = stated(table, name, dimensions)
     if fitting is None and (text := unfit(table, name, dimensions) or stated(table, name, DIMENSIONS[kind])):
         return f"may be {key}, but it is stated in '{text}', which is none of its units: give scale and unit"
-    if kind != "rate" or angle is None or (_side(name) is not None and fitting is not None):
+    return None if angle is None else _rate_obstacle(table, name, angle, fitting, dimensions)
+
+
+def _rate_obstacle(table: Table, name: str, angle: Guess, unit: str | None, dimensions: tuple[str, ...]) -> str | None:
+    """Why a column is not the rate of an angle: of no side it must follow the angle, and without a ``unit`` have a known one."""
+    if unit is not None and _side(name) is not None:
         return None
     ratio = _summed(table, name, angle)
     if ratio is None:
         return None if _side(name) else f"a rate of no side, and its sum over time does not follow '{angle.column}'"
-    if angle.time is None or any(fitting in (None, unit) for unit in _rate_units(ratio, dimensions)):
+    if unit is not None or angle.time is None or _rate_units(ratio, dimensions):
         return None
-    return f"its sum over time is {ratio:.3g} times '{angle.column}' in SI, not so in {fitting or 'any unit known'}: give scale and unit"
+    return f"its sum over time is {ratio:.3g} times '{angle.column}' in SI, as in no unit known: give scale and unit"
 
 
 def _side(name: str) -> str | None:
@@ -290,7 +296,7 @@ def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
     if ratio is None:
         alike = {"deg": "deg/s", "0.1 deg": "deg/s", "0.01 deg": "deg/s", "mm": "mm/s"}.get(angle.unit, "m/s" if linear else "rad/s")
         return alike, f"GUESSED, as the angle is in {angle.unit}"
-    return _rate_units(ratio, ("speed",) if linear else ("angular speed",))[0], f"its sum over time is {ratio:.3g} times the angle"
+    return _rate_units(ratio, ("speed",) if linear else ("angular speed",))[0], f"its sum over time is {ratio:.3g} times the angle in SI"
 
 
 def _rate_units(ratio: float, dimensions: tuple[str, ...]) -> list[str]:
@@ -311,8 +317,9 @@ def _summed(table: Table, name: str, angle: Guess) -> float | None:
     turned = value[known] - value[known].mean()
     summed = np.concatenate([[0.0], np.cumsum(0.5 * (rate[known][1:] + rate[known][:-1]) * np.diff(time[known]))])
     summed -= summed.mean()
-    both, alone = abs(float(summed @ turned)), float(turned @ turned)
-    return both / alone if both > _FOLLOWS * math.sqrt(alone * float(summed @ summed)) else None
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows follows nothing
+        both, alone, squared = abs(float(summed @ turned)), float(turned @ turned), float(summed @ summed)
+    return both / alone if both > _FOLLOWS * math.sqrt(alone * squared) else None
 
 
 def _pressure_unit(most: float) -> tuple[str, str]:
@@ -349,7 +356,7 @@ def _map_text(
     times: Sequence[ClockGuess],
     guesses: Sequence[Guess],
     unused: Sequence[Mapping[str, str]],
-    signed: Mapping[str, int],
+    bits_of: Mapping[str, int],
     table: Table,
 ) -> str:
     """The map, with the reasons as comments."""
@@ -368,8 +375,8 @@ def _map_text(
             lines.append(f"names: {_flow(names)}")
     else:
         lines.append("# time: {rate_Hz: 100}  # no column rises like a time: give the samples per second")
-    if signed:
-        lines.append(f"signed: {_flow(signed)}  # whole numbers near zero and near the largest, nothing between")
+    if bits_of:
+        lines.append(f"signed: {_flow(bits_of)}  # whole numbers near zero and near the largest, nothing between")
     lines.append("channels:" if guesses else "channels: {}  # none guessed: choose from the columns below")
     for guess in guesses:
         source: dict[str, Any] = {"column": guess.column, "unit": guess.unit}

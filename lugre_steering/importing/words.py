@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 _SPELLINGS: Mapping[str, str] = {
     "s": "s sec secs second seconds sekunden", "ms": "ms msec msecs millis milliseconds", "us": "us usec micros microseconds",
-    "ns": "ns nsec nsecs nanos nanoseconds", "min": "min minutes", "h": "h hr hrs hour hours std stunden", "d": "d day days tage",
+    "ns": "ns nsec nsecs nanos nanoseconds", "min": "min minutes", "h": "h hr hrs hour hours stunden", "d": "d day days tage",
     "rad": "rad radian radians", "mrad": "mrad", "deg": "deg degree degrees ° grad",
     "0.1 deg": "ddeg decideg 0.1_deg 0.1deg 0.1° 0.1_° 1/10_deg 1/10deg 1/10° deg/10 °/10",
     "0.01 deg": "cdeg centideg 0.01_deg 0.01deg 0.01° 0.01_° 1/100_deg 1/100deg 1/100° deg/100 °/100",
