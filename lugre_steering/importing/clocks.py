@@ -99,7 +99,9 @@ def clocks(table: Table) -> list[ClockGuess]:
     named = [name for name in fit if is_named(name) and _advances(table, name)]
     if joined or named:
         return joined + [_clock(table, name, "named so", f"count_{i}" if i > 1 else "count") for i, name in enumerate(named, 1)]
-    rising = [name for name in fit if _rises(table.columns[name]) and not counts(table.columns[name])]
+    other = ("angle", "rate", "pressure", "torque", "temperature")
+    unnamed = [name for name in fit if not any(tells(name, kind) for kind in other)]
+    rising = [name for name in unnamed if _rises(table.columns[name]) and not counts(table.columns[name])]
     return [_clock(table, name, "GUESSED: the first column that only rises", "count") for name in rising[:1]]
 
 

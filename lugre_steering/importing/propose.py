@@ -24,7 +24,7 @@ from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
-from lugre_steering.importing.words import WORDS, parts_of, remark_in, side_alone, spaced, tells, unit_in
+from lugre_steering.importing.words import WORDS, parts_of, remark_in, side_alone, spaced, tells, unit_in, words_of
 from lugre_steering.importing.write import header_stamps
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
@@ -120,8 +120,9 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     unused = [{"column": name, "why": why} for name, why in table.unusable.items()]
     of_time = {column for clock in times for column in clock.columns()}
     kinds = {name: _kind(table, name) for name in table.columns if name not in of_time}
-    # What tells a side, and an angle, before what may be of anything; what tells a side alone after what tells a quantity.
-    ordered = sorted(kinds, key=lambda name: (kinds[name] is None, _side(name) is None, not tells(name, "angle")))
+    # What tells a side, and the most of an angle, before what may be of anything; what tells a side alone after what tells a quantity.
+    of_angle = {name: sum(word in WORDS["angle"] for word in words_of(name)) for name in kinds}
+    ordered = sorted(kinds, key=lambda name: (kinds[name] is None, _side(name) is None, -of_angle[name]))
     for rates in (False, True):  # rates after the angles they belong to
         chosen: dict[str, tuple[str, str]] = {}
         for name in (name for name in ordered if (kinds[name] == "rate") is rates):

@@ -29,9 +29,9 @@ UNIT_OF: Mapping[str, str] = {spelling: unit for unit, text in _SPELLINGS.items(
 _IN_BRACKETS_ONLY = ("in", "d")
 """Units that at the end of a name are words of their own: p_in."""
 _LETTERS: Mapping[str, tuple[str, ...]] = {
-    "m": ("position",), "n": ("torque",), **dict.fromkeys(("c", "f", "k"), ("temperature", "air"))
+    "m": ("position",), "M": ("position",), "n": ("torque",), **dict.fromkeys(("c", "f", "k"), ("temperature", "air"))
 }  # fmt: skip
-"""Units that at the end of a name count only if it tells their quantity: theta_m is the measured one."""
+"""Ends of a name that are units only if it tells their quantity: theta_m is the measured one, but F_N is in newton."""
 _UNSCALED = frozenset(
     ("%", "%fs", "%_fs", "percent", "pct", "a", "ma", "amp", "amps", "v", "mv", "volt", "volts", "count", "counts", "ticks", "lsb")
 )
@@ -101,13 +101,13 @@ def side_alone(name: str) -> str | None:
 def unit_in(text: str, whole: bool = False) -> str | None:
     """A unit that a name or a header cell states: in brackets, at its end after a blank or _, or as the ``whole`` text."""
     square, rounded = _bracketed(text)
-    ends = [text] if whole else [end for end in _ends(text) if _is_unit(end.lower(), text)]
+    ends = [text] if whole else [end for end in _ends(text) if _is_unit(end, text)]
     return next((unit for candidate in (*square, *rounded, *ends) if (unit := _known(candidate)) is not None), None)
 
 
 def _is_unit(end: str, name: str) -> bool:
     """Whether the end of a name may be a unit at all."""
-    return end not in _IN_BRACKETS_ONLY and (end not in _LETTERS or any(tells(name, kind) for kind in _LETTERS[end]))
+    return end.lower() not in _IN_BRACKETS_ONLY and (end not in _LETTERS or any(tells(name, kind) for kind in _LETTERS[end]))
 
 
 def stated_in(text: str, whole: bool = False) -> str | None:
