@@ -494,7 +494,7 @@ def test_units_that_structures_and_attributes_state(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file["t"], file["p_main_a"], file["angle_left"] = 1e3 * T, 900.0 + T, ANGLE
-        for name, unit in (("t", "ms"), ("p_main_a", "psi"), ("angle_left", np.bytes_("deg"))):
+        for name, unit in (("t", "ms since 1970-01-01"), ("p_main_a", "psi"), ("angle_left", np.bytes_("deg"))):
             file[name].attrs["units"] = unit
     for ending in ("mat", "json", "h5"):
         found = propose(tmp_path / f"log.{ending}", tmp_path / f"{ending}.yaml")

@@ -256,10 +256,11 @@ def _unit(table: Table, name: str, key: str, alike: Sequence[str], taken: Mappin
     of_others = {other: stated(table, other, DIMENSIONS[kind]) for other in alike}
     like = min(alike, key=lambda other: (of_others[other] is None, -_most(table, other)))
     shared = of_others[like] or _unit_of_range(table, like, kind)[0]
-    return (unit, reason) if unit == shared else (shared, f"GUESSED: as '{like}'")
+    return (unit, reason) if unit == shared else (shared, f"GUESSED: as '{like}'; if not, then {unit}")
 
 
 def _unit_of_range(table: Table, name: str, kind: str) -> tuple[str, str]:
+    """Unit and reason by the numbers of one column."""
     most, values = _most(table, name), table.columns[name][np.isfinite(table.columns[name])]
     if kind == "angle":
         return _axis_unit(most) if _is_linear(table, name) else _angle_unit(values, most)
@@ -273,6 +274,7 @@ def _unit_of_range(table: Table, name: str, kind: str) -> tuple[str, str]:
 
 
 def _most(table: Table, name: str) -> float:
+    """Below so much lie all magnitudes but for outliers."""
     return float(np.quantile(np.abs(table.columns[name][np.isfinite(table.columns[name])]), 0.99))
 
 
@@ -295,8 +297,8 @@ def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
     linear = READABLE_UNITS[angle.unit][0] == "length"
     ratio = _summed(table, name, angle) if angle.time is not None else None
     if ratio is None:
-        alike = {"deg": "deg/s", "0.1 deg": "deg/s", "0.01 deg": "deg/s", "mm": "mm/s"}.get(angle.unit, "m/s" if linear else "rad/s")
-        return alike, f"GUESSED, as the angle is in {angle.unit}"
+        of_length, of_angle = "mm/s" if angle.unit == "mm" else "m/s", "deg/s" if angle.unit.endswith("deg") else "rad/s"
+        return of_length if linear else of_angle, f"GUESSED, as the angle is in {angle.unit}"
     return _rate_units(ratio, ("speed",) if linear else ("angular speed",))[0], f"its sum over time is {ratio:.3g} times the angle in SI"
 
 

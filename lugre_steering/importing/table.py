@@ -138,11 +138,12 @@ class Gathering:
         if key is None:
             return
         self.unusable.pop(f"{name}.{key}", None)
+        unit = texts[key].partition(" since ")[0]  # as netCDF has it: seconds since 1970-01-01
         for column in reversed(self.columns):
             if column != name and not column.startswith((f"{name}.", f"{name}[")):
                 return
             if tells(name, "time") or not tells(column, "time"):
-                self.titles.setdefault(column, (texts[key],))
+                self.titles.setdefault(column, (unit,))
 
     def table(self, titles: Mapping[str, tuple[str, ...]] | None = None) -> Table:
         return Table(self.file, self.columns, self.scalars, self.unusable, {**self.titles, **(titles or {})})
