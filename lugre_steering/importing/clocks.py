@@ -98,7 +98,8 @@ def clocks(table: Table) -> list[ClockGuess]:
     fit = [name for name in table.columns if name not in taken and unfit(table, name, ("time",)) is None]
     named = [name for name in fit if is_named(name) and _advances(table, name)]
     if joined or named:
-        return joined + [_clock(table, name, "named so", f"count_{i}" if i > 1 else "count") for i, name in enumerate(named, 1)]
+        shorts = ["count", *(f"count_{i}" for i in range(2, len(named) + 1))]
+        return joined + [_clock(table, name, "named so", short) for name, short in zip(named, shorts, strict=False)]
     other = ("angle", "rate", "pressure", "torque", "temperature")
     unnamed = [name for name in fit if not any(tells(name, kind) for kind in other)]
     rising = [name for name in unnamed if _rises(table.columns[name]) and not counts(table.columns[name])]
@@ -121,13 +122,13 @@ def _rises(values: Array) -> bool:
 
 
 def _advances(table: Table, name: str) -> bool:
-    """Rises, or is called more than t and stands still between its steps, of which a few do where a unit of time is stated."""
-    values = table.columns[name]
-    known, few = values[np.isfinite(values)], FEW if stated(table, name, ("time",)) is None else 2
-    if _rises(values) or known.size < FEW:
+    """Rises, or is called more than t and stands still between its steps: few, where a unit of time is stated."""
+    known = table.columns[name][np.isfinite(table.columns[name])]
+    if _rises(known) or known.size < FEW:
         return known.size >= FEW
     plain = words_of(name) == ["t"] or any(word in WORDS["time"] and word != "t" for word in words_of(name))
-    return plain and bool(known[-1] > known[0]) and float(np.mean(np.diff(known) >= 0.0)) > 0.9 and np.unique(known).size >= few
+    enough = np.unique(known).size >= (FEW if stated(table, name, ("time",)) is None else 2)
+    return plain and enough and bool(known[-1] > known[0]) and float(np.mean(np.diff(known) >= 0.0)) > 0.9
 
 
 def _step(values: Array) -> float:
@@ -136,6 +137,7 @@ def _step(values: Array) -> float:
 
 
 def _clock(table: Table, name: str, how: str, short: str) -> ClockGuess:
+    """By the unit that is stated, else by the numbers; ``short``: what expressions call the column."""
     values = table.columns[name][np.isfinite(table.columns[name])]
     step, middle = _step(values), float(np.median(values))
     unit = stated(table, name, ("time",))
@@ -187,10 +189,12 @@ def _noted(table: Table, guess: ClockGuess) -> ClockGuess:
 
 
 def _rate_of(seconds: Array) -> float | None:
-    """Rows per second, where about as many share each stamp."""
+    """Rows per second, where about as many share each stamp and none goes back."""
     first = np.flatnonzero(np.diff(seconds) != 0.0) + 1
     rows = np.diff(first)
-    if not rows.size or float(np.mean(np.abs(rows - np.median(rows)) <= 1.0 + 0.1 * np.median(rows))) < 0.9:
+    if not rows.size or np.any(np.diff(seconds) < 0.0):
+        return None
+    if float(np.mean(np.abs(rows - np.median(rows)) <= 1.0 + 0.1 * np.median(rows))) < 0.9:
         return None
     return float(f"{float(np.sum(rows)) / float(seconds[first[-1]] - seconds[first[0]]):.4g}")
 

@@ -120,7 +120,7 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     unused = [{"column": name, "why": why} for name, why in table.unusable.items()]
     of_time = {column for clock in times for column in clock.columns()}
     kinds = {name: _kind(table, name) for name in table.columns if name not in of_time}
-    # What tells a side, and the most of an angle, before what may be of anything; what tells a side alone after what tells a quantity.
+    # What tells a side, and the most of an angle, before what may be of anything; a side alone after all quantities.
     of_angle = {name: sum(word in WORDS["angle"] for word in words_of(name)) for name in kinds}
     ordered = sorted(kinds, key=lambda name: (kinds[name] is None, _side(name) is None, -of_angle[name]))
     for rates in (False, True):  # rates after the angles they belong to
@@ -142,7 +142,9 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     return sorted(taken.values(), key=lambda guess: list(kinds).index(guess.column)), unused
 
 
-def _obstacle(table: Table, name: str, key: str, chosen: Mapping[str, tuple[str, str]], taken: Mapping[str, Guess]) -> str | None:
+def _obstacle(
+    table: Table, name: str, key: str, chosen: Mapping[str, tuple[str, str]], taken: Mapping[str, Guess]
+) -> str | None:
     """Why a channel cannot be had from one more column."""
     if key in chosen:
         return f"may be {key} too, as '{chosen[key][0]}'"
@@ -241,7 +243,8 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
 
 def _is_linear(table: Table, name: str) -> bool:
     """Whether a column is the position of a linear axis: such a file holds a force."""
-    return tells(name, "position") and any(tells(other, "force") or stated(table, other, ("force",)) for other in table.columns)
+    of_force = (other for other in table.columns if tells(other, "force") or stated(table, other, ("force",)))
+    return tells(name, "position") and any(of_force)
 
 
 def _unit(table: Table, name: str, key: str, alike: Sequence[str], taken: Mapping[str, Guess]) -> tuple[str, str]:
@@ -297,14 +300,15 @@ def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
     linear = READABLE_UNITS[angle.unit][0] == "length"
     ratio = _summed(table, name, angle) if angle.time is not None else None
     if ratio is None:
-        of_length, of_angle = "mm/s" if angle.unit == "mm" else "m/s", "deg/s" if angle.unit.endswith("deg") else "rad/s"
-        return of_length if linear else of_angle, f"GUESSED, as the angle is in {angle.unit}"
+        small = "mm/s" if angle.unit == "mm" else "deg/s" if angle.unit.endswith("deg") else None
+        return small or ("m/s" if linear else "rad/s"), f"GUESSED, as the angle is in {angle.unit}"
     return _rate_units(ratio, ("speed",) if linear else ("angular speed",))[0], f"its sum over time is {ratio:.3g} times the angle in SI"
 
 
 def _rate_units(ratio: float, dimensions: tuple[str, ...]) -> list[str]:
     """Units in which a rate is that of an angle of which its sum over time is ``ratio`` times as much."""
-    return [unit for unit, (dimension, factor, _) in READABLE_UNITS.items() if dimension in dimensions and abs(ratio * factor - 1.0) < 0.2]
+    factors = {unit: factor for unit, (dimension, factor, _) in READABLE_UNITS.items() if dimension in dimensions}
+    return [unit for unit, factor in factors.items() if abs(ratio * factor - 1.0) < 0.2]
 
 
 def _summed(table: Table, name: str, angle: Guess) -> float | None:
