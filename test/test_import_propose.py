@@ -221,6 +221,10 @@ def test_a_stated_unit_that_is_none_of_the_quantity_is_never_taken_for_another(t
         ({"header.stamp.sec": 1.7e9 + np.floor(T + 0.5), "header.stamp.nanosec": np.round((T + 0.5) % 1.0 * 1e9)}, 0.0),
         ({"timestamp": np.floor(1.7e9 + T)}, 0.0),
         ({"time": np.repeat(T[::2], 2)}, 1e9),
+        ({"time_h": T / 3600.0}, 1e9),
+        ({"time": 134192231900000000 + 1e7 * T}, 0.0),
+        ({"time": 639000000000000000 + 1e7 * T}, 0.0),
+        ({"time": 3850000000 + T}, 0.0),
     ],
 )
 def test_clocks_of_spreadsheets_of_messages_and_of_coarse_stamps(tmp_path: Path, columns: dict[str, np.ndarray], epoch_s: float) -> None:
@@ -248,9 +252,11 @@ def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
         ({"time [s]": T / 86400.0}, "makes 8.64e+06 samples per second, expected 0.1 to 50000"),
         ({"time": np.repeat(T[::100], np.random.default_rng(1).permutation([20, 180] * 10))}, "many stamps repeat the one before"),
         ({"time": (86395.0 + T) % 86400.0}, "s before it begins"),
+        ({"time [s]": np.repeat([0.0, 1.0, 2.0, 1.0, 2.0], 400)[: T.size]}, "many stamps repeat the one before"),
         ({"time": T[::-1]}, "key 'time'"),
         ({"sample": np.arange(T.size)}, "key 'time'"),
         ({"time [ticks]": T}, "key 'time'"),
+        ({"time_daq_s": 1.78e9 + T, "p_bar": 100.0 + T, "time_can_s": T}, "key 'epoch_s'"),
     ],
 )
 def test_a_time_that_cannot_be_is_a_problem(tmp_path: Path, time: dict[str, np.ndarray], wanted: str) -> None:
@@ -290,6 +296,28 @@ def test_stamps_of_loggers(tmp_path: Path, titles: list[str], forms: list[str], 
     assert (row["from_s"], row["to_s"]) == (pytest.approx(from_s, abs=1e-3), pytest.approx(from_s + 19.99, abs=1e-3))
     assert row["samples"] == T.size
     assert ("epoch_s: 0" in found["text"]) == (from_s > 1e8)
+
+
+@pytest.mark.parametrize(
+    ("title", "every_s", "seconds", "rate_Hz"),
+    [("Time [hh:mm:ss]", 1.0, 200, 1.0), ("Time", 0.5, 100, 2.0), ("Uhrzeit", 0.1, 20, 10.0), ("Time", 0.01, 3, 100.0)],
+)
+def test_times_of_the_day_are_seconds(tmp_path: Path, title: str, every_s: float, seconds: int, rate_Hz: float) -> None:
+    form = "%H:%M:%S.%f" if every_s == 0.5 else "%H:%M:%S"
+    rows = [[(NOON + timedelta(seconds=i * every_s)).strftime(form), f"{i % 90}"] for i in range(round(seconds / every_s))]
+    proposal(written(tmp_path, [title, "angle left"], rows))
+    (row,) = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
+    assert row["rate_Hz"] == pytest.approx(rate_Hz)
+
+
+def test_a_column_that_only_rises_is_guessed_to_be_the_time(tmp_path: Path) -> None:
+    found = propose(csv_of(tmp_path, {"foo": T, "angle": ANGLE}), tmp_path / "map.yaml")
+    assert found["clocks"][0]["why"].startswith("GUESSED: the first column that only rises")
+
+
+def test_a_time_is_in_a_guessed_unit_where_another_could_be(tmp_path: Path) -> None:
+    found = propose(csv_of(tmp_path, {"time": np.arange(200.0), "angle": np.arange(200.0)}), tmp_path / "map.yaml")
+    assert "GUESSED: steps of 1: 1000 samples per second; if not, then s" in found["clocks"][0]["why"]
 
 
 def test_dates_whose_order_nothing_tells_are_left_to_the_user(tmp_path: Path) -> None:
@@ -411,3 +439,67 @@ def test_tables_that_are_no_text_are_told_what_to_do(tmp_path: Path, name: str, 
     (tmp_path / name).write_bytes(begin + bytes(100))
     with pytest.raises(MapFileError, match=wanted):
         propose(tmp_path / name, tmp_path / "map.yaml")
+
+
+TIME_ANGLE = {"time_s": T, "angle_left_deg": np.degrees(ANGLE)}
+DIGITS = 1 << 16
+
+
+@pytest.mark.parametrize(
+    ("columns", "key", "wanted"),
+    [
+        ({"latitude_deg": T, "heading [deg]": T, "wheel_angle_deg": T} | TIME_ANGLE, "angle/left", ("angle_left_deg", "deg")),
+        (TIME_ANGLE | {"gyro_z_deg_s": T, "angle_left_rate": RATE}, "rate/left", ("angle_left_rate", "rad/s")),
+        (TIME_ANGLE | {"engine_torque_Nm": T, "steer_torque_Nm": RATE}, "measured_torque", ("steer_torque_Nm", "N m")),
+        (TIME_ANGLE | {"engine_rpm": 1500.0 + T, "vehicle_speed_mps": T, "vehicle_speed": T}, "rate/left", None),
+        (TIME_ANGLE | {"vehicle_speed": T, "gyro": RATE}, "rate/left", ("gyro", "rad/s")),
+        ({"t": T, "pitch [deg]": ANGLE}, "angle/left", None),
+        ({"t": T, "yaw_angle": T, "joint_angle_deg": ANGLE}, "angle/left", ("joint_angle_deg", "deg")),
+        ({"t": T, "wheel_angle_deg": T, "angle_right_deg": T}, "angle/left", None),
+        ({"t": T, "angle_left": np.round(1e4 * RATE) % DIGITS}, "angle/left", ("angle_left", "0.01 deg")),
+        ({"t": T, "angle_left": np.round(np.degrees(ANGLE)) % DIGITS, "rate_left": np.round(9.55 * RATE) % DIGITS},
+         "rate/left", ("rate_left", "rpm")),
+        ({"t": T, "p_raw": np.round(500.0 * ANGLE) % DIGITS}, "pressure/raw", ("p_raw", "bar")),
+        ({"t": T, "angle_left_cdeg": np.round(1e4 * ANGLE) / 2.0}, "angle/left", ("angle_left_cdeg", "0.01 deg")),
+        ({"t": T, "p_main": 180.0 + T, "p_tank": 2.0 + 0.01 * T}, "pressure/tank", ("p_tank", "bar")),
+        ({"t": T, "angle_left": np.degrees(ANGLE), "angle_right": 6.0 * ANGLE}, "angle/right", ("angle_right", "deg")),
+        ({"t": T, "theta_left_m": np.degrees(ANGLE)}, "angle/left", ("theta_left_m", "deg")),
+        ({"t": T, "position_m": 20.0 * ANGLE, "force_N": RATE}, "angle/left", ("position_m", "m")),
+        ({"t": T, "cylinder_position_left_mm": 200.0 * ANGLE}, "angle/left", None),
+        ({"angle": T, "x": T}, "time", ("x", "s")),
+        ({"t": T, "air_temp_F": 70.0 + T}, "air_temperature", ("air_temp_F", "degF")),
+    ],
+)  # fmt: skip
+def test_which_column_and_unit_are_proposed(
+    tmp_path: Path, columns: dict[str, np.ndarray], key: str, wanted: tuple[str, str] | None
+) -> None:
+    found = propose(csv_of(tmp_path, columns), tmp_path / "map.yaml")
+    assert units(found).get(key) == wanted
+    if wanted is not None:
+        assert found["problem"] is None
+
+
+@pytest.mark.parametrize("columns", [{"angle_left": np.round(1e4 * ANGLE)}, {"angle": ANGLE, "air temperature": T}])
+def test_units_that_nothing_states_are_marked_as_guessed(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
+    found = propose(csv_of(tmp_path, {"t": T} | columns), tmp_path / "map.yaml")
+    assert all("GUESSED" in guess["why"] for guess in found["channels"])
+
+
+def test_units_that_structures_and_attributes_state(tmp_path: Path) -> None:
+    parts = {
+        "t": {"unit": "ms", "data": 1e3 * T}, "p_main_a": {"unit": "psi", "time": T, "data": 900.0 + T},
+        "angle_left": {"Units": "deg", "values": ANGLE},
+    }  # fmt: skip
+    savemat(tmp_path / "log.mat", parts)
+    (tmp_path / "log.json").write_text(json.dumps(parts, default=list))
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["t"], file["p_main_a"], file["angle_left"] = 1e3 * T, 900.0 + T, ANGLE
+        for name, unit in (("t", "ms since 1970-01-01"), ("p_main_a", "psi"), ("angle_left", np.bytes_("deg"))):
+            file[name].attrs["units"] = unit
+    for ending in ("mat", "json", "h5"):
+        found = propose(tmp_path / f"log.{ending}", tmp_path / f"{ending}.yaml")
+        assert found["problem"] is None
+        assert found["clocks"][0]["why"] == "named so; unit as stated"
+        assert {guess["key"]: guess["unit"] for guess in found["channels"]} == {"pressure/main_a": "psi", "angle/left": "deg"}
+        assert not any("unit" in row["column"] for row in found["unused"])

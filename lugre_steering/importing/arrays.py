@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from lugre_steering.errors import MapFileError
-from lugre_steering.importing.table import MAX_COLUMNS, MAX_DEPTH, Gathering, Table, most_numbers, size_of
+from lugre_steering.importing.table import MAX_COLUMNS, MAX_DEPTH, UNIT_KEYS, Gathering, Table, most_numbers, size_of
 
 _CHUNK = 1 << 16
 
@@ -158,6 +158,7 @@ def _collect(found: Gathering, name: str, value: Any, depth: int = 0) -> None:
             raise MapFileError(f"{found.file}: '{name[:60]}': nested more than {MAX_DEPTH} deep")
         for key, inner in value.items():
             _collect(found, f"{name}.{key}" if name else key, inner, depth + 1)
+        found.state(name, value)
     elif isinstance(value, list):
         found.refuse(name, "a cell array of several kinds")
     else:
@@ -208,3 +209,5 @@ def _add_dataset(found: Gathering, item: Any, path: str) -> None:
         found.reserve(path, size_of(item.shape))
         values = np.asarray(item[()], np.float64)
         found.add(path, values.T if matlab is not None else values)  # MATLAB counts dimensions the other way round
+        stated = {key: item.attrs[key] for key in item.attrs if key.lower() in UNIT_KEYS}
+        found.state(path, {key: text.decode(errors="replace") if isinstance(text, bytes) else text for key, text in stated.items()})

@@ -20,12 +20,21 @@ from lugre_steering.recording import Array
 
 FEW = 5
 """Fewer numbers tell nothing."""
-_UNIX = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-"""Above so much a time counts from 1970, in this unit."""
+_UNIX_S = 1e8
+"""A time above so much counts from 1970."""
+_OUR_DAYS_S = (1e9, 2.0**31)
+"""Unix times that recordings may have."""
+_UNITS = ("s", "ms", "us", "ns")
+"""Of times whose unit is not stated."""
 _RATES_HZ = (0.1, 5e4)
 """What recordings of machines are sampled at."""
-_DAY_S, _SHEET_DAYS, _SHEET_1970 = 86400.0, (25e3, 75e3), 25569
-"""Spreadsheets count days from the end of 1899: those of our lives, and the first of 1970."""
+_DAY_S = 86400.0
+_COUNTED = (
+    (_DAY_S, 25569, "days since 1900, as spreadsheets count them"), (1.0, 2082844800, "seconds since 1904, as LabVIEW counts them"),
+    (1e-7, 116444736000000000, "steps of 100 ns since 1601, as Windows counts them"),
+    (1e-7, 621355968000000000, "steps of 100 ns since the year 1, as .NET counts them"),
+)  # fmt: skip
+"""Seconds per step, the step at which 1970 began, and what is counted."""
 _SECONDS, _NANOSECONDS = ("sec", "secs", "s", "seconds"), re.compile(r"(ns|nsecs?|nanosecs?|nanoseconds)$")
 
 
@@ -60,7 +69,7 @@ class ClockGuess:
     def epoch_s(self, table: Table) -> int | None:
         """Unix time of time zero, where the columns tell Unix time."""
         seconds = self.seconds(table)
-        if not float(np.nanmedian(seconds)) > _UNIX[-1][0]:
+        if not float(np.nanmedian(seconds)) > _UNIX_S:
             return None
         return 0 if self.rate_Hz is None else int(np.nanmin(seconds))
 
@@ -76,7 +85,7 @@ class ClockGuess:
             back = f"ends {-float(steps.sum()):.3g} s before it begins, expected it to rise (over midnight?)"
             return f"{table.file}: time '{self.column}': {back}"
         rate = 1.0 / _step(seconds)
-        if _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
+        if _can_be(rate):
             return None
         expected = f"expected {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g}: is it a time, and the unit right?"
         return f"{table.file}: time '{self.column}' in {self.unit}: makes {rate:.3g} samples per second, {expected}"
@@ -87,11 +96,14 @@ def clocks(table: Table) -> list[ClockGuess]:
     joined = _joined(table)
     taken = {column for clock in joined for column in clock.columns()}
     fit = [name for name in table.columns if name not in taken and unfit(table, name, ("time",)) is None]
-    named = [name for name in fit if is_named(name) and _advances(name, table.columns[name])]
+    named = [name for name in fit if is_named(name) and _advances(table, name)]
     if joined or named:
-        return joined + [_clock(table, name, "named so") for name in named]
-    rising = [name for name in fit if _rises(table.columns[name]) and not counts(table.columns[name])]
-    return [_clock(table, name, "the first column that only rises") for name in rising[:1]]
+        shorts = ["count", *(f"count_{i}" for i in range(2, len(named) + 1))]
+        return joined + [_clock(table, name, "named so", short) for name, short in zip(named, shorts, strict=False)]
+    other = ("angle", "rate", "pressure", "torque", "temperature")
+    unnamed = [name for name in fit if not any(tells(name, kind) for kind in other)]
+    rising = [name for name in unnamed if _rises(table.columns[name]) and not counts(table.columns[name])]
+    return [_clock(table, name, "GUESSED: the first column that only rises", "count") for name in rising[:1]]
 
 
 def is_named(name: str) -> bool:
@@ -109,13 +121,14 @@ def _rises(values: Array) -> bool:
     return known.size >= FEW and float(np.mean(np.diff(known) > 0.0)) > 0.9
 
 
-def _advances(name: str, values: Array) -> bool:
-    """Rises, or is called more than t and stands still between its steps."""
-    known = values[np.isfinite(values)]
-    if _rises(values) or known.size < FEW:
+def _advances(table: Table, name: str) -> bool:
+    """Rises, or is called more than t and stands still between its steps: few, where a unit of time is stated."""
+    known = table.columns[name][np.isfinite(table.columns[name])]
+    if _rises(known) or known.size < FEW:
         return known.size >= FEW
     plain = words_of(name) == ["t"] or any(word in WORDS["time"] and word != "t" for word in words_of(name))
-    return plain and bool(known[-1] > known[0]) and float(np.mean(np.diff(known) >= 0.0)) > 0.9 and np.unique(known).size >= FEW
+    enough = np.unique(known).size >= (FEW if stated(table, name, ("time",)) is None else 2)
+    return plain and enough and bool(known[-1] > known[0]) and float(np.mean(np.diff(known) >= 0.0)) > 0.9
 
 
 def _step(values: Array) -> float:
@@ -123,24 +136,38 @@ def _step(values: Array) -> float:
     return float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else float("nan")
 
 
-def _clock(table: Table, name: str, how: str) -> ClockGuess:
+def _clock(table: Table, name: str, how: str, short: str) -> ClockGuess:
+    """By the unit that is stated, else by the numbers; ``short``: what expressions call the column."""
     values = table.columns[name][np.isfinite(table.columns[name])]
     step, middle = _step(values), float(np.median(values))
     unit = stated(table, name, ("time",))
-    unix = next((unit for least, unit in _UNIX if middle > least), None)
+    unix = [unit for unit in _UNITS if _in_our_days(middle * READABLE_UNITS[unit][1])]
+    counted = [way for way in _COUNTED if _in_our_days(way[0] * (middle - way[1])) and _can_be(1.0 / (step * way[0]))]
     if unit is not None:
         guess = ClockGuess(name, unit, f"{how}; unit as stated")
-    elif unix is not None:
-        guess = ClockGuess(name, unix, f"{how}; as Unix time it lies in our days")
-    elif 1.0 / step > _RATES_HZ[1] and _SHEET_DAYS[0] < middle < _SHEET_DAYS[1]:
-        why = f"{how}; days since 1900, as spreadsheets count them: {_rate(step, 'd')}"
-        guess = ClockGuess(name, "s", why, f"{_DAY_S:g} * (day - {_SHEET_1970})", {"day": name})
+    elif unix:
+        guess = ClockGuess(name, unix[0], f"{how}; as Unix time it lies in our days")
+    elif counted:
+        length, begin, what = counted[0]
+        why = f"{how}; {what}: {_rate(step * length, 's')}"
+        guess = ClockGuess(name, "s", why, f"{length:g} * ({short} - {begin})", {short: name})
     elif 1.0 / step > _RATES_HZ[1] and values.min() >= 0.0 and values.max() <= 1.0:
-        guess = ClockGuess(name, "d", f"{how}; parts of a day, as spreadsheets keep times: {_rate(step, 'd')}")
+        why = f"{how}; GUESSED: parts of a day, as spreadsheets keep times: {_rate(step, 'd')}; if not, then h"
+        guess = ClockGuess(name, "d", why)
     else:
         unit = "s" if step < 0.5 else "ms" if step < 500.0 else "us" if step < 1e5 else "ns"
-        guess = ClockGuess(name, unit, f"{how}; steps of {step:.3g}: {_rate(step, unit)}")
+        others = [other for other in _UNITS if other != unit and _can_be(1.0 / (step * READABLE_UNITS[other][1]))]
+        sure, doubt = ("GUESSED: ", f"; if not, then {others[0]}") if others else ("", "")
+        guess = ClockGuess(name, unit, f"{how}; {sure}steps of {step:.3g}: {_rate(step, unit)}{doubt}")
     return _noted(table, guess)
+
+
+def _in_our_days(unix_s: float) -> bool:
+    return _OUR_DAYS_S[0] < unix_s < _OUR_DAYS_S[1]
+
+
+def _can_be(rate_Hz: float) -> bool:
+    return _RATES_HZ[0] <= rate_Hz <= _RATES_HZ[1]
 
 
 def _rate(step: float, unit: str) -> str:
@@ -162,10 +189,12 @@ def _noted(table: Table, guess: ClockGuess) -> ClockGuess:
 
 
 def _rate_of(seconds: Array) -> float | None:
-    """Rows per second, where about as many share each stamp."""
+    """Rows per second, where about as many share each stamp and none goes back."""
     first = np.flatnonzero(np.diff(seconds) != 0.0) + 1
     rows = np.diff(first)
-    if rows.size < 2 or float(np.mean(np.abs(rows - np.median(rows)) <= 1.0 + 0.1 * np.median(rows))) < 0.9:
+    if not rows.size or np.any(np.diff(seconds) < 0.0):
+        return None
+    if float(np.mean(np.abs(rows - np.median(rows)) <= 1.0 + 0.1 * np.median(rows))) < 0.9:
         return None
     return float(f"{float(np.sum(rows)) / float(seconds[first[-1]] - seconds[first[0]]):.4g}")
 
@@ -187,7 +216,7 @@ def _joined(table: Table) -> list[ClockGuess]:
 
 def _day_and_time(table: Table) -> list[ClockGuess]:
     named = {name: values for name, values in table.columns.items() if is_named(name) and _all_within(values, np.inf)}
-    days = [name for name, values in named.items() if _whole(values, _DAY_S) and values.min() > _UNIX[-1][0]]
+    days = [name for name, values in named.items() if _whole(values, _DAY_S) and values.min() > _UNIX_S]
     for day in days[:1]:
         same = [name for name, values in named.items() if values.size == named[day].size and _all_within(values, _DAY_S)]
         for name in same[:1]:

@@ -20,7 +20,7 @@ SCHEMA = "lugre_steering/import/1"
 
 READABLE_UNITS: Mapping[str, tuple[str, float, float]] = {
     "s": ("time", 1.0, 0.0), "ms": ("time", 1e-3, 0.0), "us": ("time", 1e-6, 0.0), "ns": ("time", 1e-9, 0.0),
-    "min": ("time", 60.0, 0.0), "d": ("time", 86400.0, 0.0),
+    "min": ("time", 60.0, 0.0), "h": ("time", 3600.0, 0.0), "d": ("time", 86400.0, 0.0),
     "rad": ("angle", 1.0, 0.0), "mrad": ("angle", 1e-3, 0.0), "deg": ("angle", 0.017453292519943295, 0.0),
     "0.1 deg": ("angle", 0.0017453292519943296, 0.0), "0.01 deg": ("angle", 0.00017453292519943296, 0.0),
     "rev": ("angle", 6.283185307179586, 0.0),
@@ -35,7 +35,7 @@ READABLE_UNITS: Mapping[str, tuple[str, float, float]] = {
     "N": ("force", 1.0, 0.0), "kN": ("force", 1e3, 0.0), "lbf": ("force", 4.4482216152605, 0.0),
     "N m": ("torque", 1.0, 0.0), "kN m": ("torque", 1e3, 0.0), "mN m": ("torque", 1e-3, 0.0),
     "lbf ft": ("torque", 1.3558179483314004, 0.0), "lbf in": ("torque", 0.1129848290276167, 0.0),
-    "degC": ("temperature", 1.0, 0.0), "K": ("temperature", 1.0, -273.15),
+    "degC": ("temperature", 1.0, 0.0), "degF": ("temperature", 5.0 / 9.0, -160.0 / 9.0), "K": ("temperature", 1.0, -273.15),
 }  # fmt: skip
 """Unit -> dimension, factor and constant that give SI (temperatures: degC)."""
 

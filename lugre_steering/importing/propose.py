@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -16,13 +17,15 @@ import yaml
 from lugre_steering.errors import LugreSteeringError, MapFileError
 from lugre_steering.importing.channels import read_channels
 from lugre_steering.importing.clocks import FEW, ClockGuess, clocks, counts, is_named
-from lugre_steering.importing.map import DIMENSIONS, READABLE_UNITS, SCHEMA, Csv, load_map
-from lugre_steering.importing.plausible import DEGREES, check_units
+from lugre_steering.importing.evaluate import signed
+from lugre_steering.importing.map import DIMENSIONS, READABLE_UNITS, SCHEMA, Csv, load_map, to_si
+from lugre_steering.importing.plausible import check_units
 from lugre_steering.importing.read import FORMATS, read_table
 from lugre_steering.importing.sniff import sniff
 from lugre_steering.importing.stated import stated, unfit
 from lugre_steering.importing.table import Table
 from lugre_steering.importing.words import WORDS, parts_of, remark_in, side_alone, spaced, tells, unit_in, words_of
+from lugre_steering.importing.write import header_stamps
 from lugre_steering.provenance import hashed, provenance
 from lugre_steering.recording import Array
 
@@ -30,6 +33,9 @@ _PRESSURE = "|".join(sorted(WORDS["pressure"]))
 _OF_PRESSURE, _PRESSURE_OF = re.compile(rf"^(?:{_PRESSURE})_(?=[a-z]{{2}})"), re.compile(rf"(?<=[a-z_][a-z])_(?:{_PRESSURE})$")
 _CONTAINERS = ("data", "fluid_pressure", "samples", "signals", "value", "values")
 """Parts of paths that name nothing."""
+_STROKE = "a length in {}: by 'pivots' or a 'polynomial' an angle, on a linear axis the angle itself"
+_FOLLOWS = 0.9
+"""Correlation of the sum of a rate over time with an angle, from which it is the rate of this angle."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +57,12 @@ def propose(file: Path, map_file: Path) -> dict[str, Any]:
         options, more = _allowances(file, options)
         reasons += more
     table = read_table(file, options)
+    bits_of = {name: bits for name, values in table.columns.items() if (bits := _signed_bits(values))}
+    as_meant = {name: signed(table.columns[name], bits, name) for name, bits in bits_of.items()}
+    table = replace(table, columns={**table.columns, **as_meant})
     times = clocks(table)
     guesses, unused = _channels(table, times)
-    signed = {name: bits for name, values in table.columns.items() if (bits := _signed_bits(values))}
-    text = _map_text(file, options, reasons, times, guesses, unused, signed, table)
+    text = _map_text(file, options, reasons, times, guesses, unused, bits_of, table)
     try:
         with map_file.open("x", encoding="utf-8") as stream:
             stream.write(text)
@@ -66,7 +74,7 @@ def propose(file: Path, map_file: Path) -> dict[str, Any]:
         "format": reasons,
         "clocks": [asdict(clock) for clock in times],
         "channels": [asdict(guess) | {"time": guess.time.column if guess.time else None} for guess in guesses],
-        "signed": signed,
+        "signed": bits_of,
         "unused": unused,
         "problem": _problem(file, map_file) or next(filter(None, (clock.doubt(table) for clock in times)), None),
     }
@@ -86,7 +94,10 @@ def _problem(file: Path, map_file: Path) -> str | None:
     """What still keeps the map from working."""
     try:
         mapping = load_map(map_file)
-        check_units(file, mapping, read_channels(read_table(file, mapping.csv), mapping))
+        channels = read_channels(read_table(file, mapping.csv), mapping)
+        check_units(file, mapping, channels)
+        for channel in channels.values():
+            header_stamps(file, map_file, mapping, channel)
     except LugreSteeringError as error:
         return str(error)
     return None
@@ -108,30 +119,63 @@ def _channels(table: Table, times: Sequence[ClockGuess]) -> tuple[list[Guess], l
     taken: dict[str, Guess] = {}
     unused = [{"column": name, "why": why} for name, why in table.unusable.items()]
     of_time = {column for clock in times for column in clock.columns()}
-    order = {None: 1, "rate": 2}  # rates after the angles they belong to, and these by their own names first
-    ordered = sorted((name for name in table.columns if name not in of_time), key=lambda name: order.get(_kind(table, name), 0))
-    for name in ordered:
-        key, why = _key(table, name)
-        if key is not None and (text := unfit(table, name, DIMENSIONS[key.partition("/")[0]])):
-            key, why = None, f"{why}, but it is stated in '{text}', which is none of its units: give scale and unit"
-        if key is not None and (obstacle := _obstacle(key, taken)):
-            key, why = None, obstacle
-        if key is None:
-            unused.append({"column": name, "why": f"{why}; {_span(table.columns[name])}"})
-            continue
-        unit, reason = _unit(table, name, key, taken)
-        if "GUESSED" in reason and (remark := remark_in(name)) is not None:
-            reason += f"; what '{remark}' says is not known"
-        taken[key] = Guess(key, name, unit, f"{why}; {reason}", _clock_of(table, times, name))
-    return list(taken.values()), unused
+    kinds = {name: _kind(table, name) for name in table.columns if name not in of_time}
+    # What tells a side, and the most of an angle, before what may be of anything; a side alone after all quantities.
+    of_angle = {name: sum(word in WORDS["angle"] for word in words_of(name)) for name in kinds}
+    ordered = sorted(kinds, key=lambda name: (kinds[name] is None, _side(name) is None, -of_angle[name]))
+    for rates in (False, True):  # rates after the angles they belong to
+        chosen: dict[str, tuple[str, str]] = {}
+        for name in (name for name in ordered if (kinds[name] == "rate") is rates):
+            key, why = _key(table, name)
+            if key is not None and (obstacle := _obstacle(table, name, key, chosen, taken)):
+                key, why = None, obstacle
+            if key is None:
+                unused.append({"column": name, "why": f"{why}; {_span(table.columns[name])}"})
+            else:
+                chosen[key] = name, why
+        for key, (name, why) in chosen.items():
+            alike = [other for of, (other, _) in chosen.items() if of.partition("/")[0] == key.partition("/")[0]]
+            unit, reason = _unit(table, name, key, alike, taken)
+            if "GUESSED" in reason and (remark := remark_in(name)) is not None:
+                reason += f"; what '{remark}' says is not known"
+            taken[key] = Guess(key, name, unit, f"{why}; {reason}", _clock_of(table, times, name))
+    return sorted(taken.values(), key=lambda guess: list(kinds).index(guess.column)), unused
 
 
-def _obstacle(key: str, taken: Mapping[str, Guess]) -> str | None:
+def _obstacle(
+    table: Table, name: str, key: str, chosen: Mapping[str, tuple[str, str]], taken: Mapping[str, Guess]
+) -> str | None:
     """Why a channel cannot be had from one more column."""
-    if key in taken:
-        return f"may be {key} too, as '{taken[key].column}'"
-    angle = key.replace("rate/", "angle/")
-    return None if angle == key or angle in taken else "a rate without its angle"
+    if key in chosen:
+        return f"may be {key} too, as '{chosen[key][0]}'"
+    kind, _, side = key.partition("/")
+    if kind == "angle" and _side(name) is None and "angle/right" in chosen:
+        return f"of no side, while '{chosen['angle/right'][0]}' is of the right"
+    dimensions, angle = DIMENSIONS[kind], taken.get(f"angle/{side}")
+    if kind == "rate":
+        if angle is None:
+            return "a rate without its angle"
+        dimensions = ("speed",) if READABLE_UNITS[angle.unit][0] == "length" else ("angular speed",)
+    fitting = stated(table, name, dimensions)
+    if fitting is None and (text := unfit(table, name, dimensions) or stated(table, name, DIMENSIONS[kind])):
+        return f"may be {key}, but it is stated in '{text}', which is none of its units: give scale and unit"
+    return None if angle is None else _rate_obstacle(table, name, angle, fitting, dimensions)
+
+
+def _rate_obstacle(table: Table, name: str, angle: Guess, unit: str | None, dimensions: tuple[str, ...]) -> str | None:
+    """Why a column is not the rate of an angle: of no side it must follow the angle, and without a ``unit`` have a known one."""
+    if unit is not None and _side(name) is not None:
+        return None
+    ratio = _summed(table, name, angle)
+    if ratio is None:
+        return None if _side(name) else f"a rate of no side, and its sum over time does not follow '{angle.column}'"
+    if unit is not None or angle.time is None or _rate_units(ratio, dimensions):
+        return None
+    return f"its sum over time is {ratio:.3g} times '{angle.column}' in SI, as in no unit known: give scale and unit"
+
+
+def _side(name: str) -> str | None:
+    return next((side for side in ("left", "right") if tells(name, side)), None)
 
 
 def _kind(table: Table, name: str) -> str | None:
@@ -146,6 +190,8 @@ def _kind(table: Table, name: str) -> str | None:
     dimension = READABLE_UNITS[unit][0] if (unit := stated(table, name, None)) else None
     if dimension == "temperature" and tells(name, "air"):
         return "air_temperature"
+    if dimension == "angle" and _side(name) is None:  # headings and latitudes are in deg as well
+        return None
     by_unit = {"angle": "angle", "angular speed": "rate", "pressure": "pressure", "torque": "torque", "force": "torque"}
     return by_unit.get(dimension or "")
 
@@ -168,7 +214,10 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
     if np.isfinite(table.columns[name]).sum() < FEW:
         return None, "hardly any numbers"
     if kind in ("angle", "rate"):
-        side = next((side for side in ("left", "right") if tells(name, side)), None)
+        length = kind == "angle" and stated(table, name, ("angle",)) is None and stated(table, name, ("length",))
+        if length and not _is_linear(table, name):
+            return None, _STROKE.format(length)
+        side = _side(name)
         return f"{kind}/{side or 'left'}", f"the name tells of {kind}" + ("" if side else ", of no side: called left")
     if kind == "pressure":
         line = _line(name)
@@ -186,28 +235,50 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
         return None, "counts the rows: as a time it needs their rate"
     none = {"command": "a command or state, nothing measured", "temperature": "a temperature, but not said to be of the air"}
     if kind is None and (unit := stated(table, name, ("length",))) is not None:
-        return None, f"a length in {unit}: by 'pivots' or a 'polynomial' an angle, on a linear axis the angle itself"
+        return None, _STROKE.format(unit)
+    if kind is None and (unit := stated(table, name, ("angle",))) is not None:
+        return None, f"in {unit}, but the name tells neither of an angle nor of a side"
     return None, none.get(kind or "", "the name tells nothing known")
 
 
-def _unit(table: Table, name: str, key: str, taken: Mapping[str, Guess]) -> tuple[str, str]:
+def _is_linear(table: Table, name: str) -> bool:
+    """Whether a column is the position of a linear axis: such a file holds a force."""
+    of_force = (other for other in table.columns if tells(other, "force") or stated(table, other, ("force",)))
+    return tells(name, "position") and any(of_force)
+
+
+def _unit(table: Table, name: str, key: str, alike: Sequence[str], taken: Mapping[str, Guess]) -> tuple[str, str]:
+    """Unit and reason; a guessed one is that of the columns ``alike``, of the same kind: stated, or of the largest numbers."""
     kind, _, side = key.partition("/")
     unit = stated(table, name, DIMENSIONS[kind])
     if unit is not None:
         return unit, "unit as stated"
-    values = table.columns[name][np.isfinite(table.columns[name])]
-    most = float(np.quantile(np.abs(values), 0.99))
-    if kind == "angle":
-        linear = not {"position", "pos"}.isdisjoint(words_of(name)) and any(tells(other, "force") for other in table.columns)
-        return _axis_unit(most) if linear else _angle_unit(most, float(np.ptp(values)))
     if kind == "rate":
         return _rate_unit(table, name, taken[f"angle/{side}"])
+    unit, reason = _unit_of_range(table, name, kind)
+    of_others = {other: stated(table, other, DIMENSIONS[kind]) for other in alike}
+    like = min(alike, key=lambda other: (of_others[other] is None, -_most(table, other)))
+    shared = of_others[like] or _unit_of_range(table, like, kind)[0]
+    return (unit, reason) if unit == shared else (shared, f"GUESSED: as '{like}'; if not, then {unit}")
+
+
+def _unit_of_range(table: Table, name: str, kind: str) -> tuple[str, str]:
+    """Unit and reason by the numbers of one column."""
+    most, values = _most(table, name), table.columns[name][np.isfinite(table.columns[name])]
+    if kind == "angle":
+        return _axis_unit(most) if _is_linear(table, name) else _angle_unit(values, most)
     if kind == "pressure":
         return _pressure_unit(most)
     if kind == "measured_torque":
         unit = "N" if tells(name, "force") else "N m"
         return unit, f"GUESSED: up to {most:.3g}, no unit known is stated"
-    return ("K", f"{most:.0f} can only be K") if float(np.median(values)) > 150.0 else ("degC", f"up to {most:.3g}")
+    kelvin = float(np.median(values)) > 150.0
+    return ("K", f"{most:.0f} can only be K") if kelvin else ("degC", f"GUESSED: up to {most:.3g}; if not, then degF")
+
+
+def _most(table: Table, name: str) -> float:
+    """Below so much lie all magnitudes but for outliers."""
+    return float(np.quantile(np.abs(table.columns[name][np.isfinite(table.columns[name])]), 0.99))
 
 
 def _axis_unit(most: float) -> tuple[str, str]:
@@ -215,30 +286,47 @@ def _axis_unit(most: float) -> tuple[str, str]:
     return unit, f"GUESSED: up to {most:.4g} and a force in the file, so a linear axis; if not, then {'deg' if unit == 'mm' else 'rad'}"
 
 
-def _angle_unit(most: float, travel: float) -> tuple[str, str]:
-    if most > 2.0 * np.pi:
+def _angle_unit(values: Array, most: float) -> tuple[str, str]:
+    if most <= 2.0 * np.pi:
+        return "rad", f"GUESSED: up to {most:.3g}; as deg it would travel {np.ptp(values):.2g} deg only. A linear axis would be m"
+    if most <= 360.0 or np.any(values != np.round(values)):
         return "deg", f"up to {most:.4g}: radians would be more than a turn"
-    return "rad", f"GUESSED: up to {most:.3g}; as deg it would travel {travel:.2g} deg only. A linear axis would be m"
+    unit = "0.1 deg" if most <= 1800.0 else "0.01 deg"
+    return unit, f"GUESSED: whole numbers up to {most:.4g}: deg would be more than a turn"
 
 
 def _rate_unit(table: Table, name: str, angle: Guess) -> tuple[str, str]:
-    """By the slope of the angle over the rate times time: 57 where one is in deg and the other in rad."""
+    """By the sum over time: 57 times the angle where one is in deg and the other in rad."""
     linear = READABLE_UNITS[angle.unit][0] == "length"
-    plain = f"{angle.unit}/s" if angle.unit in ("deg", "mm") else "m/s" if linear else "rad/s"
-    if angle.time is None or angle.unit not in ("deg", "rad"):
-        return plain, f"GUESSED, as the angle is in {angle.unit}"
-    time, value, rate = angle.time.seconds(table), table.columns[angle.column], table.columns[name]
+    ratio = _summed(table, name, angle) if angle.time is not None else None
+    if ratio is None:
+        small = "mm/s" if angle.unit == "mm" else "deg/s" if angle.unit.endswith("deg") else None
+        return small or ("m/s" if linear else "rad/s"), f"GUESSED, as the angle is in {angle.unit}"
+    return _rate_units(ratio, ("speed",) if linear else ("angular speed",))[0], f"its sum over time is {ratio:.3g} times the angle in SI"
+
+
+def _rate_units(ratio: float, dimensions: tuple[str, ...]) -> list[str]:
+    """Units in which a rate is that of an angle of which its sum over time is ``ratio`` times as much."""
+    factors = {unit: factor for unit, (dimension, factor, _) in READABLE_UNITS.items() if dimension in dimensions}
+    return [unit for unit, factor in factors.items() if abs(ratio * factor - 1.0) < 0.2]
+
+
+def _summed(table: Table, name: str, angle: Guess) -> float | None:
+    """How many times an angle [SI] the sum of a rate over time is, nothing where it does not follow the angle; without a
+    time the rows are counted."""
+    value, rate = to_si(table.columns[angle.column], angle.unit), table.columns[name]
+    time = np.arange(float(value.size)) if angle.time is None else angle.time.seconds(table)
     if not time.size == value.size == rate.size:
-        return plain, f"GUESSED, as the angle is in {angle.unit}"
+        return None
     known = np.isfinite(time) & np.isfinite(value) & np.isfinite(rate)
+    if known.sum() < FEW:
+        return None
     turned = value[known] - value[known].mean()
     summed = np.concatenate([[0.0], np.cumsum(0.5 * (rate[known][1:] + rate[known][:-1]) * np.diff(time[known]))])
     summed -= summed.mean()
-    ratio = abs(float(summed @ turned) / float(turned @ turned)) if turned.any() else 0.0
-    for factor, other in ((DEGREES, "deg/s"), (1.0 / DEGREES, "rad/s")):
-        if abs(ratio / factor - 1.0) < 0.2:
-            return other, f"its sum over time is {ratio:.3g} times the angle in {angle.unit}"
-    return plain, f"its sum over time is {ratio:.3g} times the angle" if 0.8 < ratio < 1.25 else "GUESSED, as the angle"
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows follows nothing
+        both, alone, squared = abs(float(summed @ turned)), float(turned @ turned), float(summed @ summed)
+    return both / alone if both > _FOLLOWS * math.sqrt(alone * squared) else None
 
 
 def _pressure_unit(most: float) -> tuple[str, str]:
@@ -275,7 +363,7 @@ def _map_text(
     times: Sequence[ClockGuess],
     guesses: Sequence[Guess],
     unused: Sequence[Mapping[str, str]],
-    signed: Mapping[str, int],
+    bits_of: Mapping[str, int],
     table: Table,
 ) -> str:
     """The map, with the reasons as comments."""
@@ -294,8 +382,8 @@ def _map_text(
             lines.append(f"names: {_flow(names)}")
     else:
         lines.append("# time: {rate_Hz: 100}  # no column rises like a time: give the samples per second")
-    if signed:
-        lines.append(f"signed: {_flow(signed)}  # whole numbers near zero and near the largest, nothing between")
+    if bits_of:
+        lines.append(f"signed: {_flow(bits_of)}  # whole numbers near zero and near the largest, nothing between")
     lines.append("channels:" if guesses else "channels: {}  # none guessed: choose from the columns below")
     for guess in guesses:
         source: dict[str, Any] = {"column": guess.column, "unit": guess.unit}

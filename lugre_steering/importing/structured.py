@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.errors import MapFileError
+from lugre_steering.importing.stamps import is_stamp
 from lugre_steering.importing.table import MAX_DEPTH, Gathering, Table
 from lugre_steering.importing.text import number
 from lugre_steering.recording import Array
@@ -62,6 +63,7 @@ def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
     if isinstance(value, dict):
         for key, inner in value.items():
             _collect(found, _join(name, key), inner, depth + 1)
+        found.state(name, value)
     elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
         _collect_records(found, name, value)
     elif isinstance(value, list) and value and all(isinstance(item, list) for item in value):
@@ -111,6 +113,8 @@ def _numbers(found: Gathering, name: str, values: Sequence[Any]) -> Array | None
     """Values (n,); nothing if one of them is no number, which is noted."""
     if set(map(type, values)) == {float}:
         return np.array(values)
+    if any(isinstance(value, str) and is_stamp(value) for value in values):
+        found.titles[name] = ("s",)
     numbers = np.empty(len(values))
     for place, value in enumerate(values):
         single = _number(value)

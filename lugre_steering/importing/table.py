@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from lugre_steering.errors import MapFileError
-from lugre_steering.importing.words import unit_in
+from lugre_steering.importing.words import tells, unit_in
 from lugre_steering.recording import Array
 
 MAX_NUMBERS = 100_000_000
@@ -26,6 +26,8 @@ FEW_NUMBERS, PACKED = 8_000_000, 50
 MAX_COLUMNS = 10_000
 MAX_DEPTH = 64
 """Nested structures."""
+UNIT_KEYS = ("unit", "units", "einheit")
+"""What the attribute or field is called that states a unit."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,19 @@ class Gathering:
         nanoseconds = array.astype(f"{array.dtype.kind}8[ns]")
         self.add(name, np.where(np.isnat(nanoseconds), np.nan, nanoseconds.astype(np.int64).astype(np.float64)))
         self.titles[name] = ("ns",)
+
+    def state(self, name: str, texts: Mapping[str, Any]) -> None:
+        """Note the unit that attributes, or fields beside, state of what was gathered last, all under ``name``, but for its times."""
+        key = next((key for key, text in texts.items() if key.lower() in UNIT_KEYS and isinstance(text, str)), None)
+        if key is None:
+            return
+        self.unusable.pop(f"{name}.{key}", None)
+        unit = texts[key].partition(" since ")[0]  # as netCDF has it: seconds since 1970-01-01
+        for column in reversed(self.columns):
+            if column != name and not column.startswith((f"{name}.", f"{name}[")):
+                return
+            if tells(name, "time") or not tells(column, "time"):
+                self.titles.setdefault(column, (unit,))
 
     def table(self, titles: Mapping[str, tuple[str, ...]] | None = None) -> Table:
         return Table(self.file, self.columns, self.scalars, self.unusable, {**self.titles, **(titles or {})})

@@ -16,7 +16,7 @@ import numpy as np
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
-from lugre_steering.importing.stamps import stamp
+from lugre_steering.importing.stamps import is_stamp, stamp
 from lugre_steering.importing.table import MAX_COLUMNS, MAX_NUMBERS, Table
 
 Row = tuple[int, list[str]]
@@ -136,6 +136,7 @@ class _Columns:
             title: f"column '{title}' occurs twice; expected '{title}[1]', '{title}[2]', ... in the map"
             for title, count in Counter(titles).items() if count > 1 and title
         }  # fmt: skip
+        self.stamped: set[str] = set()
         self.left_out: Counter[str] = Counter()
         self.rows = 0
 
@@ -194,6 +195,8 @@ class _Columns:
                 return list(map(float, cells))
             except ValueError:
                 pass
+        if not self.values[place] and any(map(is_stamp, cells)):
+            self.stamped.add(self.names[place])
         found = []
         for (line, _), cell in zip(block, cells, strict=True):
             value = number(cell, decimal, self.options.dates)
@@ -213,7 +216,8 @@ class _Columns:
         return found
 
     def _titles(self) -> dict[str, tuple[str, ...]]:
-        """What the other header rows say; which are units is for the proposal to find out."""
+        """The unit of dates and times, and what the other header rows say; which are units is for the proposal to find out."""
         others = [row for i, row in enumerate(self.header, 1) if i != self.options.name_row]
         columns = zip(self.names, *(row + [""] * (len(self.names) - len(row)) for row in others), strict=False)
-        return {name: tuple(filter(None, cells)) for name, *cells in columns if any(cells)}
+        found = {name: tuple(filter(None, cells)) for name, *cells in columns if any(cells)}
+        return found | {name: ("s", *found.get(name, ())) for name in self.stamped}

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 _SPELLINGS: Mapping[str, str] = {
     "s": "s sec secs second seconds sekunden", "ms": "ms msec msecs millis milliseconds", "us": "us usec micros microseconds",
-    "ns": "ns nsec nsecs nanos nanoseconds", "min": "min minutes", "d": "d day days tage",
+    "ns": "ns nsec nsecs nanos nanoseconds", "min": "min minutes", "h": "h hr hrs hour hours stunden", "d": "d day days tage",
     "rad": "rad radian radians", "mrad": "mrad", "deg": "deg degree degrees ° grad",
-    "0.1 deg": "0.1_deg 0.1deg 0.1° 0.1_° 1/10_deg 1/10deg 1/10° deg/10 °/10",
-    "0.01 deg": "0.01_deg 0.01deg 0.01° 0.01_° 1/100_deg 1/100deg 1/100° deg/100 °/100",
+    "0.1 deg": "ddeg decideg 0.1_deg 0.1deg 0.1° 0.1_° 1/10_deg 1/10deg 1/10° deg/10 °/10",
+    "0.01 deg": "cdeg centideg 0.01_deg 0.01deg 0.01° 0.01_° 1/100_deg 1/100deg 1/100° deg/100 °/100",
     "rev": "rev revs revolution revolutions turn turns", "m": "m meter metre", "cm": "cm", "mm": "mm", "um": "um micron microns",
     "in": "in inch inches",
     "rad/s": "rad/s rad_s rads rad/sec radps", "deg/s": "deg/s deg_s °/s dps deg/sec °/sec degs grad/s",
@@ -22,12 +22,16 @@ _SPELLINGS: Mapping[str, str] = {
     "N m": "nm n_m n·m n*m n.m n-m newtonmeter", "kN m": "knm kn_m kn·m kn*m kn.m", "mN m": "mNm mN_m mN·m mN*m mN.m",
     "lbf ft": "lbf_ft lbf-ft lbf·ft lbf*ft lbfft lb_ft lb-ft lbft ft_lbf ft-lbf ftlbf ft_lb ft-lb ftlb",
     "lbf in": "lbf_in lbf-in lbf·in lbf*in lbfin lb_in lb-in lbin in_lbf in-lbf inlbf in_lb in-lb inlb",
-    "degC": "degc c °c celsius deg_c", "K": "k kelvin",
+    "degC": "degc c °c celsius deg_c", "degF": "degf f °f fahrenheit deg_f", "K": "k kelvin",
 }  # fmt: skip
 UNIT_OF: Mapping[str, str] = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
 """Spelling -> unit; in any case, but for capitals here: mNm is not MNm."""
 _IN_BRACKETS_ONLY = ("in", "d")
 """Units that at the end of a name are words of their own: p_in."""
+_LETTERS: Mapping[str, tuple[str, ...]] = {
+    "m": ("position",), "M": ("position",), "n": ("torque",), **dict.fromkeys(("c", "f", "k"), ("temperature", "air"))
+}  # fmt: skip
+"""Ends of a name that are units only if it tells their quantity: theta_m is the measured one, but F_N is in newton."""
 _UNSCALED = frozenset(
     ("%", "%fs", "%_fs", "percent", "pct", "a", "ma", "amp", "amps", "v", "mv", "volt", "volts", "count", "counts", "ticks", "lsb")
 )
@@ -46,6 +50,7 @@ WORDS: Mapping[str, frozenset[str]] = {
         "torque": "torque moment drehmoment tau trq force kraft",
         "force": "force kraft",
         "angle": "angle theta phi winkel lenkwinkel steer steering position pos q qm qs encoder joint alpha",
+        "position": "position pos stroke",
         "left": "left l li links lh",
         "right": "right r re rechts rh",
     }.items()
@@ -96,8 +101,13 @@ def side_alone(name: str) -> str | None:
 def unit_in(text: str, whole: bool = False) -> str | None:
     """A unit that a name or a header cell states: in brackets, at its end after a blank or _, or as the ``whole`` text."""
     square, rounded = _bracketed(text)
-    ends = [text] if whole else [end for end in _ends(text) if end.lower() not in _IN_BRACKETS_ONLY]
+    ends = [text] if whole else [end for end in _ends(text) if _is_unit(end, text)]
     return next((unit for candidate in (*square, *rounded, *ends) if (unit := _known(candidate)) is not None), None)
+
+
+def _is_unit(end: str, name: str) -> bool:
+    """Whether the end of a name may be a unit at all."""
+    return end.lower() not in _IN_BRACKETS_ONLY and (end not in _LETTERS or any(tells(name, kind) for kind in _LETTERS[end]))
 
 
 def stated_in(text: str, whole: bool = False) -> str | None:

@@ -39,7 +39,7 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
     table = read_table(file, mapping.csv)
     channels = read_channels(table, mapping)
     check_units(file, mapping, channels)
-    stamps = {name: _stamps(file, map_file, mapping, channel) for name, channel in channels.items()}
+    stamps = {name: header_stamps(file, map_file, mapping, channel) for name, channel in channels.items()}
     logged = _log_times(mapping, channels, stamps)
     origin = provenance("import", {"table": hashed(file), "map": hashed(map_file), "storage": storage})
     marks = {"imported_from": file.name, "import_map": map_file.name, MADE: "\n".join(origin.lines())}
@@ -95,7 +95,7 @@ def staged(out: Path) -> Iterator[Path]:
         os.close(lock)
 
 
-def _stamps(file: Path, map_file: Path, mapping: ImportMap, channel: Imported) -> IntArray:
+def header_stamps(file: Path, map_file: Path, mapping: ImportMap, channel: Imported) -> IntArray:
     """Header stamps (n,) [ns]; rounding the two parts apart keeps nanoseconds."""
     low, high = float(channel.time_s.min()), float(channel.time_s.max())
     if not 0.0 < mapping.epoch_s + low <= mapping.epoch_s + high < 2.0**31:
