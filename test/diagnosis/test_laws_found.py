@@ -36,7 +36,7 @@ from lugre_steering.diagnosis.laws.rival import (
     leaves_names,
 )
 from lugre_steering.diagnosis.laws.screen import Screen, Screened
-from lugre_steering.diagnosis.laws.write import described, entries, law_words, sentence
+from lugre_steering.diagnosis.laws.write import described, entries, formula, law_words, sentence
 from lugre_steering.diagnosis.search.search import Search
 from lugre_steering.diagnosis.search.surely import deviations
 from lugre_steering.effects.law_entry import LawEntry
@@ -542,5 +542,5 @@ def test_a_formula_has_its_numbers_and_a_sentence_what_fits_as_well(form: str, v
         "channel": "conservative_torque", "coordinate": "angle", "memory": "none", "form": form, "values": values, "range": [-0.6, 0.6],
         "title": "a torque", "largest_Nm": 900.0, "largest_share": 0.1, "ties": [{"title": "a gain"}, {"title": "a loss"}, {"title": "more"}],
     }  # fmt: skip
-    assert write.formula([law], load_vehicle(None)) == f"torque [N m] = {said}"
-    assert write.sentence([law], lambda torque: f"{torque:g} N m").endswith("of the torque; not to be told from a gain or a loss)")
+    assert formula([law], load_vehicle(None)) == f"torque [N m] = {said}"
+    assert sentence([law], lambda torque: f"{torque:g} N m").endswith("of the torque; not to be told from a gain or a loss)")
