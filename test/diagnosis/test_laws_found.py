@@ -17,6 +17,7 @@ from small_problem import SIGMA, effect, small_problem, weight, with_torque
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
+from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude.experiment import next_experiment
 from lugre_steering.diagnosis.conclude.left_over import beside_laws
 from lugre_steering.diagnosis.conclude.stands import standing
@@ -24,7 +25,16 @@ from lugre_steering.diagnosis.finished import Finished
 from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws import rival
 from lugre_steering.diagnosis.laws.cells import Axis, Cell, axes_of, trace
-from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, _loop_gain, _sure, find, leading, preferred
+from lugre_steering.diagnosis.laws.find import (
+    FoundLaws,
+    Tried,
+    _loop_gain,
+    _sure,
+    find,
+    heldout_gains,
+    leading,
+    preferred,
+)
 from lugre_steering.diagnosis.laws.refine import closed_forms, closed_law, free_law, law_of, with_law
 from lugre_steering.diagnosis.laws.rival import (
     _in_place_of_given,
@@ -244,6 +254,21 @@ def test_a_second_law_is_sought_beside_the_first_as_it_was_fitted() -> None:
     first = with_law(problem, used, fitted(problem), free_law(problem, short, 0, np.zeros(short.pieces)))
     screen = Screen(problem, first, used, split(problem), white(problem).draws, trace(problem, first, 1, [Axis("angle")]), 1)
     assert screen.beside.left[0] < 1.2 * first.cost
+
+
+def test_each_of_two_has_its_own_gain_on_held_out_data() -> None:
+    """One of ten times the noise, and one as large as that: without it half is missing, less what recalibration makes up for."""
+    large, small = effect("slope_bias", torque=10.0 * SIGMA), effect("kingpin_jacking", amplitude=1.0)
+    there = NOTHING.predict_all(NOTHING.start())
+    shape = NOTHING.predict_all(NOTHING.start(), [small]) - there
+    small[1]["amplitude"] = SIGMA / float(np.sqrt(np.mean(shape[split(NOTHING).held] ** 2)))
+    problem = with_torque(NOTHING, NOTHING.predict_all(NOTHING.start(), [large, small]))
+    result, plain = fitted(problem, large, small), fitted(problem)
+    done = named(problem, result)
+    judged = verify.judged_once(problem, plain, result, done.roles, 1)
+    gains = heldout_gains(done, problem, result, 0, judged, 1)
+    assert gains[0] == pytest.approx(0.99, abs=0.01)
+    assert 0.05 < gains[1] < 0.5
 
 
 def screen_of(problem: Problem, before: Fit) -> Screen:
@@ -540,7 +565,8 @@ def test_a_bad_law_in_a_catalogue_is_refused_by_key(tmp_path: Path) -> None:
 def test_a_formula_has_its_numbers_and_a_sentence_what_fits_as_well(form: str, values: dict[str, float], said: str) -> None:
     law = {
         "channel": "conservative_torque", "coordinate": "angle", "memory": "none", "form": form, "values": values, "range": [-0.6, 0.6],
-        "title": "a torque", "largest_Nm": 900.0, "largest_share": 0.1, "ties": [{"title": "a gain"}, {"title": "a loss"}, {"title": "more"}],
+        "title": "a torque", "largest_Nm": 900.0, "largest_share": 0.1,
+        "ties": [{"title": title} for title in ("a gain", "a loss", "more")],
     }  # fmt: skip
     assert formula([law], load_vehicle(None)) == f"torque [N m] = {said}"
     assert sentence([law], lambda torque: f"{torque:g} N m").endswith("of the torque; not to be told from a gain or a loss)")
