@@ -20,8 +20,7 @@ import yaml
 
 from lugre_steering import yaml_text
 from lugre_steering.chain.compiled import exp, law, tanh
-from lugre_steering.chain.compose import HOOKS, quantities_of
-from lugre_steering.chain.layout import BASELINE_FIELDS
+from lugre_steering.chain.compose import HOOKS, SENSOR_HOOKS, quantities_of
 from lugre_steering.effects.declared import A_NAME, check_typed, is_name
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
@@ -30,8 +29,8 @@ from lugre_steering.expression import ExpressionError, parse
 from lugre_steering.files import read_text, write_text
 from lugre_steering.schema import Reader
 
-PAIRED = ("wind_up", "contact")
-"""Hooks whose laws return more than one number: a line of YAML cannot."""
+OF_PYTHON = ("wind_up", "contact", "line")
+"""Hooks whose laws return more than one number, which a line of YAML cannot, or act once per pressure line (``Effect.per_line``)."""
 
 
 @law
@@ -214,15 +213,16 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
     if set(sheet.update) != set(sheet.memory):
         raise reader.fail(key("update"), sorted(sheet.update), f"the next value of each memory ({', '.join(sheet.memory) or 'none'})")
     hooks = {}
-    for i, (hook, text) in enumerate(sheet.laws.items()):
-        if hook not in HOOKS or hook in PAIRED:
-            known = ", ".join(name for name in HOOKS if name not in PAIRED)
-            hint = " (this one needs a .py file)" if hook in PAIRED else ""
+    keeping = next((hook for hook in sheet.laws if hook not in SENSOR_HOOKS), "")  # whose law makes the next values of the memory
+    for hook, text in sheet.laws.items():
+        if hook not in HOOKS or hook in OF_PYTHON:
+            known = ", ".join(name for name in HOOKS if name not in OF_PYTHON)
+            hint = " (this one needs a .py file)" if hook in OF_PYTHON else ""
             raise reader.fail(key(f"laws.{hook}"), text, f"a hook out of {known}{hint}")
-        own = [*sheet.parameters, *sheet.memory]
-        names = [*own, *(name for name in (*quantities_of(hook), *BASELINE_FIELDS) if name not in own)]
-        parts = {"": text, **(sheet.update if i == 0 else {})}
-        hooks[hook] = _compiled(reader, key(f"laws.{hook}"), hook, parts, names, tuple(sheet.memory) if i == 0 else ())
+        memory = {} if hook in SENSOR_HOOKS else sheet.update if hook == keeping else {name: name for name in sheet.memory}
+        own = [*sheet.parameters, *memory]
+        names = [*own, *(name for name in quantities_of(hook) if name not in own)]
+        hooks[hook] = _compiled(reader, key(f"laws.{hook}"), hook, text, memory, names)
     parameters = tuple(
         Parameter(
             name, p.unit, p.meaning, p.scale, -math.inf if p.low <= -1e300 else p.low, math.inf if p.high >= 1e300 else p.high,
@@ -238,10 +238,10 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
     )  # fmt: skip
 
 
-def _compiled(reader: Reader, key: str, hook: str, parts: Mapping[str, str], names: Sequence[str], memory: Sequence[str]) -> Any:
-    """A law out of its expression and the updates of the memory, which see the memory as it was."""
+def _compiled(reader: Reader, key: str, hook: str, part: str, memory: Mapping[str, str], names: Sequence[str]) -> Any:
+    """A law out of its expression and what becomes of the ``memory``; both see the memory as it was."""
     try:
-        checked = {name: parse(text, names) for name, text in parts.items()}
+        checked = {name: parse(text, names) for name, text in {"": part, **memory}.items()}
     except ExpressionError as error:
         raise EffectError(f"{reader.file}: key '{key}': {error}") from None
     used = [name for name in names if name not in memory and any(name in one.names for one in checked.values())]

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from lugre_steering.chain.compose import Composition, check, compose
+from lugre_steering.chain.compose import SENSOR_HOOKS, Composition, check, compose
 from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.step import new_parameters, run_side
 from lugre_steering.effects import own
@@ -31,6 +31,7 @@ from lugre_steering.effects.entry import STAGES, Effect
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
 from lugre_steering.provenance import Provenance, Source, provenance
+from lugre_steering.recording import Array
 
 GROUP = "lugre_steering.effects"
 VARIABLE = "LUGRE_STEERING_EFFECTS"
@@ -129,7 +130,7 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
         foreign = dataclasses.replace(new, sha256=origin.sha256)
         try:
             check_declared(foreign, {*CATALOGUE, *ids})
-            check(foreign)
+            check(foreign, [*CATALOGUE.values()])
             _try(foreign)
         except EffectError as error:
             raise EffectError(f"{where}: {error}") from error
@@ -145,23 +146,29 @@ def made(command: str, options: Mapping[str, Any], vehicle: Path | Source | None
 
 def _try(new: Effect) -> None:
     """Compile an effect and run it over a short motion at its typical size: what fails is told now, not in mid-work."""
-    made = compose([new])
-    p, time = new_parameters(made), np.asarray(np.arange(200) * 0.01, np.float64)
-    for field, value in (("static_torque", 1.1), ("coulomb_torque", 1.0), ("sigma_0", 50.0), ("stribeck_speed", 0.05),
-                         ("stribeck_exponent", 2.0), ("heat_capacity", 1e4), ("sides", 1.0), ("table_step", 1.0)):  # fmt: skip
-        p[field] = value
-    if not new.per_line:
-        for field, number in new.fields({parameter.name: parameter.typical for parameter in new.parameters}).items():
-            p[field] = number
+    time = np.asarray(np.arange(200) * 0.01, np.float64)
+    phase = 3.0 * time
+    theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))
+    typical = {parameter.name: parameter.typical for parameter in new.parameters}
     try:
-        phase = 3.0 * time
-        theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))
-        out = run_side(p, np.ones((2, 2)), np.asarray(time), theta, omega, alpha)
+        p = new_parameters(compose([new]))
+        for field, value in (("static_torque", 1.1), ("coulomb_torque", 1.0), ("sigma_0", 50.0), ("stribeck_speed", 0.05),
+                             ("stribeck_exponent", 2.0), ("heat_capacity", 1e4), ("sides", 1.0), ("table_step", 1.0)):  # fmt: skip
+            p[field] = value
+        for field, number in new.fields({} if new.per_line else typical).items():
+            p[field] = number
+        out = run_side(p, np.ones((2, 2)), time, theta, omega, alpha)
+        given: list[Array | float] = [out[name] for name in OUTPUT.names or ()]
+        with np.errstate(all="ignore"):
+            for hook in sorted(new.hooks.keys() & SENSOR_HOOKS):  # over whole recordings, and compiled for one number at a time
+                given.append(new.law(hook, typical, theta=theta, elapsed=time))
+                given.append(float(new.hooks[hook](*(typical.get(name, 0.1) for name in new.reads(hook)))))
+        finite = all(np.isfinite(part).all() for part in given)
     except Exception as error:  # Numba's errors are many and long
         owed = "; a law returns its part, then every memory that it names" if new.memory else ""
         raise EffectError(f"effect '{new.id}': its laws cannot be compiled: {_reason(error)}{owed}") from error
-    if not all(np.isfinite(out[name]).all() for name in OUTPUT.names or ()):
-        raise EffectError(f"effect '{new.id}': got torques that are no numbers at its typical size, expected finite ones")
+    if not finite:
+        raise EffectError(f"effect '{new.id}': got torques or readings that are no numbers at its typical size, expected finite ones")
 
 
 def _reason(error: Exception) -> str:
