@@ -98,6 +98,7 @@ def _is_number(value: object) -> bool:
 
 def _in_order(effect: Effect) -> Iterator[Claim]:
     yield "id", effect.id, is_name(effect.id), A_NAME
+    yield "id", effect.id, re.fullmatch(r"law_\d+", effect.id) is None, "another name: law_1, law_2, ... are the laws of a vehicle file"
     for key in ("title", "joint_title"):
         yield key, getattr(effect, key), _is_line(getattr(effect, key)), "one line"
     for name in (*(p.name for p in effect.parameters), *effect.memory, *effect.tables):

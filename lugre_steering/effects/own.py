@@ -21,7 +21,7 @@ import yaml
 from lugre_steering import yaml_text
 from lugre_steering.chain.compiled import exp, law, tanh
 from lugre_steering.chain.compose import HOOKS, SENSOR_HOOKS, quantities_of
-from lugre_steering.effects.declared import A_NAME, check_typed, is_name
+from lugre_steering.effects.declared import A_NAME, check_declared, check_typed, is_name
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
 from lugre_steering.errors import EffectError, reason
@@ -176,6 +176,11 @@ def add_law(catalogue: Path, identity: str, title: str, source: str, law: Mappin
     new = {"id": identity, "title": title, "source": source, "law": law}
     item = yaml.safe_dump([new], sort_keys=False, allow_unicode=True, width=120)
     reader = Reader(catalogue, EffectError)
+    effect = _of_law(reader, reader.build(_Kept, new, ""), "")
+    try:
+        check_declared(effect, ())
+    except EffectError as error:
+        raise EffectError(f"{catalogue}: {error}") from error
     before, known = "effects:\n", []
     if catalogue.exists():
         if any(effect.id == identity for effect in read_effects(catalogue)[0]):
@@ -190,7 +195,6 @@ def add_law(catalogue: Path, identity: str, title: str, source: str, law: Mappin
         except EffectError:
             continue
         if whole == {"effects": [*known, new]}:
-            _of_law(reader, reader.build(_Kept, new, ""), "")
             write_text(text, catalogue)
             return
     raise EffectError(f"{catalogue}: expected a file of one list 'effects', each entry behind a dash, to add '{identity}' to")

@@ -319,6 +319,7 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
         ("scale: 300.0", "scale: many", "a plain number"),
         ("laws:", "lawz:", "no such key"),
         ("id: chain_ripple", "id: class", "no word of Python"),
+        ("id: chain_ripple", "id: law_1", "id: got 'law_1', expected another name: law_1, law_2, ... are the laws of a vehicle file"),
         ("id: chain_ripple", f"id: {'a' * 300}", "at most 64"),
         ("title: ", 'title: "a\\nb" #', r"title: got 'a\\nb', expected one line"),
         ("high: 1.0e4", "high: -1.0", "parameters.torque.low: got 0.0, expected less than high"),
