@@ -93,14 +93,17 @@ class _Kept:
 
 
 def read_effects(file: Path) -> tuple[list[Effect], str]:
-    """Effects of a user's file, and the SHA-256 of its content, by which vehicle files know it again."""
+    """Effects of a user's file, each with the SHA-256 by which vehicle files know it again, and that of the whole file.
+
+    Of Python it is that of the file, as a law may use whatever stands there; of YAML it is that of its own entry.
+    """
     try:
         content = read_text(file, yaml_text.LONGEST)
     except (OSError, ValueError) as error:
         raise EffectError(f"{file}: cannot be read: {reason(error)}; expected a .py or .yaml file of effects") from error
     sha256 = hashlib.sha256(content.encode()).hexdigest()
     if file.suffix == ".py":
-        found = _of_module(_run(file, content, sha256), str(file))
+        found = [dataclasses.replace(effect, sha256=sha256) for effect in _of_module(_run(file, content, sha256), str(file))]
     elif file.suffix in (".yaml", ".yml"):
         found = _of_yaml(file)
     else:
@@ -153,12 +156,14 @@ def _of_yaml(file: Path) -> list[Effect]:
     if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise reader.fail("effects", listed, "a list of effects")
     prefixes = [f"effects[{i}]" for i in range(len(listed))] if len(listed) > 1 else [""]
-    return [
+    found = [
         _of_law(reader, reader.build(_Kept, item, prefix), prefix)
         if isinstance(item, Mapping) and "law" in item
         else _of_sheet(reader, reader.build(_Sheet, item, prefix), prefix)
         for item, prefix in zip(listed, prefixes, strict=True)
     ]
+    digests = (hashlib.sha256(repr(item).encode()).hexdigest() for item in listed)
+    return [dataclasses.replace(effect, sha256=digest) for effect, digest in zip(found, digests, strict=True)]
 
 
 def _of_law(reader: Reader, kept: _Kept, prefix: str) -> Effect:

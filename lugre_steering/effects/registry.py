@@ -15,7 +15,7 @@ import pkgutil
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -40,10 +40,12 @@ VARIABLE = "LUGRE_STEERING_EFFECTS"
 
 @dataclass(frozen=True)
 class Origin:
-    """Where foreign physics comes from: what to give or install, and the SHA-256 of what it is."""
+    """Where foreign physics comes from: what to give or install, and the SHA-256 of what it is; ``of_file``: of the whole file, which
+    vehicle files have that were written before entries of YAML had theirs."""
 
     source: str
     sha256: str
+    of_file: str = field(default="", compare=False)
 
 
 def _shipped() -> Iterator[Effect]:
@@ -111,15 +113,15 @@ def add_files(files: str | Path | Sequence[str | Path]) -> None:
     paths = [Path(file) for file in ([files] if isinstance(files, (str, Path)) else files)]
     for file in paths:
         effects, sha256 = own.read_effects(file)
-        _add(effects, Origin(file.name, sha256), str(file))
+        _add([(new, Origin(file.name, new.sha256, sha256)) for new in effects], str(file))
     if paths:
         known = os.environ.get(VARIABLE, "").split(os.pathsep)
         os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(path.resolve()) for path in paths)]))
 
 
-def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
-    ids = [new.id for new in effects]
-    for new in effects:
+def _add(effects: Sequence[tuple[Effect, Origin]], where: str) -> None:
+    ids = [new.id for new, _ in effects]
+    for new, origin in effects:
         if ids.count(new.id) > 1:
             raise EffectError(f"{where}: effect '{new.id}': there are {ids.count(new.id)} of this id; expected one")
         if ORIGINS.get(new.id) == origin:
@@ -196,8 +198,8 @@ def _add_installed() -> None:
             found = entry.load()
         except (Exception, SystemExit) as error:  # whatever a foreign package raises
             raise EffectError(f"{where}: entry point '{entry.name}' cannot be loaded: {type(error).__name__}: {error}") from error
-        effects = own.of_objects(found, f"{where}: entry point '{entry.name}'")
-        _add(effects, Origin(where, _content(entry.module)), where)
+        origin = Origin(where, _content(entry.module))
+        _add([(new, origin) for new in own.of_objects(found, f"{where}: entry point '{entry.name}'")], where)
 
 
 for _effect in CATALOGUE.values():

@@ -52,7 +52,7 @@ def _of_catalogue(added: EffectEntry, fail: Fail) -> tuple[Effect, EffectEntry]:
     if effect is None:
         raise fail("id", added.id, f"an effect of the catalogue; {suggestion(added.id, list(CATALOGUE))}")
     origin = ORIGINS.get(added.id)
-    if origin is not None and added.sha256 not in (None, origin.sha256):
+    if origin is not None and added.sha256 not in (None, origin.sha256, origin.of_file):
         expected = f"that of the laws given now in {origin.source} ({origin.sha256}): they are others under the same name"
         raise fail("sha256", added.sha256, expected)
     return effect, added if origin is None else replace(added, source=origin.source, sha256=origin.sha256)

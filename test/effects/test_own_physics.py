@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -26,11 +27,11 @@ from lugre_steering.diagnosis import effect_card
 from lugre_steering.effects import registry
 from lugre_steering.effects.entry import Seen
 from lugre_steering.effects.own import read_effects
-from lugre_steering.errors import EffectError
+from lugre_steering.errors import EffectError, VehicleFileError
 from lugre_steering.estimator import Estimator
 from lugre_steering.fitting.fingerprint import _suggested
 from lugre_steering.resources import config_folder
-from lugre_steering.vehicle import EffectEntry, load
+from lugre_steering.vehicle import EffectEntry, load, save
 from lugre_steering.vehicle.model import build_model
 
 OWN = config_folder() / "own_physics"
@@ -350,6 +351,36 @@ def test_what_is_no_effect_is_refused(tmp_path: Path, old: str, new: str, words:
 def test_an_effect_has_no_field_of_another(tmp_path: Path, identity: str, name: str, field: str) -> None:
     told = refusal(tmp_path / "mine.yaml", RIPPLE.read_text().replace("pitch", name), "id: chain_ripple", f"id: {identity}", name)
     assert f"'{field}', which there is already" in told
+
+
+KEPT = """
+- id: {name}_loss
+  title: {name}
+  law: {{channel: gain, coordinate: none, form: constant, range: [0.0, 1.0], values: {{value: {value}}}}}
+"""
+
+
+def test_a_vehicle_file_knows_its_entry_whatever_else_stands_in_the_file(tmp_path: Path) -> None:
+    """By the entry itself, or as earlier vehicle files have it by the whole file; another entry of its name is refused."""
+    file, written = tmp_path / "mine.yaml", tmp_path / "vehicle.yaml"
+    first, second = KEPT.format(name="first", value=0.1), KEPT.format(name="second", value=0.2)
+
+    def read(text: str) -> str | None:
+        """The hash that the vehicle file has of the first effect once it is read and written beside these."""
+        file.write_text(f"effects:\n{text}")
+        with put_back():
+            registry.add_files(file)
+            vehicle = load(written)
+        save(vehicle, written)
+        return vehicle.effects[0].sha256
+
+    of_file = hashlib.sha256(f"effects:\n{first}".encode()).hexdigest()
+    save(load(SHEET).replace(effects=(EffectEntry("first_loss", {"size": 1.0}, file.name, of_file),)), written)
+    of_entry = read(first)
+    assert of_entry != of_file
+    assert read(f"# both\n{first}{second}") == of_entry
+    with pytest.raises(VehicleFileError, match="others under the same name"):
+        read(first.replace("0.1", "0.3"))
 
 
 @pytest.mark.usefixtures("catalogue")
