@@ -72,6 +72,10 @@ TOLD_BY = {
 }  # fmt: skip
 
 
+THERMAL = ("rubber_temperature", "air_temperature")
+"""Coordinates that only a vehicle with rubber has."""
+
+
 def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
     """A law under a name: an effect whose only parameter is its size, 1 as it was found."""
     constants = law_fields(entry)
@@ -79,7 +83,7 @@ def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
     return laws.law_effect(
         identity, title, constants, stage=STAGE_OF.get(entry.channel, "measurement"), source=source, trace=entry.title or title,
         equation=f"{entry.channel} x {entry.form} of {entry.coordinate}", coordinate=TOLD_BY.get(entry.coordinate, "time"),
-        counts_from_start=entry.coordinate in ("time", "slip", "work"),
+        counts_from_start=entry.coordinate in ("time", "slip", "work"), needs=("rubber",) if entry.coordinate in THERMAL else (),
     )  # fmt: skip
 
 

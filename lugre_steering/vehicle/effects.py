@@ -66,6 +66,8 @@ def _check_machine(vehicle: Vehicle, effect: Effect, fail: Fail) -> None:
         raise fail("id", effect.id, "a vehicle with the section 'rubber' for a thermal effect")
     if OF_CYLINDERS & effect.hooks.keys() and vehicle.hydraulics is None:
         raise fail("id", effect.id, "a vehicle with the section 'hydraulics', whose cylinders have arms and lines")
+    if lacking := [section for section in effect.needs if getattr(vehicle, section) is None]:
+        raise fail("id", effect.id, f"a vehicle with the section '{lacking[0]}', without which this effect means nothing")
 
 
 def _range(vehicle: Vehicle, parameter: Parameter) -> tuple[float, float]:
