@@ -18,11 +18,13 @@ from typing import Any
 
 import pytest
 import yaml
+from catalogue import put_back
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from lugre_steering.cli import app
+from lugre_steering.effects.law_entry import LawEntry, named
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.errors import ImplausibleWarning, LugreSteeringError, VehicleFileError
 from lugre_steering.estimator.node_parameters import read_options
@@ -196,6 +198,19 @@ def test_rubber_starts_at_the_reference_temperature_if_nothing_is_said() -> None
     assert vehicle.initial == Initial(17.0, 17.0)
 
 
+@pytest.mark.parametrize(
+    ("sheet", "effect", "section"),
+    [(JOINT, "line_loss_linear", "hydraulics"), (SHEET, "gear_friction", "contact"), (JOINT, "warm_loss", "rubber")],
+)
+def test_an_effect_stands_only_where_what_it_needs_does(sheet: dict[str, Any], effect: str, section: str) -> None:
+    with put_back():
+        law = LawEntry("gain", "rubber_temperature", "linear", (0.0, 50.0), {"value": 0.0, "slope": 0.01})
+        CATALOGUE["warm_loss"] = named("warm_loss", "a loss when warm", "a test", law)
+        values = {p.name: p.typical for p in CATALOGUE[effect].parameters}
+        with pytest.raises(VehicleFileError, match=f"'{effect}', expected a vehicle with the section '{section}'"):
+            from_mapping(changed(sheet, "effects", [{"id": effect, "parameters": values}]), FILE)
+
+
 def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
     for effect in CATALOGUE.values():
         for bound in ("low", "high"):
@@ -205,7 +220,8 @@ def test_every_effect_loads_at_the_bounds_of_a_fit() -> None:
             for low, high in effect.places:  # the ends of a range are not equal
                 values |= {high: values[low] + 0.1} if bound == "low" else {low: values[high] - 0.1}
             if effect.observable:
-                from_mapping(with_effects((effect.id, values)), FILE)
+                sheet = JOINT if "contact" in effect.needs else SHEET
+                from_mapping(changed(sheet, "effects", [{"id": effect.id, "parameters": values}]), FILE)
 
 
 def test_exponent_without_point_is_a_number(tmp_path: Path) -> None:

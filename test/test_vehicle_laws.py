@@ -66,6 +66,18 @@ def test_laws_are_written_and_read_again(tmp_path: Path) -> None:
         (TABLE, {"knots": [1.0]}, ("laws[0].knots", "at least two")),
         (TABLE, {"values": {"value": 1.0}}, ("laws[0].knots", "values")),
         (TABLE, {"knotz": [1.0]}, ("laws[0].knotz", "knots")),
+        (TABLE, {"knots": [0.0] * 514}, ("laws[0].knots", "at most 513")),
+        (TABLE, {"knots": [-1.0, -5.0]}, ("laws[0].knots", "-1 takes all")),
+        (TABLE, {"channel": "friction_level", "knots": [-3.0, -3.0]}, ("laws[0].knots", "-1 takes all")),
+        (TABLE, {"channel": "coulomb_friction", "coordinate": "abs_torque", "knots": [0.0, 2.5]}, ("laws[0].knots", "drive itself")),
+        (LAW, {"coordinate": "torque", "form": "linear", "values": {"value": 0.0, "slope": -3.0}}, ("laws[0].values", "drive itself")),
+        (LAW, {"form": "window", "values": {"outside": 0.0, "inside": 1.0, "start": 0.5, "end": -0.5}},
+         ("laws[0].values.end", "at least the start (0.5)")),
+        (LAW, {"form": "sinusoid", "values": {"value": 0.0, "sine": 1.0, "cosine": 0.0, "period": 0.02}},
+         ("laws[0].values.period", "at least 0.0234", "513 places")),
+        (LAW, {"intervals": {"aftr": [2.5, 3.5]}}, ("laws[0].intervals.aftr", "before, after, at, width, memory_size")),
+        (LAW, {"intervals": {"after": [2.5]}}, ("laws[0].intervals.after", "two ascending numbers")),
+        (LAW, {"heldout_gain": 5.0}, ("laws[0].heldout_gain", "at most 1")),
     ],
 )  # fmt: skip
 def test_a_mistake_in_a_law_is_refused_with_its_key(base: dict[str, Any], change: dict[str, Any], told: tuple[str, ...]) -> None:
@@ -73,6 +85,21 @@ def test_a_mistake_in_a_law_is_refused_with_its_key(base: dict[str, Any], change
         made({**base, **change})
     for text in (FILE.name, *told):
         assert text in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"intervals": {"memory_size": [1.0, 3.0]}, "heldout_gain": -0.1},
+        {"form": "sinusoid", "values": {"value": 0.0, "sine": 1.0, "cosine": 0.0, "period": 2.0 / 70.0}},
+        {"coordinate": "torque", "form": "linear", "values": {"value": 0.0, "slope": 3.0}, "memory": "ring"},
+        {"channel": "gain", "form": "linear", "values": {"value": 0.0, "slope": 1.5}},
+        {"coordinate": "torque", "range": [-10.0, 10.0]},
+    ],
+)
+def test_a_law_as_a_diagnosis_may_write_it_is_read(change: dict[str, Any]) -> None:
+    """The finest period that it seeks, what rings (nothing that it adds itself drives it), shares below -1 in a part, a steep step."""
+    made({**LAW, "intervals": {}, **change})
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -85,7 +112,7 @@ def test_a_mistake_in_a_law_is_refused_with_its_key(base: dict[str, Any], change
     ],
 )
 def test_widths_of_nothing_make_jumps_without_a_word(form: str, values: dict[str, float]) -> None:
-    (law,) = made({**LAW, "form": form, "values": values}).laws
+    (law,) = made({**LAW, "form": form, "values": values, "intervals": {}}).laws
     f = np.asarray(law_fields(law)["f"])
     assert set(f) <= {0.0, 3.0}
     assert f[0] == 0.0

@@ -200,8 +200,9 @@ def _compose(effects: Sequence[Physics]) -> Composition:
     return _made[name]
 
 
-def check(effect: Physics) -> None:
-    """Refuse an effect whose wiring leads nowhere: unknown hooks and names, parameters and memory that no law reads."""
+def check(effect: Physics, others: Sequence[Physics] = ()) -> None:
+    """Refuse an effect whose wiring leads nowhere: unknown hooks and names, parameters and memory that no law reads, and fields of its
+    records (``<id>_<name>``) that are those of the baseline or of ``others``."""
     read = set()
     for hook, function in effect.hooks.items():
         if hook not in HOOKS:
@@ -209,11 +210,22 @@ def check(effect: Physics) -> None:
         for name in _arguments(function):
             _wire(effect, hook, name)
             read.add(name)
-    own = [p.name for p in effect.parameters] + list(effect.memory) + list(effect.tables)
+    own = _names(effect)
     if doubled := sorted({name for name in own if own.count(name) > 1}):
         raise EffectError(f"effect '{effect.id}': {', '.join(doubled)}: expected each name once among parameters, memory and tables")
     if effect.hooks and (idle := [name for name in own if name not in read]):
         raise EffectError(f"effect '{effect.id}': {', '.join(idle)}: no law reads it; expected an argument of that name")
+    taken = {*BASELINE_FIELDS, *STATE_FIELDS, *(f"{other.id}_{name}" for other in others for name in _names(other))}
+    if double := [name for name in own if f"{effect.id}_{name}" in taken]:
+        raise EffectError(
+            f"effect '{effect.id}': {', '.join(double)}: got a name that makes '{effect.id}_{double[0]}', which there is already; "
+            "expected another id or name"
+        )
+
+
+def _names(effect: Physics) -> list[str]:
+    """Its parameters, memory and tables."""
+    return [p.name for p in effect.parameters] + list(effect.memory) + list(effect.tables)
 
 
 def _arguments(function: LawFunction) -> tuple[str, ...]:
@@ -231,31 +243,29 @@ def _source(function: LawFunction) -> str:
 
 
 def quantities_of(hook: str) -> dict[str, str]:
-    """Quantities that laws of a hook may read, with their expressions in the step."""
-    if hook not in _STEPWISE:
-        return dict(HOOKS[hook].given)
+    """What laws of a hook may read beside their own, with its expression in the step: quantities and, but for sensors, parameters of
+    the baseline."""
     known: dict[str, str] = {}
-    for name in _STEPWISE[: _STEPWISE.index(hook) + 1]:
+    for name in _STEPWISE[: _STEPWISE.index(hook) + 1] if hook in _STEPWISE else (hook,):
         known |= HOOKS[name].given
-    return known
+    return known if hook in SENSOR_HOOKS else known | {name: f"p.{name}" for name in BASELINE_FIELDS}
 
 
 def _wire(effect: Physics, hook: str, name: str) -> str:
     """The expression of the step that an argument of a law stands for."""
-    record = "q" if effect.per_line else "p"
     known = quantities_of(hook)
-    if name in effect.memory:
+    # Laws of sensors are asked for whole recordings at once, apart from the step: they have its parameters and nothing that lasts.
+    own = [p.name for p in effect.parameters] if hook in SENSOR_HOOKS else _names(effect)
+    if name in own and name in effect.memory:
         return f"s.{effect.id}_{name}"
-    if name in effect.tables or any(p.name == name for p in effect.parameters):
-        return f"{record}.{effect.id}_{name}"
+    if name in own:
+        return f"{'q' if effect.per_line else 'p'}.{effect.id}_{name}"
     if name in known:
         return known[name]
-    if name in BASELINE_FIELDS and hook not in ("line", "delay", "lag"):
-        return f"p.{name}"
-    own = [p.name for p in effect.parameters] + list(effect.memory) + list(effect.tables)
+    kinds = "parameters" if hook in SENSOR_HOOKS else "parameters, memory and tables"
     raise EffectError(
-        f"effect '{effect.id}': law '{hook}': got the argument '{name}', expected one of its own ({', '.join(own) or 'none'}), a quantity "
-        f"known there ({', '.join(known) or 'none'}) or a parameter of the baseline ({', '.join(BASELINE_FIELDS)})"
+        f"effect '{effect.id}': law '{hook}': got the argument '{name}', expected one of its own {kinds} ({', '.join(own) or 'none'}) "
+        f"or what is known there ({', '.join(known) or 'nothing'})"
     )
 
 

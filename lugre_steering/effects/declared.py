@@ -53,6 +53,10 @@ def check_declared(effect: Effect, known: Collection[str]) -> None:
             raise EffectError(f"effect '{effect.id}': {what}: got '{name}'; {wanted}")
     if effect.parameters and not effect.hooks and not effect.not_recorded:
         raise EffectError(f"effect '{effect.id}': hooks: got none, expected a law that reads its parameters")
+    if effect.hooks and not effect.amplitudes:
+        amplitude = "an amplitude, which switches the effect off at zero: a parameter that has no 'grid' and is not 'optional'"
+        names = ", ".join(p.name for p in effect.parameters) or "none"
+        raise EffectError(f"effect '{effect.id}': parameters: got {names}, expected {amplitude}")
 
 
 Claim = tuple[str, object, bool, str]
@@ -94,11 +98,17 @@ def _is_number(value: object) -> bool:
 
 def _in_order(effect: Effect) -> Iterator[Claim]:
     yield "id", effect.id, is_name(effect.id), A_NAME
+    yield "id", effect.id, re.fullmatch(r"law_\d+", effect.id) is None, "another name: law_1, law_2, ... are the laws of a vehicle file"
     for key in ("title", "joint_title"):
         yield key, getattr(effect, key), _is_line(getattr(effect, key)), "one line"
     for name in (*(p.name for p in effect.parameters), *effect.memory, *effect.tables):
-        own = is_name(name) and name not in OF_MOTION
-        yield "name of a parameter, memory or table", name, own, f"{A_NAME}, nor one of {', '.join(OF_MOTION)}"
+        free = is_name(name) and name not in OF_MOTION
+        yield "name of a parameter, memory or table", name, free, f"{A_NAME}, nor one of {', '.join(OF_MOTION)}"
+    yield from ((f"tables.{name}", size, size > 0, "a length of at least 1") for name, size in effect.tables.items())
+    own = [p.name for p in effect.parameters]
+    yield "per_line", effect.per_line, effect.per_line == ("line" in effect.hooks), "True for the law 'line', or else False"
+    yield "hooks", [*effect.hooks], not effect.per_line or len(effect.hooks) == 1, "no other beside 'line'"
+    yield "parameters", own, not effect.per_line or len(own) == 1, "one alone, which is there once for each line"
     for p in effect.parameters:
         key = f"parameters.{p.name}"
         yield from ((f"{key}.{part}", getattr(p, part), _is_line(getattr(p, part)), "one line") for part in ("unit", "meaning"))

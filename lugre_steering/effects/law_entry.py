@@ -19,6 +19,12 @@ NARROWEST, WIDEST = 1e-12, 1e12
 """How far apart the ends of a range may be, in any unit."""
 SHORTEST_S = 1e-3
 """Period of a mode that a chain of such steps could follow."""
+FEWEST_PLACES = 3
+"""Places of a law in a period: with fewer it would be another one."""
+SHARES = ("friction_level", "presliding_stiffness", "gain")
+"""Channels of which -1 takes all that is there."""
+FED_BACK = (("conservative_torque", "coulomb_friction"), ("torque", "abs_torque", "opposing_torque"))
+"""Channels and coordinates by which a law is driven by what it adds itself."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,10 @@ TOLD_BY = {
 }  # fmt: skip
 
 
+THERMAL = ("rubber_temperature", "air_temperature")
+"""Coordinates that only a vehicle with rubber has."""
+
+
 def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
     """A law under a name: an effect whose only parameter is its size, 1 as it was found."""
     constants = law_fields(entry)
@@ -79,7 +89,7 @@ def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
     return laws.law_effect(
         identity, title, constants, stage=STAGE_OF.get(entry.channel, "measurement"), source=source, trace=entry.title or title,
         equation=f"{entry.channel} x {entry.form} of {entry.coordinate}", coordinate=TOLD_BY.get(entry.coordinate, "time"),
-        counts_from_start=entry.coordinate in ("time", "slip", "work"),
+        counts_from_start=entry.coordinate in ("time", "slip", "work"), needs=("rubber",) if entry.coordinate in THERMAL else (),
     )  # fmt: skip
 
 
@@ -102,15 +112,35 @@ def check_law(entry: LawEntry, reader: Reader, key: str) -> None:
         expected = f"two ascending numbers, {NARROWEST:g} to {WIDEST:g} apart: where the coordinate was seen"
         raise reader.fail(f"{key}.range", list(entry.range), expected)
     if entry.form == laws.TABLE:
-        if len(entry.knots) < 2 or entry.values:
-            expected = "at least two values of f, equally spaced over the range, and no 'values'"
+        if not 2 <= len(entry.knots) <= laws.KNOTS or entry.values:
+            expected = f"at least two and at most {laws.KNOTS} values of f, equally spaced over the range, and no 'values'"
             raise reader.fail(f"{key}.knots", list(entry.knots), expected)
     else:
         _check_values(entry, reader, key)
-    if not np.isfinite(law_fields(entry)["f"]).all():
+    if expected := _wrong_size(entry):
         which = "knots" if entry.form == laws.TABLE else "values"
-        expected = "numbers with which the law is finite over its range, and as far beyond as it goes on"
         raise reader.fail(f"{key}.{which}", getattr(entry, which), expected)
+    for name, ends in entry.intervals.items():
+        if name not in (*entry.values, "memory_size") or len(ends) != 2 or not ends[0] <= ends[1]:
+            expected = f"two ascending numbers for each of {', '.join((*entry.values, 'memory_size'))}"
+            raise reader.fail(f"{key}.intervals.{name}", list(ends), expected)
+    if entry.heldout_gain is not None and entry.heldout_gain > 1.0:
+        raise reader.fail(f"{key}.heldout_gain", entry.heldout_gain, "a share, at most 1")
+
+
+def _wrong_size(entry: LawEntry) -> str:
+    """What the values or knots of a law should be; empty if they are."""
+    f = np.asarray(law_fields(entry)["f"])
+    if not np.isfinite(f).all():
+        return "numbers with which the law is finite over its range, and as far beyond as it goes on"
+    low, high = entry.range
+    if entry.channel in SHARES and laws.sampled(entry.form, entry.values, entry.knots, low, high).max() <= -1.0:
+        return "a law above -1 somewhere on its range: a share of -1 takes all that is there"
+    start, end = laws.reach(entry.form, entry.values, low, high)
+    driven = entry.channel in FED_BACK[0] and entry.coordinate in FED_BACK[1] and entry.memory != "ring"
+    if driven and abs(float(f[-1]) - float(f[0])) >= end - start:
+        return "a law that changes by less than the torque it depends on: it would drive itself"
+    return ""
 
 
 def _check_values(entry: LawEntry, reader: Reader, key: str) -> None:
@@ -123,5 +153,11 @@ def _check_values(entry: LawEntry, reader: Reader, key: str) -> None:
             raise reader.fail(f"{key}.values.{name}", number, f"no such value of '{entry.form}'; {suggestion(name, list(names))}")
         if name in laws.POSITIVE and not number > 0.0:
             raise reader.fail(f"{key}.values.{name}", number, "a number above 0")
+        start, end = laws.reach(entry.form, entry.values, *entry.range)
+        least = FEWEST_PLACES * (end - start) / (laws.KNOTS - 1)
+        if name == "period" and number < least:
+            raise reader.fail(f"{key}.values.{name}", number, f"at least {least:.3g}: a law is kept at {laws.KNOTS} places")
     if missing := [name for name in names if name not in entry.values]:
         raise reader.fail(f"{key}.values", entry.values, f"values of {', '.join(missing)}")
+    if entry.form == "window" and entry.values["start"] > entry.values["end"]:
+        raise reader.fail(f"{key}.values.end", entry.values["end"], f"at least the start ({entry.values['start']:g})")

@@ -287,6 +287,11 @@ def law_effect(identity: str, title: str, constants: Mapping[str, float | Array]
     )  # fmt: skip
 
 
+def is_law(effect: Effect) -> bool:
+    """Whether an effect is such a law under a name."""
+    return effect.hooks is _HOOKS
+
+
 def slot(place: int) -> Effect:
     """The effect that runs the law with this place in the vehicle file."""
     return law_effect(f"law_{place + 1}", f"Law {place + 1}", {})

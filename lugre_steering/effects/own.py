@@ -20,9 +20,8 @@ import yaml
 
 from lugre_steering import yaml_text
 from lugre_steering.chain.compiled import exp, law, tanh
-from lugre_steering.chain.compose import HOOKS, quantities_of
-from lugre_steering.chain.layout import BASELINE_FIELDS
-from lugre_steering.effects.declared import A_NAME, check_typed, is_name
+from lugre_steering.chain.compose import HOOKS, SENSOR_HOOKS, quantities_of
+from lugre_steering.effects.declared import A_NAME, check_declared, check_typed, is_name
 from lugre_steering.effects.entry import STAGES, Effect, Parameter
 from lugre_steering.effects.law_entry import LawEntry, check_law, named
 from lugre_steering.errors import EffectError, reason
@@ -30,8 +29,8 @@ from lugre_steering.expression import ExpressionError, parse
 from lugre_steering.files import read_text, write_text
 from lugre_steering.schema import Reader
 
-PAIRED = ("wind_up", "contact")
-"""Hooks whose laws return more than one number: a line of YAML cannot."""
+OF_PYTHON = ("wind_up", "contact", "line")
+"""Hooks whose laws return more than one number, which a line of YAML cannot, or act once per pressure line (``Effect.per_line``)."""
 
 
 @law
@@ -94,14 +93,17 @@ class _Kept:
 
 
 def read_effects(file: Path) -> tuple[list[Effect], str]:
-    """Effects of a user's file, and the SHA-256 of its content, by which vehicle files know it again."""
+    """Effects of a user's file, each with the SHA-256 by which vehicle files know it again, and that of the whole file.
+
+    Of Python it is that of the file, as a law may use whatever stands there; of YAML it is that of its own entry.
+    """
     try:
         content = read_text(file, yaml_text.LONGEST)
     except (OSError, ValueError) as error:
         raise EffectError(f"{file}: cannot be read: {reason(error)}; expected a .py or .yaml file of effects") from error
     sha256 = hashlib.sha256(content.encode()).hexdigest()
     if file.suffix == ".py":
-        found = _of_module(_run(file, content, sha256), str(file))
+        found = [dataclasses.replace(effect, sha256=sha256) for effect in _of_module(_run(file, content, sha256), str(file))]
     elif file.suffix in (".yaml", ".yml"):
         found = _of_yaml(file)
     else:
@@ -154,12 +156,14 @@ def _of_yaml(file: Path) -> list[Effect]:
     if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise reader.fail("effects", listed, "a list of effects")
     prefixes = [f"effects[{i}]" for i in range(len(listed))] if len(listed) > 1 else [""]
-    return [
+    found = [
         _of_law(reader, reader.build(_Kept, item, prefix), prefix)
         if isinstance(item, Mapping) and "law" in item
         else _of_sheet(reader, reader.build(_Sheet, item, prefix), prefix)
         for item, prefix in zip(listed, prefixes, strict=True)
     ]
+    digests = (hashlib.sha256(repr(item).encode()).hexdigest() for item in listed)
+    return [dataclasses.replace(effect, sha256=digest) for effect, digest in zip(found, digests, strict=True)]
 
 
 def _of_law(reader: Reader, kept: _Kept, prefix: str) -> Effect:
@@ -177,6 +181,11 @@ def add_law(catalogue: Path, identity: str, title: str, source: str, law: Mappin
     new = {"id": identity, "title": title, "source": source, "law": law}
     item = yaml.safe_dump([new], sort_keys=False, allow_unicode=True, width=120)
     reader = Reader(catalogue, EffectError)
+    effect = _of_law(reader, reader.build(_Kept, new, ""), "")
+    try:
+        check_declared(effect, ())
+    except EffectError as error:
+        raise EffectError(f"{catalogue}: {error}") from error
     before, known = "effects:\n", []
     if catalogue.exists():
         if any(effect.id == identity for effect in read_effects(catalogue)[0]):
@@ -191,7 +200,6 @@ def add_law(catalogue: Path, identity: str, title: str, source: str, law: Mappin
         except EffectError:
             continue
         if whole == {"effects": [*known, new]}:
-            _of_law(reader, reader.build(_Kept, new, ""), "")
             write_text(text, catalogue)
             return
     raise EffectError(f"{catalogue}: expected a file of one list 'effects', each entry behind a dash, to add '{identity}' to")
@@ -214,15 +222,16 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
     if set(sheet.update) != set(sheet.memory):
         raise reader.fail(key("update"), sorted(sheet.update), f"the next value of each memory ({', '.join(sheet.memory) or 'none'})")
     hooks = {}
-    for i, (hook, text) in enumerate(sheet.laws.items()):
-        if hook not in HOOKS or hook in PAIRED:
-            known = ", ".join(name for name in HOOKS if name not in PAIRED)
-            hint = " (this one needs a .py file)" if hook in PAIRED else ""
+    keeping = next((hook for hook in sheet.laws if hook not in SENSOR_HOOKS), "")  # whose law makes the next values of the memory
+    for hook, text in sheet.laws.items():
+        if hook not in HOOKS or hook in OF_PYTHON:
+            known = ", ".join(name for name in HOOKS if name not in OF_PYTHON)
+            hint = " (this one needs a .py file)" if hook in OF_PYTHON else ""
             raise reader.fail(key(f"laws.{hook}"), text, f"a hook out of {known}{hint}")
-        own = [*sheet.parameters, *sheet.memory]
-        names = [*own, *(name for name in (*quantities_of(hook), *BASELINE_FIELDS) if name not in own)]
-        parts = {"": text, **(sheet.update if i == 0 else {})}
-        hooks[hook] = _compiled(reader, key(f"laws.{hook}"), hook, parts, names, tuple(sheet.memory) if i == 0 else ())
+        memory = {} if hook in SENSOR_HOOKS else sheet.update if hook == keeping else {name: name for name in sheet.memory}
+        own = [*sheet.parameters, *memory]
+        names = [*own, *(name for name in quantities_of(hook) if name not in own)]
+        hooks[hook] = _compiled(reader, key(f"laws.{hook}"), hook, text, memory, names)
     parameters = tuple(
         Parameter(
             name, p.unit, p.meaning, p.scale, -math.inf if p.low <= -1e300 else p.low, math.inf if p.high >= 1e300 else p.high,
@@ -238,10 +247,10 @@ def _of_sheet(reader: Reader, sheet: _Sheet, prefix: str) -> Effect:
     )  # fmt: skip
 
 
-def _compiled(reader: Reader, key: str, hook: str, parts: Mapping[str, str], names: Sequence[str], memory: Sequence[str]) -> Any:
-    """A law out of its expression and the updates of the memory, which see the memory as it was."""
+def _compiled(reader: Reader, key: str, hook: str, part: str, memory: Mapping[str, str], names: Sequence[str]) -> Any:
+    """A law out of its expression and what becomes of the ``memory``; both see the memory as it was."""
     try:
-        checked = {name: parse(text, names) for name, text in parts.items()}
+        checked = {name: parse(text, names) for name, text in {"": part, **memory}.items()}
     except ExpressionError as error:
         raise EffectError(f"{reader.file}: key '{key}': {error}") from None
     used = [name for name in names if name not in memory and any(name in one.names for one in checked.values())]

@@ -15,14 +15,14 @@ import pkgutil
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lugre_steering.chain.compose import Composition, check, compose
+from lugre_steering.chain.compose import SENSOR_HOOKS, Composition, check, compose
 from lugre_steering.chain.layout import OUTPUT
 from lugre_steering.chain.step import new_parameters, run_side
 from lugre_steering.effects import own
@@ -31,6 +31,7 @@ from lugre_steering.effects.entry import STAGES, Effect
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
 from lugre_steering.provenance import Provenance, Source, provenance
+from lugre_steering.recording import Array
 
 GROUP = "lugre_steering.effects"
 VARIABLE = "LUGRE_STEERING_EFFECTS"
@@ -39,10 +40,12 @@ VARIABLE = "LUGRE_STEERING_EFFECTS"
 
 @dataclass(frozen=True)
 class Origin:
-    """Where foreign physics comes from: what to give or install, and the SHA-256 of what it is."""
+    """Where foreign physics comes from: what to give or install, and the SHA-256 of what it is; ``of_file``: of the whole file, which
+    vehicle files have that were written before entries of YAML had theirs."""
 
     source: str
     sha256: str
+    of_file: str = field(default="", compare=False)
 
 
 def _shipped() -> Iterator[Effect]:
@@ -110,15 +113,15 @@ def add_files(files: str | Path | Sequence[str | Path]) -> None:
     paths = [Path(file) for file in ([files] if isinstance(files, (str, Path)) else files)]
     for file in paths:
         effects, sha256 = own.read_effects(file)
-        _add(effects, Origin(file.name, sha256), str(file))
+        _add([(new, Origin(file.name, new.sha256, sha256)) for new in effects], str(file))
     if paths:
         known = os.environ.get(VARIABLE, "").split(os.pathsep)
         os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(path.resolve()) for path in paths)]))
 
 
-def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
-    ids = [new.id for new in effects]
-    for new in effects:
+def _add(effects: Sequence[tuple[Effect, Origin]], where: str) -> None:
+    ids = [new.id for new, _ in effects]
+    for new, origin in effects:
         if ids.count(new.id) > 1:
             raise EffectError(f"{where}: effect '{new.id}': there are {ids.count(new.id)} of this id; expected one")
         if ORIGINS.get(new.id) == origin:
@@ -129,7 +132,7 @@ def _add(effects: Sequence[Effect], origin: Origin, where: str) -> None:
         foreign = dataclasses.replace(new, sha256=origin.sha256)
         try:
             check_declared(foreign, {*CATALOGUE, *ids})
-            check(foreign)
+            check(foreign, [*CATALOGUE.values()])
             _try(foreign)
         except EffectError as error:
             raise EffectError(f"{where}: {error}") from error
@@ -145,23 +148,29 @@ def made(command: str, options: Mapping[str, Any], vehicle: Path | Source | None
 
 def _try(new: Effect) -> None:
     """Compile an effect and run it over a short motion at its typical size: what fails is told now, not in mid-work."""
-    made = compose([new])
-    p, time = new_parameters(made), np.asarray(np.arange(200) * 0.01, np.float64)
-    for field, value in (("static_torque", 1.1), ("coulomb_torque", 1.0), ("sigma_0", 50.0), ("stribeck_speed", 0.05),
-                         ("stribeck_exponent", 2.0), ("heat_capacity", 1e4), ("sides", 1.0), ("table_step", 1.0)):  # fmt: skip
-        p[field] = value
-    if not new.per_line:
-        for field, number in new.fields({parameter.name: parameter.typical for parameter in new.parameters}).items():
-            p[field] = number
+    time = np.asarray(np.arange(200) * 0.01, np.float64)
+    phase = 3.0 * time
+    theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))
+    typical = {parameter.name: parameter.typical for parameter in new.parameters}
     try:
-        phase = 3.0 * time
-        theta, omega, alpha = (np.asarray(part, np.float64) for part in (0.3 * np.sin(phase), 0.9 * np.cos(phase), -2.7 * np.sin(phase)))
-        out = run_side(p, np.ones((2, 2)), np.asarray(time), theta, omega, alpha)
+        p = new_parameters(compose([new]))
+        for field, value in (("static_torque", 1.1), ("coulomb_torque", 1.0), ("sigma_0", 50.0), ("stribeck_speed", 0.05),
+                             ("stribeck_exponent", 2.0), ("heat_capacity", 1e4), ("sides", 1.0), ("table_step", 1.0)):  # fmt: skip
+            p[field] = value
+        for field, number in new.fields({} if new.per_line else typical).items():
+            p[field] = number
+        out = run_side(p, np.ones((2, 2)), time, theta, omega, alpha)
+        given: list[Array | float] = [out[name] for name in OUTPUT.names or ()]
+        with np.errstate(all="ignore"):
+            for hook in sorted(new.hooks.keys() & SENSOR_HOOKS):  # over whole recordings, and compiled for one number at a time
+                given.append(new.law(hook, typical, theta=theta, elapsed=time))
+                given.append(float(new.hooks[hook](*(typical.get(name, 0.1) for name in new.reads(hook)))))
+        finite = all(np.isfinite(part).all() for part in given)
     except Exception as error:  # Numba's errors are many and long
         owed = "; a law returns its part, then every memory that it names" if new.memory else ""
         raise EffectError(f"effect '{new.id}': its laws cannot be compiled: {_reason(error)}{owed}") from error
-    if not all(np.isfinite(out[name]).all() for name in OUTPUT.names or ()):
-        raise EffectError(f"effect '{new.id}': got torques that are no numbers at its typical size, expected finite ones")
+    if not finite:
+        raise EffectError(f"effect '{new.id}': got torques or readings that are no numbers at its typical size, expected finite ones")
 
 
 def _reason(error: Exception) -> str:
@@ -189,8 +198,8 @@ def _add_installed() -> None:
             found = entry.load()
         except (Exception, SystemExit) as error:  # whatever a foreign package raises
             raise EffectError(f"{where}: entry point '{entry.name}' cannot be loaded: {type(error).__name__}: {error}") from error
-        effects = own.of_objects(found, f"{where}: entry point '{entry.name}'")
-        _add(effects, Origin(where, _content(entry.module)), where)
+        origin = Origin(where, _content(entry.module))
+        _add([(new, origin) for new in own.of_objects(found, f"{where}: entry point '{entry.name}'")], where)
 
 
 for _effect in CATALOGUE.values():

@@ -18,7 +18,8 @@ from lugre_steering.chain.doors import doors, row
 from lugre_steering.chain.layout import BASELINE, OUTPUT, STATE
 from lugre_steering.chain.rates import MOTION
 from lugre_steering.chain.step import Records, acting
-from lugre_steering.effects.laws import slot
+from lugre_steering.effects.laws import is_law, slot
+from lugre_steering.effects.registry import effect
 from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD
@@ -332,7 +333,7 @@ class Estimator:
     def law_left_steps(self) -> Mapping[str, int]:
         """Steps so far with the coordinate of a law outside the range on which it was seen, by the law's place in the file; what
         was counted before a restart is forgotten."""
-        return {f"laws[{i}]": int(self._state[_law_left(i)].sum()) for i in range(len(self.vehicle.laws))}
+        return {place: int(self._state[field].sum()) for place, field in _law_left(self.vehicle).items()}
 
     def snapshot(self) -> Snapshot:
         """A copy of the whole state, for ``restore``."""
@@ -361,9 +362,11 @@ def doubts(row: Records) -> list[str]:
     return [text for bit, text in enumerate(DOUBTS) if bits >> bit & 1]
 
 
-def _law_left(place: int) -> str:
-    """The field of the state that counts the steps outside the range of a law."""
-    return f"{slot(place).id}_outside"
+def _law_left(vehicle: Vehicle) -> dict[str, str]:
+    """Fields of the state that count the steps outside the range of a law, by the law's place in the file."""
+    kept = {f"effects[{i}]": entry.id for i, entry in enumerate(vehicle.effects) if is_law(effect(entry.id))}
+    ids = {**kept, **{f"laws[{i}]": slot(i).id for i in range(len(vehicle.laws))}}
+    return {place: f"{identity}_outside" for place, identity in ids.items()}
 
 
 def _label(kind: Kind, name: str) -> str:
@@ -473,7 +476,7 @@ def _new_core(vehicle: Vehicle, options: Options) -> tuple[Composition, Core]:
         geometry=geometry,
         areas=areas,
         lines=line_index,
-        law_left=np.array([_place(composition.state, _law_left(i)) for i in range(len(vehicle.laws))], np.int64),
+        law_left=np.array([_place(composition.state, field) for field in _law_left(vehicle).values()], np.int64),
         plan_ns=np.zeros(PLAN_POINTS, np.int64),
         plan_theta=np.zeros((sides, PLAN_POINTS)),
         scratch_value=np.zeros(lines),

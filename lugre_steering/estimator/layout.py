@@ -184,7 +184,7 @@ class Core(NamedTuple):
     areas: Array
     lines: IntArray
     law_left: IntArray
-    """For each law of the vehicle file, where in a row of ``state`` its steps outside the range on which it was seen are counted."""
+    """For each law of the vehicle file, named or not, where in a row of ``state`` its steps outside the range seen are counted."""
     plan_ns: IntArray
     plan_theta: Array
     scratch_value: Array

@@ -9,15 +9,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from lugre_steering.chain.compose import SENSOR_HOOKS
 from lugre_steering.chain.step import Records, new_state, run_side, torque_side
-from lugre_steering.effects.entry import Effect
+from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
 from lugre_steering.vehicle import load
 from lugre_steering.vehicle.model import build_model
 
 UNIT = re.compile(r"(1|[0-9]|N|m|rad|deg|s|K|W|J|Pa|kg|degC|[/^() ])+")
+NEUTRAL = {"arm": 1.0, "line": 0.0, "delay": 0.0, "lag": 0.0}
+"""Laws of sensors that are no part of the step, and what they give where every amplitude is zero."""
 NOTICED = 1e-6
 """Change of the torque, as a share of its amplitude, from which a parameter acts."""
 
@@ -29,12 +30,42 @@ def broken(effect: Effect) -> list[str]:
     vehicle = load(config_folder() / "test_vehicle.yaml")
     model = build_model(vehicle)
     found = [f"unit: {p.name} has '{p.unit}', expected SI units" for p in effect.parameters if not UNIT.fullmatch(p.unit)]
-    if not effect.hooks.keys() - {*SENSOR_HOOKS} and "angle" not in effect.hooks:
+    found += _sensed(effect)
+    if effect.hooks.keys() <= NEUTRAL.keys():
         return found
     bench = _Bench(effect, model.parameters[0], model.rubber)
     for check in (_neutral, _acting, _finite, _in_pieces, _causal, _mirrored, _passive):
         found += check(bench)
     return found
+
+
+def _sensed(effect: Effect) -> Iterator[str]:
+    """What laws of sensors break over some angles and times."""
+    hooks = [hook for hook in NEUTRAL if hook in effect.hooks]
+    theta, elapsed = np.linspace(-0.5, 0.5, 11), np.linspace(0.0, 60.0, 11)
+
+    def laws(**changes: float) -> Array:
+        values = {parameter.name: changes.get(parameter.name, parameter.typical) for parameter in effect.parameters}
+        with np.errstate(all="ignore"):
+            given = [effect.law(hook, values, theta=theta, elapsed=elapsed) for hook in hooks]
+        return np.array([np.broadcast_to(part, theta.shape) for part in given])
+
+    typical = laws()
+    if not np.isfinite(typical).all():
+        yield "finite: a law of a sensor gives no number at its typical size"
+    for hook, given in zip(hooks, laws(**dict.fromkeys(effect.amplitudes, 0.0)), strict=True):
+        if not np.allclose(given, NEUTRAL[hook], rtol=0.0, atol=1e-12):
+            yield f"neutral: the law '{hook}' does not give {NEUTRAL[hook]:g} where every amplitude is zero"
+    read = {name for hook in hooks for name in effect.reads(hook)}
+    for parameter in effect.parameters:
+        if parameter.name in read and np.array_equal(laws(**{parameter.name: _other(parameter)}), typical):
+            yield f"acting: no law of a sensor changes with {parameter.name}"
+
+
+def _other(parameter: Parameter) -> float:
+    """Another value than the typical one."""
+    value = parameter.typical
+    return 1.2 * value if value != 0.0 else 0.1 * parameter.scale
 
 
 class _Bench:
@@ -83,11 +114,11 @@ def _acting(bench: _Bench) -> Iterator[str]:
         yield "acting: the torque does not change at its typical size; give parameters an 'example' at which it does"
         return
     windows = [{}, *(dict.fromkeys(pair, 0.0) for pair in bench.effect.places)]  # one range hides what another does
-    for parameter in bench.effect.parameters:
-        value = parameter.typical
-        other = 1.2 * value if value != 0.0 else 0.1 * parameter.scale
+    read = {name for hook in bench.effect.hooks.keys() - NEUTRAL.keys() for name in bench.effect.reads(hook)}
+    for parameter in (p for p in bench.effect.parameters if p.name in read):
+        other = {parameter.name: _other(parameter)}
         changes = [
-            bench.change(bench.torque(bench.parameters(**rest)), bench.torque(bench.parameters(**rest, **{parameter.name: other})))
+            bench.change(bench.torque(bench.parameters(**rest)), bench.torque(bench.parameters(**rest, **other)))
             for rest in windows
             if parameter.name not in rest
         ]

@@ -52,7 +52,7 @@ def _of_catalogue(added: EffectEntry, fail: Fail) -> tuple[Effect, EffectEntry]:
     if effect is None:
         raise fail("id", added.id, f"an effect of the catalogue; {suggestion(added.id, list(CATALOGUE))}")
     origin = ORIGINS.get(added.id)
-    if origin is not None and added.sha256 not in (None, origin.sha256):
+    if origin is not None and added.sha256 not in (None, origin.sha256, origin.of_file):
         expected = f"that of the laws given now in {origin.source} ({origin.sha256}): they are others under the same name"
         raise fail("sha256", added.sha256, expected)
     return effect, added if origin is None else replace(added, source=origin.source, sha256=origin.sha256)
@@ -66,6 +66,8 @@ def _check_machine(vehicle: Vehicle, effect: Effect, fail: Fail) -> None:
         raise fail("id", effect.id, "a vehicle with the section 'rubber' for a thermal effect")
     if OF_CYLINDERS & effect.hooks.keys() and vehicle.hydraulics is None:
         raise fail("id", effect.id, "a vehicle with the section 'hydraulics', whose cylinders have arms and lines")
+    if lacking := [section for section in effect.needs if getattr(vehicle, section) is None]:
+        raise fail("id", effect.id, f"a vehicle with the section '{lacking[0]}', without which this effect means nothing")
 
 
 def _range(vehicle: Vehicle, parameter: Parameter) -> tuple[float, float]:

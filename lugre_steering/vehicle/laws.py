@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from lugre_steering.effects.law_entry import check_law
+from lugre_steering.effects.law_entry import THERMAL, check_law
 from lugre_steering.schema import Reader
 from lugre_steering.vehicle.sections import Vehicle
 
 MOST_IN_FILE = 16
-THERMAL = ("rubber_temperature", "air_temperature")
 
 
 def check_laws(vehicle: Vehicle, reader: Reader) -> None:

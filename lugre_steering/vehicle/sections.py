@@ -304,7 +304,7 @@ class EffectEntry:
     source: str | None = None
     """File or package that holds an effect which is not shipped."""
     sha256: str | None = None
-    """Of that file, or of the laws of the package: another law under the same name is refused."""
+    """Of its entry in that file (YAML), of the file (Python) or of the laws of the package: another law under the same name is refused."""
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
+from catalogue import put_back
 from chain_support import swing, vehicle
 from scipy.signal import lsim
 
 from lugre_steering.chain.step import run_side, torque_side
 from lugre_steering.effects import laws
+from lugre_steering.effects.law_entry import named
+from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.estimator import Estimator, doubts
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import EffectEntry, LawEntry, Vehicle
@@ -18,6 +23,8 @@ from lugre_steering.vehicle.model import build_model
 
 TIME, THETA, OMEGA, _ = swing(30.0, 0.01)
 ALPHA = np.gradient(OMEGA, TIME)
+NARROW = LawEntry("friction_level", "angle", "linear", (-0.05, 0.05), {"value": 0.0, "slope": 2.0})
+"""A law of few angles."""
 
 
 def torque(changed: Vehicle) -> Array:
@@ -179,9 +186,17 @@ def test_the_whole_catalogue_in_place_changes_nothing() -> None:
     assert full == pytest.approx(with_law(entry), rel=1e-12)
 
 
-def test_the_estimator_counts_steps_outside_the_range_and_runs_a_block_like_single_messages() -> None:
-    entry = LawEntry("friction_level", "angle", "linear", (-0.05, 0.05), {"value": 0.0, "slope": 2.0})
-    driven = vehicle().replace(laws=(entry,))
+@pytest.fixture
+def kept() -> Iterator[EffectEntry]:
+    """That law under a name."""
+    with put_back():
+        CATALOGUE["kept"] = named("kept", "a kept law", "a test", NARROW)
+        yield EffectEntry("kept", {"size": 1.0})
+
+
+@pytest.mark.parametrize("place", ["laws[0]", "effects[0]"])
+def test_the_estimator_counts_steps_outside_the_range_and_runs_a_block_like_single_messages(place: str, kept: EffectEntry) -> None:
+    driven = vehicle().replace(laws=(NARROW,)) if place == "laws[0]" else vehicle().replace(effects=(kept,))
     block, single = Estimator(driven), Estimator(driven)
     stamps = (10**18 + np.repeat(np.round(TIME * 1e9).astype(np.int64), 2)).astype(np.int64)
     channel, value = np.tile([0, 1], TIME.size), np.repeat(THETA, 2)
@@ -190,7 +205,7 @@ def test_the_estimator_counts_steps_outside_the_range_and_runs_a_block_like_sing
     assert np.array_equal(np.concatenate(each)["total"], together["total"])
     outside = int(np.sum(np.abs(together["theta"]) > 0.05 + 1e-6))
     assert outside > 500
-    assert block.law_left_steps == {"laws[0]": outside}
+    assert block.law_left_steps == {place: outside}
     told = np.array(["outside the range of a law" in doubts(row) for row in together])
     assert np.array_equal(told, (np.abs(together["theta"]) > 0.05).any(axis=1))
     begin = int(np.argmax(told))

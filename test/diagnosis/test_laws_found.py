@@ -540,9 +540,12 @@ def test_a_law_is_kept_under_a_name_and_what_stood_in_the_file_stays(tmp_path: P
     assert [effect.id for effect in effects] == ["first", "worn_arms"]
     f = effects[1].fields({"size": 1.0})["worn_arms_f"]
     assert np.asarray(f)[[0, 256, 512]] == pytest.approx([0.0, 0.1, 0.05])
-    twice = CliRunner().invoke(app, command)
-    assert twice.exit_code != 0
-    assert "worn_arms" in twice.output
+    before = catalogue.read_text()
+    for change, told in (([], "worn_arms"), (["--id", "law_1"], "laws of a vehicle file"), (["--id", "x", "--title", "a\nb"], "one line")):
+        refused = CliRunner().invoke(app, [*command, *change])
+        assert refused.exit_code != 0
+        assert told in " ".join(refused.output.split())
+    assert catalogue.read_text() == before
 
 
 def test_a_bad_law_in_a_catalogue_is_refused_by_key(tmp_path: Path) -> None:

@@ -47,6 +47,10 @@ def endless(theta, dt, size):  # type: ignore[no-untyped-def]
     return size * math.sin(theta) * 0.01 / dt
 
 
+def blind(size, edge):  # type: ignore[no-untyped-def]
+    return 1.0 + size + 0.0 * edge
+
+
 def driving(omega, size):  # type: ignore[no-untyped-def]
     return -400.0 * size * omega
 
@@ -60,6 +64,8 @@ BREAKING = {
         (made(driving, SIZE), "passive"),
         (made(one_sided, dataclasses.replace(SIZE, unit="lbf ft"), one_sided=True), "unit"),
         (made(not_neutral, Parameter("size", "N m", "", 5.0), acts_by=("size",), one_sided=False), "mirror"),
+        (made(blind, SIZE, Parameter("edge", "rad", "read, but to no end", 0.1, grid=(0.1,)), hook="arm"), "acting: .* edge"),
+        (made(not_neutral, SIZE, hook="delay"), "neutral: the law 'delay'"),
     ])
 }  # fmt: skip
 

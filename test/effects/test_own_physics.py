@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -20,17 +21,17 @@ from catalogue import put_back
 from click.testing import Result
 from typer.testing import CliRunner
 
-from lugre_steering.chain.step import torque_side
+from lugre_steering.chain.step import new_parameters, run_side, torque_side
 from lugre_steering.cli import app
 from lugre_steering.diagnosis import effect_card
 from lugre_steering.effects import registry
 from lugre_steering.effects.entry import Seen
 from lugre_steering.effects.own import read_effects
-from lugre_steering.errors import EffectError
+from lugre_steering.errors import EffectError, VehicleFileError
 from lugre_steering.estimator import Estimator
 from lugre_steering.fitting.fingerprint import _suggested
 from lugre_steering.resources import config_folder
-from lugre_steering.vehicle import EffectEntry, load
+from lugre_steering.vehicle import EffectEntry, load, save
 from lugre_steering.vehicle.model import build_model
 
 OWN = config_folder() / "own_physics"
@@ -228,11 +229,17 @@ print(round((torque_side(p, model.rubber, time, np.full(50, 0.1), *still) - plai
         ('{"torque": torque}', "torque", "hooks: got <function torque at .*>, expected a mapping"),
         ("GAIN = 1.0", "raise SystemExit(3)", "cannot be run: SystemExit: 3"),
         ("* shape(theta)", "* shape(thta)", "name 'thta' is not defined"),
+        ("tier=2", "tier=2, per_line=True", "per_line: got True, expected True for the law 'line', or else False"),
+        ('{"torque": torque}', '{"line": lambda stiffness: stiffness}', "per_line: got False"),
+        ("tier=2", 'tier=2, tables={"tab": -1}', "tables.tab: got -1, expected a length of at least 1"),
+        ('{"torque": torque}', '{"delay": lambda stiffness: stifness}', "name 'stifness' is not defined"),
+        ('{"torque": torque}', '{"arm": lambda theta, stiffness: (1.0, stiffness)}', "cannot be compiled: float.. argument"),
+        ('{"torque": torque}', '{"arm": lambda stiffness, wound: 1.0}', "got the argument 'wound', expected one of its own parameters"),
         ("def torque(stiffness, theta):", "def torque(stiffness, theta, wound):", "every memory that it names"),
     ],
 )
 def test_what_own_python_declares_must_mean_something(tmp_path: Path, old: str, new: str, words: str) -> None:
-    text = OWN_PYTHON if "memory that" not in words else OWN_PYTHON.replace("tier=2", 'tier=2, memory={"wound": 0.0}')
+    text = OWN_PYTHON if "wound" not in new or "memory" in new else OWN_PYTHON.replace("tier=2", 'tier=2, memory={"wound": 0.0}')
     assert len(refusal(tmp_path / "mine.py", text, old, new, words).splitlines()) == 1
 
 
@@ -313,6 +320,7 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
         ("scale: 300.0", "scale: many", "a plain number"),
         ("laws:", "lawz:", "no such key"),
         ("id: chain_ripple", "id: class", "no word of Python"),
+        ("id: chain_ripple", "id: law_1", "id: got 'law_1', expected another name: law_1, law_2, ... are the laws of a vehicle file"),
         ("id: chain_ripple", f"id: {'a' * 300}", "at most 64"),
         ("title: ", 'title: "a\\nb" #', r"title: got 'a\\nb', expected one line"),
         ("high: 1.0e4", "high: -1.0", "parameters.torque.low: got 0.0, expected less than high"),
@@ -321,10 +329,74 @@ def test_a_package_is_known_once_installed(tmp_path: Path) -> None:
         ("scale: 300.0", "scale: 1.0e+9", "parameters.torque.scale: got 1000000000.0, expected a typical size above 0, at most"),
         ("grid: [", "grid: [7.0, ", "parameters.pitch.grid: got 7.0, expected values from low"),
         ("laws:", "memory: {wound: 0.0}\nlaws:", "the next value of each memory"),
+        ("scale: 300.0", "scale: 300.0, grid: [300.0]", "expected an amplitude, which switches the effect off at zero"),
+        ("torque: torque", "line: torque", "needs a .py file"),
+        ("torque: torque * sin(6.283185307 * theta / pitch)", "arm: 1 + torque * theta / coulomb_torque * pitch", "no 'coulomb_torque'"),
+        ("torque: torque * sin(6.283185307 * theta / pitch)", "arm: log(-pitch - abs(torque))", "readings that are no numbers"),
+        ("laws:", "memory: {wound: 0.0}\nupdate: {wound: theta}\nlaws:\n  arm: 1 + torque * wound", "no 'wound'"),
     ],
 )
 def test_what_is_no_effect_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert "mine.yaml" in refusal(tmp_path / "mine.yaml", RIPPLE.read_text(), old, new, words)
+
+
+@pytest.mark.parametrize(
+    ("identity", "name", "field"),
+    [
+        ("end", "stop_stiffness", "end_stop_stiffness"),
+        ("rubber", "temperature", "rubber_temperature"),
+        ("contact", "angle", "contact_angle"),
+    ],
+)
+def test_an_effect_has_no_field_of_another(tmp_path: Path, identity: str, name: str, field: str) -> None:
+    told = refusal(tmp_path / "mine.yaml", RIPPLE.read_text().replace("pitch", name), "id: chain_ripple", f"id: {identity}", name)
+    assert f"'{field}', which there is already" in told
+
+
+KEPT = """
+- id: {name}_loss
+  title: {name}
+  law: {{channel: gain, coordinate: none, form: constant, range: [0.0, 1.0], values: {{value: {value}}}}}
+"""
+
+
+def test_a_vehicle_file_knows_its_entry_whatever_else_stands_in_the_file(tmp_path: Path) -> None:
+    """By the entry itself, or as earlier vehicle files have it by the whole file; another entry of its name is refused."""
+    file, written = tmp_path / "mine.yaml", tmp_path / "vehicle.yaml"
+    first, second = KEPT.format(name="first", value=0.1), KEPT.format(name="second", value=0.2)
+
+    def read(text: str) -> str | None:
+        """The hash that the vehicle file has of the first effect once it is read and written beside these."""
+        file.write_text(f"effects:\n{text}")
+        with put_back():
+            registry.add_files(file)
+            vehicle = load(written)
+        save(vehicle, written)
+        return vehicle.effects[0].sha256
+
+    of_file = hashlib.sha256(f"effects:\n{first}".encode()).hexdigest()
+    save(load(SHEET).replace(effects=(EffectEntry("first_loss", {"size": 1.0}, file.name, of_file),)), written)
+    of_entry = read(first)
+    assert of_entry != of_file
+    assert read(f"# both\n{first}{second}") == of_entry
+    with pytest.raises(VehicleFileError, match="others under the same name"):
+        read(first.replace("0.1", "0.3"))
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_two_laws_of_yaml_share_a_memory(tmp_path: Path) -> None:
+    """A law of a sensor stands before that which turns the memory on, and another reads it: a ramp of the samples so far."""
+    laws = "laws: {delay: 0 * late, torque: size * turns, level: 1 + 0 * size * turns}\nmemory: {turns: 0.0}\nupdate: {turns: turns + 1}"
+    size, late = "size: {unit: N m, meaning: of a sample, scale: 5.0}", "late: {unit: s, meaning: nothing, scale: 0.01}"
+    (tmp_path / "ramp.yaml").write_text(
+        f"id: ramp\nstage: parallel_torque\ntitle: a ramp\n{laws}\nparameters: {{{size}, {late}}}\n", encoding="utf-8"
+    )
+    registry.add_files(tmp_path / "ramp.yaml")
+    p, still = new_parameters(registry.composed(["ramp"])), np.zeros(5)
+    for field in ("static_torque", "coulomb_torque", "sigma_0", "stribeck_speed", "stribeck_exponent", "heat_capacity", "table_step"):
+        p[field] = 1.0
+    p["ramp_size"] = 3.0
+    assert run_side(p, np.ones((2, 2)), np.arange(5) * 0.1, still, still, still)["torque"].tolist() == [0.0, 3.0, 6.0, 9.0, 12.0]
 
 
 @pytest.mark.parametrize(
