@@ -38,7 +38,7 @@ class LawEntry:
     form: str
     """Closed form of ``values``, or a table of ``knots``."""
     range: tuple[float, ...]
-    """Where the coordinate was seen; beyond, f is held."""
+    """Where the coordinate was seen; beyond, f is held, a line, a hinge or a sinusoid from half the range further on."""
     values: dict[str, float] = field(default_factory=dict)
     """Values of the closed form, by name."""
     knots: tuple[float, ...] = ()
