@@ -80,11 +80,56 @@ def test_trailing_commas_and_unequal_columns(tmp_path: Path) -> None:
 def test_text_among_numbers_is_refused_unless_it_is_said_to_be_missing(tmp_path: Path) -> None:
     file = write(tmp_path, "log.csv", "t,a\n0,1\n1,OVER\n2,3\n")
     assert list(read_table(file).column("t")) == [0.0, 1.0, 2.0]
-    with pytest.raises(MapFileError, match="line 3, column 'a': got 'OVER'"):
+    with pytest.raises(MapFileError, match=r"line 3, column 'a': got 'OVER', .* csv\.allow: \[text_cells\] takes text as missing$"):
         read_table(file).column("a")
     found = read_table(file, Csv(allow=("text_cells",)))
     assert found.column("a") == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
     assert found.left_out == {"cells of text (count as missing)": 1}
+    with pytest.raises(MapFileError, match="got 'OVER OUT', expected"):  # one line
+        read_table(write(tmp_path, "log.csv", 't,a\n0,1\n1,"OVER\nOUT"\n')).column("a")
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "wanted"),
+    [
+        ('t,a\n0,1\n# event, "valve open\n2,3\n3,4\n', Csv(), [1.0, 3.0, 4.0]),
+        ('Remark,"open\nt,a\n0,1\n1,2\n', Csv(skip_rows=1), [1.0, 2.0]),
+        ('t,a,note\n0,1,"two\nlines"\n1,2,\n', Csv(), [1.0, 2.0]),
+        ('t,"a\n"\n0,1\n1,2\n', Csv(), [1.0, 2.0]),
+        ("a,p\n1,5\n#N/A,5\n # remark\n4,5\n", Csv(), [1.0, np.nan, 4.0]),
+        ("a,p\n,\n1,5\n,\n\n,\n4,5\n,\n", Csv(allow=("text_rows",)), [1.0, np.nan, np.nan, 4.0]),
+        ("a\n1\n\n4\n\n", Csv(), [1.0, np.nan, 4.0]),
+    ],
+)
+def test_no_row_of_numbers_gets_lost(tmp_path: Path, text: str, options: Csv, wanted: list[float]) -> None:
+    assert read_table(write(tmp_path, "log.csv", text), options).column("a") == pytest.approx(wanted, nan_ok=True)
+
+
+@pytest.mark.parametrize("rows", [3, 20_000])
+def test_a_quote_that_is_not_closed_is_told_where_it_is(tmp_path: Path, rows: int) -> None:
+    file = write(tmp_path, "log.csv", '# a\nt,a,note\n0,1,"5\n' + "1,2,\n" * rows + '3,4,"x"\n')
+    with pytest.raises(MapFileError, match=r"log\.csv: line 3: a cell begins with a quote that its row does not close"):
+        read_table(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("0,0;1,5\n0,1;2,5\n", Csv(";", ",", columns=("t", "a"))), ("12:00:00,1\n12:00:01,2\n", Csv(columns=("t", "a"))),
+        ("0,1\n1,2\n", Csv(columns=("t", "a"))), ("0.5,,1\n0.6,1,2\n", Csv()),
+    ],
+)  # fmt: skip
+def test_a_first_row_of_numbers_is_no_header(tmp_path: Path, text: str, options: Csv) -> None:
+    with pytest.raises(MapFileError, match=r"line 1: the header holds numbers, expected .* csv\.header_rows: 0"):
+        read_table(write(tmp_path, "log.csv", text), options)
+    assert list(read_table(write(tmp_path, "log.csv", "1,2,3\n0,1,2\n")).columns) == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize("cell", ["#NV", "#DIV/0!", "1.#QNAN", "-1.#IND", "--.--"])
+def test_what_programs_write_where_there_is_no_number(tmp_path: Path, cell: str) -> None:
+    found = read_table(write(tmp_path, "log.csv", f"t,a\n0,1\n1,{cell}\n"))
+    assert found.column("a") == pytest.approx([1.0, np.nan], nan_ok=True)
+    assert found.left_out == {"cells of '-', '?', '#N/A' and the like (count as missing)": 1}
 
 
 def test_columns_apart_by_blanks_and_other_encodings(tmp_path: Path) -> None:

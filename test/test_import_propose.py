@@ -332,7 +332,7 @@ def test_tabs_beside_names_with_blanks(tmp_path: Path) -> None:
 def test_dashes_and_question_marks_are_missing_numbers_and_no_units(tmp_path: Path) -> None:
     rows = [[f"{0.01 * i:.2f}", {1: "-", 2: "---"}.get(i % 10, f"{i % 7}"), "?" if i == 5 else f"{i}"] for i in range(600)]
     found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], [["s", "-", "bar"], *rows]))
-    assert "121 cells of '-', '?' or '#N/A' (count as missing)" in found["format"]
+    assert "121 cells of '-', '?', '#N/A' and the like (count as missing)" in found["format"]
     assert units(found)["pressure/main_a"] == ("p_main_a", "bar")
     missing = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
     assert [row["missing"] for row in missing] == [120, 1]
