@@ -248,6 +248,7 @@ def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
         ({"time [s]": T / 86400.0}, "makes 8.64e+06 samples per second, expected 0.1 to 50000"),
         ({"time": np.repeat(T[::100], np.random.default_rng(1).permutation([20, 180] * 10))}, "many stamps repeat the one before"),
         ({"time": (86395.0 + T) % 86400.0}, "s before it begins"),
+        ({"time": T % 7.0}, "runs back, after which 1301 of 2000 samples are of no use"),
         ({"time": T[::-1]}, "key 'time'"),
         ({"sample": np.arange(T.size)}, "key 'time'"),
         ({"time [ticks]": T}, "key 'time'"),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.bag.load import set_back
 from lugre_steering.errors import MapFileError
 from lugre_steering.expression import ExpressionError
 from lugre_steering.importing.evaluate import Columns, evaluate, same_length, times, unit_of
@@ -53,9 +54,16 @@ class Imported:
             "missing": self.missing,
             "outside_start_stop": self.outside,
             "not_increasing": int(np.sum(step <= 0.0)),
+            "unusable": unusable(self.time_s),
             "gaps_s": [[float(self.time_s[i]), float(self.time_s[i + 1])] for i in gaps],
             "outliers_s": [float(t) for t in self.time_s[outliers(self.value)]],
         }
+
+
+def unusable(time_s: Array) -> int:
+    """Samples that a reader of the bag leaves out: their clock was set back, or their time is that of another."""
+    stamp = np.round(1e9 * time_s).astype(np.int64)
+    return int(stamp.size - np.unique(stamp[~set_back(stamp)]).size)
 
 
 def outliers(value: Array) -> IntArray:

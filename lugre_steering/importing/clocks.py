@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.importing.channels import unusable
 from lugre_steering.importing.evaluate import Columns, times
 from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Clock, ImportMap
 from lugre_steering.importing.stated import stated, unfit
@@ -24,6 +25,8 @@ _UNIX = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Above so much a time counts from 1970, in this unit."""
 _RATES_HZ = (0.1, 5e4)
 """What recordings of machines are sampled at."""
+_LOST = 0.01
+"""More samples than this share behind others of their clock are no stray ones."""
 _DAY_S, _SHEET_DAYS, _SHEET_1970 = 86400.0, (25e3, 75e3), 25569
 """Spreadsheets count days from the end of 1899: those of our lives, and the first of 1970."""
 _SECONDS, _NANOSECONDS = ("sec", "secs", "s", "seconds"), re.compile(r"(ns|nsecs?|nanosecs?|nanoseconds)$")
@@ -76,10 +79,14 @@ class ClockGuess:
             back = f"ends {-float(steps.sum()):.3g} s before it begins, expected it to rise (over midnight?)"
             return f"{table.file}: time '{self.column}': {back}"
         rate = 1.0 / _step(seconds)
-        if _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
-            return None
-        expected = f"expected {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g}: is it a time, and the unit right?"
-        return f"{table.file}: time '{self.column}' in {self.unit}: makes {rate:.3g} samples per second, {expected}"
+        if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
+            expected = f"expected {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g}: is it a time, and the unit right?"
+            return f"{table.file}: time '{self.column}' in {self.unit}: makes {rate:.3g} samples per second, {expected}"
+        lost = unusable(seconds[np.isfinite(seconds)]) - int(np.sum(steps == 0.0))
+        if lost > _LOST * steps.size:
+            back = f"runs back, after which {lost} of {steps.size + 1} samples are of no use"
+            return f"{table.file}: time '{self.column}': {back}, expected it to rise: split the file there, or time: {{rate_Hz: ...}}"
+        return None
 
 
 def clocks(table: Table) -> list[ClockGuess]:
