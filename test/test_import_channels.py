@@ -213,6 +213,8 @@ def test_one_side_in_degrees_and_one_in_radians_is_caught(tmp_path: Path) -> Non
         ("pressure/a", 200.0 + T, "Pa", "is the unit Pa?"),
         ("pressure/a", 2e7 + T, "bar", "is the unit bar?"),
         ("pressure/a", 200.0 + T, "bar", None),
+        ("pressure/a", np.where(T < 2.0, -62.5, 100.0), "bar", "200 samples below a vacuum, down to -62.5 bar: a broken wire"),
+        ("pressure/a", 100.0 * T - 1.0, "bar", None),
         ("air_temperature", 293.0 + 0.0 * T, "degC", "is the unit degC?"),
         ("air_temperature", 293.0 + 0.0 * T, "K", None),
     ],

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lugre_steering.counted import counted
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.channels import Imported
 from lugre_steering.importing.map import RADIANS, ImportMap
@@ -25,6 +26,8 @@ _MIN_SAMPLES = 20
 
 _PRESSURES_PA = (2e4, 2e8)
 """Where the highest pressure of a hydraulic machine lies."""
+_VACUUM_PA = -1.05e5
+"""No gauge of a pressure reads less."""
 _AIR_DEGC = (-60.0, 80.0)
 
 
@@ -69,6 +72,9 @@ def doubts(mapping: ImportMap, channel: Imported, others: Iterable[Imported]) ->
     elif channel.unit == "Pa":
         if max(-low, high) > 0.0 and not _PRESSURES_PA[0] <= max(-low, high) <= _PRESSURES_PA[1]:
             found.append(f"up to {max(-low, high):.3g} Pa: is the unit {unit}?")
+        if below := int(np.sum(channel.value < _VACUUM_PA)):
+            samples = counted(below, "sample")
+            found.append(f"{samples} below a vacuum, down to {1e-5 * low:.3g} bar: a broken wire, or is the offset or zero wrong?")
     elif channel.unit == "degC" and not _AIR_DEGC[0] <= low <= high <= _AIR_DEGC[1]:
         found.append(f"{low:.3g} ... {high:.3g} degC: is the unit {unit}?")
     return found
