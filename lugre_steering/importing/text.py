@@ -29,6 +29,12 @@ _GROUPED = re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})", re.ASC
 _MISSING = ("", "nan", "-nan", "na", "n/a", "null", "none")
 _NO_VALUE = re.compile(r"-+(\.-+)?|\?+|#n/a|#nv|#div/0!|[-+]?1[.,]#(ind|inf|[qs]?nan)0*", re.IGNORECASE)
 """What loggers and spreadsheets write where there is none."""
+_NO_TEXT = (
+    (b"\x1f\x8b", "is packed (gzip), expected a table: unpack it"),
+    (b"PK\x03\x04", "is packed, or a spreadsheet, expected a table: unpack it, or save it as CSV"),
+    (b"\x93NUMPY", "is an array without names, expected a table: save it by names, as .npz"),
+)
+"""How files begin that hold a table, but no text."""
 OPEN_QUOTE = 'a cell begins with a quote that its row does not close, expected "..." or none'
 _MAX_LINE = 1 << 20
 _LINE_BREAK = re.compile(r"\s*[\r\n]\s*")
@@ -50,8 +56,18 @@ def number(text: str, decimal: str = ".", dates: str | None = None) -> float | N
     return stamp(text, dates)
 
 
+def check_text(file: Path) -> None:
+    """Refuse what is no text, but known."""
+    with file.open("rb") as stream:
+        begin = stream.read(8)
+    for magic, what in _NO_TEXT:
+        if begin.startswith(magic):
+            raise MapFileError(f"{file}: {what}")
+
+
 def read_text(file: Path, options: Csv) -> Table:
     """The columns of a CSV file."""
+    check_text(file)
     rows = read_rows(file, options)
     filled = (row for row in rows if any(row[1]))
     count = int(options.header_rows)
