@@ -104,6 +104,7 @@ def _commented(lines: Sequence[str], comment: str, delimiter: str, decimal: str,
             cells = [cell.strip() for _, row in _split([text], "", delimiter) for cell in row]
             if len(set(cells)) == len(cells) == width and all(number(cell, decimal) is None for cell in cells):
                 found.append(tuple(cells))
+                break
     return next((cells for cells in found if not _is_units(cells)), found[-1] if found else None)
 
 
