@@ -231,7 +231,9 @@ def test_mistakes_in_the_map_are_named(tmp_path: Path, text: str, message: str) 
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ("t,b\n0,1\n", "no column 'a'; there are: t, b"),
+        ("t,b\n0,1\n", r"no column 'a'; there are: t, b \(key 'channels\.angle/left' of the map\)"),
+        ("x,a\n0,1\n", r"no column 't'; there are: x, a \(key 'time' of the map\)"),
+        ("t;a\n0;1\n", r"no column 'a'; there are: none; without numbers: t;a \(line 2, .* got '0;1', .*\); is csv\.delimiter right\?"),
         ("t,A\n0,1\n", "no column 'a'"),
         ("t,a\n0,1\n1,x\n", "line 3, column 'a': got 'x', expected a number"),
         ("t,a\n0,1\n1,1_0\n", "line 3, column 'a': got '1_0', expected a number"),

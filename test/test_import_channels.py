@@ -133,7 +133,7 @@ GOOD = HEAD + "time: {column: t}\nchannels: {measured_torque: {expression: a * b
         (GOOD.replace("{column: t}", "{column: t, rate_Hz: 5}"), r"key 'time': got \['column', 'rate_Hz'\], expected exactly one of"),
         (GOOD.replace("{column: t}", "{unit: s}"), "key 'time': got nothing, expected exactly one of"),
         (GOOD + "signed: {a: 2.5}\n", "key 'signed.a': got 2.5, expected a whole number"),
-        (GOOD + "signed: {z: 16}\n", "no column 'z'"),
+        (GOOD + "signed: {z: 16}\n", r"no column 'z'.* \(key 'signed' of the map\)"),
         (GOOD + "names: {'a b': a}\n", "key 'names': got 'a b'"),
         (GOOD + "names: {sin: a}\n", "key 'names': got 'sin'"),
         (GOOD + "names: {z: gone}\n", None),

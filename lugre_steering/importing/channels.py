@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -83,7 +85,8 @@ def outliers(value: Array) -> IntArray:
 
 def read_channels(table: Table, mapping: ImportMap) -> dict[str, Imported]:
     """All channels of the map; a rate goes with its angle."""
-    columns = Columns(table, mapping)
+    with _asked_by("signed"):
+        columns = Columns(table, mapping)
     found: dict[str, Imported] = {}
     for name in sorted(mapping.channels, key=lambda name: name.startswith("rate/")):  # rates after their angles
         if name.startswith("rate/"):
@@ -94,11 +97,22 @@ def read_channels(table: Table, mapping: ImportMap) -> dict[str, Imported]:
     return found
 
 
+@contextmanager
+def _asked_by(key: str) -> Iterator[None]:
+    """Errors of a table name the key of the map that asks for what is not there."""
+    try:
+        yield
+    except MapFileError as error:
+        raise MapFileError(f"{error} (key '{key}' of the map)") from None
+
+
 def _channel(columns: Columns, mapping: ImportMap, name: str) -> Imported:
     table, source, clock = columns.table, mapping.channels[name], mapping.clock(name)
     try:
-        value = evaluate(columns, source)
-        time = times(columns, clock, value.size)
+        with _asked_by(f"channels.{name}"):
+            value = evaluate(columns, source)
+        with _asked_by("time" if source.time is None else f"channels.{name}.time"):
+            time = times(columns, clock, value.size)
     except ExpressionError as error:
         raise MapFileError(f"{table.file}: channel {name}: {error}") from error
     same_length(table, name, f"the {clock}", time, value)
@@ -119,7 +133,8 @@ def _channel(columns: Columns, mapping: ImportMap, name: str) -> Imported:
 def _rate(columns: Columns, mapping: ImportMap, angle: Imported, name: str) -> Array:
     """Rates (n,) at the rows of the angle."""
     try:
-        value = evaluate(columns, mapping.channels[name])
+        with _asked_by(f"channels.{name}"):
+            value = evaluate(columns, mapping.channels[name])
     except ExpressionError as error:
         raise MapFileError(f"{columns.table.file}: channel {name}: {error}") from error
     if value.size != angle.rows.size:

@@ -70,7 +70,7 @@ def signed(values: Array, bits: int, where: str) -> Array:
     half, full = 2.0 ** (bits - 1), 2.0**bits
     wrong = known[(known != np.round(known)) | (known < -half) | (known >= full)]
     if wrong.size:
-        raise MapFileError(f"{where}: got {wrong[0]:g}, expected whole numbers of {bits} bits (key 'signed')")
+        raise MapFileError(f"{where}: got {wrong[0]:g}, expected whole numbers of {bits} bits, as 'signed' says")
     return np.where(values >= half, values - full, values)
 
 
@@ -136,7 +136,7 @@ def _angle_of_stroke(columns: Columns, pivots: Pivots) -> Array:
     if impossible.size:
         raise MapFileError(
             f"{columns.table.file}: column '{pivots.column}': row {impossible[0] + 1} of the data makes the pivots "
-            f"{length[impossible[0]]:.4g} m apart, expected {abs(chassis - knuckle):.4g} to {chassis + knuckle:.4g} m (key 'pivots')"
+            f"{length[impossible[0]]:.4g} m apart, expected {abs(chassis - knuckle):.4g} to {chassis + knuckle:.4g} m"
         )
     opening = math.atan2(x * v - y * u, x * u + y * v)  # from the chassis pivot to the knuckle pivot at zero angle
     return np.asarray(math.copysign(1.0, opening) * np.arccos(cosine) - opening, np.float64)
