@@ -101,6 +101,7 @@ def test_csv_with_two_clocks_units_rate_and_an_epoch(tmp_path: Path) -> None:
     assert [round(seconds(m) - 1.5e9, 3) for m in pressures] == [0.5, 1.0, 2.0]
     rows = {row["channel"]: row for row in result["channels"]}
     assert rows["angle/right"]["missing"] == 1
+    assert (rows["rate/right"]["samples"], rows["rate/right"]["missing"], rows["rate/right"]["unit"]) == (2, 1, "rad/s")
     assert rows["angle/right"]["rate_Hz"] == pytest.approx(100.0)
     assert rows["pressure/main_a"]["samples"] == 3
 

@@ -197,6 +197,30 @@ def test_small_degrees_labelled_as_radians_are_caught_by_the_rate(tmp_path: Path
     assert import_table(table, map_file, tmp_path / "bag")["channels"][0]["doubts"] == []
 
 
+@pytest.mark.parametrize(
+    ("rate", "of_angle", "of_rate"),
+    [
+        (np.full_like(T, 9000.0), "moves otherwise than its rate says", []),
+        (np.zeros_like(T), "moves otherwise than its rate says", []),
+        (np.where(T == 1.0, 1e30, 30.0 * np.cos(T)), None, ["1 sample beyond 1000 rad/s, which count as missing: is the unit deg/s?"]),
+        (np.where(T < 4.0, 30.0 * np.cos(T), np.inf), None, []),
+    ],
+)
+def test_a_rate_is_told_of_too(tmp_path: Path, rate: np.ndarray, of_angle: str | None, of_rate: list[str]) -> None:
+    table = csv_of(tmp_path, t=T, a=30.0 * np.sin(T), w=rate)
+    text = HEAD + "time: {column: t}\nchannels:\n  angle/left: {column: a, unit: deg}\n  rate/left: {column: w, unit: deg/s}\n"
+    angle, row = import_table(table, save(tmp_path, "map.yaml", text), tmp_path / "bag")["channels"]
+    assert row["channel"] == "rate/left"
+    assert row["missing"] == np.sum(~np.isfinite(rate))
+    assert row["doubts"] == of_rate
+    assert (of_angle is None and angle["doubts"] == []) or (of_angle is not None and of_angle in angle["doubts"][0])
+
+
+def test_a_rate_without_numbers_is_refused(tmp_path: Path) -> None:
+    text = "  angle/left: {column: a, unit: deg}\n  rate/left: {column: w, unit: deg/s}\n"
+    assert "channel rate/left: no number in any of 600 rows" in refused(tmp_path, csv_of(tmp_path, t=T, a=T, w=np.nan * T), text)
+
+
 def test_one_side_in_degrees_and_one_in_radians_is_caught(tmp_path: Path) -> None:
     table = csv_of(tmp_path, t=T, l=2.0 * np.sin(T), r=np.radians(1.9 * np.sin(T)))
     said = refused(tmp_path, table, "  angle/left: {column: l, unit: rad}\n  angle/right: {column: r, unit: rad}\n")

@@ -39,6 +39,16 @@ class Imported:
     outside: int
     rate: Array | None = None
 
+    def own_rate(self) -> Imported | None:
+        """The rate of an angle as a channel, where the table has it."""
+        if self.rate is None:
+            return None
+        known = np.isfinite(self.rate)
+        rows = self.rows.copy()
+        rows[rows] = known
+        name, missing = self.name.replace("angle/", "rate/"), int(np.sum(~known))
+        return Imported(name, f"{self.unit}/s", self.time_s[known], self.rate[known], rows, missing, 0)
+
     def summary(self) -> dict[str, Any]:
         """Rate, gaps and outliers."""
         step = np.diff(self.time_s)
@@ -139,4 +149,8 @@ def _rate(columns: Columns, mapping: ImportMap, angle: Imported, name: str) -> A
         raise MapFileError(f"{columns.table.file}: channel {name}: {error}") from error
     if value.size != angle.rows.size:
         raise MapFileError(f"{columns.table.file}: {name}: has {value.size} values, expected {angle.rows.size} as {angle.name}")
-    return value[angle.rows]
+    rate = np.where(np.isfinite(value), value, np.nan)[angle.rows]
+    if np.isnan(rate).all():
+        expected = "expected some, or no such channel in the map"
+        raise MapFileError(f"{columns.table.file}: channel {name}: no number in any of {rate.size} rows, {expected}")
+    return rate
