@@ -147,11 +147,19 @@ def test_columns_apart_by_blanks_and_other_encodings(tmp_path: Path) -> None:
     [
         ("2026-11-22 05:30:00", 1795325400.0), ("2026-11-22T05:30:00.25Z", 1795325400.25),
         ("2026-11-22T07:30:00,125+02:00", 1795325400.125), ("1970-01-01T00:00:01-0130", 5401.0),
+        ("2026/11/22 05:30:00:250", 1795325400.25), ("2026.11.22 05:30:00 UTC", 1795325400.0), ("2026-11-22T07:30:00+02", 1795325400.0),
     ],
 )  # fmt: skip
 def test_dates_are_unix_times(tmp_path: Path, cell: str, unix: float) -> None:
     file = write(tmp_path, "log.csv", f"stamp;a\n{cell};1\n")
     assert list(read_table(file, Csv(delimiter=";")).column("stamp")) == [pytest.approx(unix, abs=1e-6)]
+
+
+@pytest.mark.parametrize("cell", ["25.10.26 05:30:00", "59:57.00", "22-11-2026", "05:30"])
+def test_dates_of_other_forms_are_told_what_is_read(tmp_path: Path, cell: str) -> None:
+    file = write(tmp_path, "log.csv", f"stamp;a\n{cell};1\n")
+    with pytest.raises(MapFileError, match=rf"got '{cell}', expected a number .* a date or time as 2026-11-22 05:30:00\.25\+01:00"):
+        read_table(file, Csv(delimiter=";")).column("stamp")
 
 
 def test_a_day_that_is_none_is_no_number(tmp_path: Path) -> None:

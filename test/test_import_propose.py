@@ -310,6 +310,7 @@ def stamps(form: str) -> list[str]:
         (["Datum"], ["%d.%m.%Y %H:%M:%S,%f"], NOON.timestamp()),
         (["Timestamp"], ["%m/%d/%Y %I:%M:%S.%f %p"], NOON.timestamp()),
         (["Stamp"], ["%d/%m/%Y %H:%M:%S.%f"], NOON.timestamp()),
+        (["Stamp"], ["%d-%m-%Y %H:%M:%S.%f"], NOON.timestamp()),
         (["Time"], ["%H:%M:%S.%f"], 11 * 3600 + 59 * 60 + 50),
         (["Date", "Time"], ["%Y-%m-%d", "%H:%M:%S.%f"], NOON.timestamp()),
         (["Time", "Date"], ["%I:%M:%S.%f %p", "%d.%m.%Y"], NOON.timestamp()),

@@ -17,7 +17,7 @@ import numpy as np
 
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
-from lugre_steering.importing.stamps import stamp
+from lugre_steering.importing.stamps import FORMS, stamp
 from lugre_steering.importing.table import MAX_COLUMNS, MAX_NUMBERS, Table
 
 Row = tuple[int, list[str]]
@@ -37,13 +37,15 @@ _NO_TEXT = (
 """How files begin that hold a table, but no text."""
 OPEN_QUOTE = 'a cell begins with a quote that its row does not close, expected "..." or none'
 _MAX_LINE = 1 << 20
+_DATED = re.compile(r"\d+[-/.:]\d+[-/.:]\d|\d+:\d\d", re.ASCII)
+"""What may be meant as a date or time, of whatever form."""
 _LINE_BREAK = re.compile(r"\s*[\r\n]\s*")
 _BLOCK = 4096
 
 
 def number(text: str, decimal: str = ".", dates: str | None = None) -> float | None:
     """A cell as a number, NaN if it says that there is none, nothing if it is other text. A date is its Unix time [s], a time
-    alone the seconds of its day; ``dates``: the order of day and month, where slashes are between them."""
+    alone the seconds of its day; ``dates``: the order of day and month, where slashes or dashes are between them."""
     text = text.strip()
     # With another decimal character a point groups thousands, or the map is wrong.
     plain = text if decimal == "." else text.replace(".", "?").replace(decimal, ".").replace("?", ",")
@@ -268,7 +270,8 @@ class _Columns:
                 if "text_cells" not in self.options.allow:
                     where = f"line {line}, column '{self.names[place]}'"
                     hint = "" if any(map(str.isdigit, cell)) else "; csv.allow: [text_cells] takes text as missing"
-                    expected = f"expected a number (decimal '{decimal}') or an empty cell{hint}"
+                    date = f", a date or time as {FORMS}," if _DATED.match(cell.strip()) else ""
+                    expected = f"expected a number (decimal '{decimal}'){date} or an empty cell{hint}"
                     self.unusable[self.names[place]] = f"{where}: got '{_LINE_BREAK.sub(' ', cell)[:60]}', {expected}"
                     self.values[place] = array("d", self.values[place][:0])
                     return []
