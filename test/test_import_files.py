@@ -20,6 +20,7 @@ from scipy.io import savemat
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import read_table, table
 from lugre_steering.importing.map import Csv
+from lugre_steering.importing.sniff import sniff
 
 needs_h5py = pytest.mark.skipif(importlib.util.find_spec("h5py") is None, reason="h5py is not installed")
 needs_pyarrow = pytest.mark.skipif(importlib.util.find_spec("pyarrow") is None, reason="pyarrow is not installed")
@@ -204,12 +205,29 @@ def test_one_json_object_per_line(tmp_path: Path, name: str) -> None:
     assert found.column("a") == pytest.approx([1.0, np.nan], nan_ok=True)
 
 
+@pytest.mark.parametrize("end", ['{"t": 3, "a', '{"t": 3, "a\0\0', "\0" * 512, ""])
+def test_json_lines_that_the_end_of_the_file_cuts_off(tmp_path: Path, end: str) -> None:
+    found = read_table(write(tmp_path, "log.jsonl", '{"t": 0, "a": "\u2028"}\r\n{"t": 1}\n' + end))
+    assert list(found.column("t")) == [0.0, 1.0]
+    assert found.left_out == ({"records that the end of the file cuts off": 1} if "t" in end else {})
+
+
+def test_a_tail_of_nul_is_no_row(tmp_path: Path) -> None:
+    file = write(tmp_path, "log.csv", "t,a\n0,1\n1,2\n" + "\0" * (3 << 20))
+    found = read_table(file)
+    assert list(found.column("a")) == [1.0, 2.0]
+    assert list(found.left_out) == ["lines of NUL (was the power lost?)"]
+    assert sniff(file)[0] == Csv()
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ('{"t": [0, 1', "is not readable JSON"),
         ("", "is not readable JSON"),
-        ('{"t": 0}\n{"t": ', "line 2: Expecting value at character"),
+        ('{"t": 0}\n{"t": \n', "line 2: Expecting value at character"),
+        ('{"t": 0}{"t": 1}', "line 1: Extra data at character"),
+        ('{"t": 0}\n{"t": 1}{"t": 2}', "line 2: Extra data at character"),
         ("[" * 100_000, "nested too deeply"),
         ('{"a":' * 500 + "1" + "}" * 500, "nested more than 64 deep"),
         ("[" + '{"a":' * 500 + "1" + "}" * 500 + "]", "nested too deeply|not a readable JSON"),

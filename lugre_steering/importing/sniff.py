@@ -29,6 +29,7 @@ _RUN = 5
 def sniff(file: Path) -> tuple[Csv, list[str]]:
     """Options to read the file with, and a reason for each that is not the default."""
     encoding, text = _decoded(file)
+    text = text.rstrip("\0")  # what a recorder leaves that loses power
     lines = list(islice(io.StringIO(text, newline=""), _LINES))  # as the reader has them
     if "\0" in text or not lines:
         raise MapFileError(f"{file}: holds no text, expected a table")

@@ -36,6 +36,7 @@ _NO_TEXT = (
 )
 """How files begin that hold a table, but no text."""
 OPEN_QUOTE = 'a cell begins with a quote that its row does not close, expected "..." or none'
+_NUL = "\0"
 _MAX_LINE = 1 << 20
 _DATED = re.compile(r"\d+[-/.:]\d+[-/.:]\d|\d+:\d\d", re.ASCII)
 """What may be meant as a date or time, of whatever form."""
@@ -148,6 +149,7 @@ def _lines(file: Path, stream: TextIO) -> Iterator[str]:
     count = 0
     while line := stream.readline(_MAX_LINE):
         count += 1
+        line = line if line.strip(f"{_NUL}\r\n") or _NUL not in line else _NUL  # of any length
         if len(line) == _MAX_LINE:
             raise MapFileError(f"{file}: line {count}: is longer than {_MAX_LINE} characters, expected a table")
         yield line
@@ -227,6 +229,9 @@ class _Columns:
         """The cells of the columns; nothing if the row is to be left out."""
         line, row = found
         width = len(self.titles)
+        if row[0] == _NUL:
+            self.left_out["lines of NUL (was the power lost?)"] += 1
+            return None
         if len(row) > width and not any(cell.strip() for cell in row[width:]):
             row = row[:width]  # trailing commas
         if row[0].strip() in self.leads and _trimmed(row) in self.header:
