@@ -109,8 +109,11 @@ def test_the_angle_from_stroke_and_pivots_is_the_one_that_turned_the_pivot(
 def test_a_stroke_beyond_the_triangle_is_refused(tmp_path: Path) -> None:
     table = csv_of(tmp_path, t=np.arange(3.0), stroke=np.array([0.0, 1.0, 900.0]))
     text = "{pivots: {column: stroke, unit: mm, chassis_m: [0.9, 0.1], knuckle_m: [0.3, 0.4]}}"
-    with pytest.raises(MapFileError, match=r"row 3 of the data makes the pivots 1\.571 m apart, expected 0\.4055 to 1\.406 m"):
+    with pytest.raises(MapFileError, match=r"1 of 3 values .*: 900 puts the pivots 1\.571 m apart, expected 0\.4055 to 1\.406 m"):
         channels(tmp_path, table, f"time: {{column: t}}\nchannels: {{angle/left: {text}}}\n")
+    table = csv_of(tmp_path, t=T, stroke=np.where(T == 1.0, -9999.0, 0.0))
+    found = channels(tmp_path, table, f"time: {{column: t}}\nchannels: {{angle/left: {text}}}\n")["angle/left"]
+    assert (found.value.size, found.missing) == (T.size - 1, 1)
 
 
 def test_time_from_seconds_and_nanoseconds_or_from_a_rate(tmp_path: Path) -> None:
