@@ -199,6 +199,12 @@ def test_json_records_columns_matrices_and_single_numbers(tmp_path: Path) -> Non
         found.column("entries.tt")
 
 
+def test_json_rows_below_a_row_of_names(tmp_path: Path) -> None:
+    found = read_table(write(tmp_path, "log.json", '{"log": [["t", "a"], [0, 1], [1, null], [2, "3"]]}'))
+    assert list(found.column("log.t")) == [0.0, 1.0, 2.0]
+    assert found.column("log.a") == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
+
+
 @pytest.mark.parametrize("name", ["log.jsonl", "log.json"])
 def test_one_json_object_per_line(tmp_path: Path, name: str) -> None:
     found = read_table(write(tmp_path, name, '{"t": 0, "a": 1}\n\n{"t": 1, "a": NaN}\n'))
@@ -307,6 +313,26 @@ def test_what_unpacks_to_far_more_than_any_recording_is_refused(tmp_path: Path, 
     monkeypatch.setattr(np.lib.format, "read_array", lambda *_, **__: pytest.fail("unpacked"))
     with pytest.raises(MapFileError, match="to 180000 numbers, expected at most 100000 in one of this size"):
         read_table(tmp_path / "zeros.npz")
+
+
+def structs(*rows: dict) -> np.ndarray:
+    """A struct array of MATLAB."""
+    array = np.empty((1, len(rows)), [(key, object) for key in rows[0]])
+    for place, row in enumerate(rows):
+        array[0, place] = tuple(row.values())
+    return array
+
+
+@pytest.mark.parametrize(
+    ("labels", "names"), [(("q", "p"), ("s.q.values", "s.p.values")), (("q", "q"), ("s[1].values", "s[2].values"))]
+)
+def test_struct_arrays_of_matlab(tmp_path: Path, labels: tuple[str, str], names: tuple[str, str]) -> None:
+    signals = structs(*({"values": np.arange(3.0)[:, None] + i, "label": label} for i, label in enumerate(labels)))
+    log = structs({"t": 0.0, "a": 1.0}, {"t": 0.1, "a": np.empty((0, 0))}, {"t": 0.2, "a": 3.0})
+    savemat(tmp_path / "d.mat", {"s": signals, "log": log})
+    found = read_table(tmp_path / "d.mat")
+    assert [list(found.column(name)) for name in names] == [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]
+    assert found.column("log.a") == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
 
 
 def test_a_matlab_variable_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

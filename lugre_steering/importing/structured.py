@@ -73,11 +73,14 @@ def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
         for key, inner in value.items():
             _collect(found, _join(name, key), inner, depth + 1)
     elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
-        _collect_records(found, name, value)
+        collect_records(found, name, value)
     elif isinstance(value, list) and value and all(isinstance(item, list) for item in value):
-        width = len(value[0])
+        titles, width = value[0], len(value[0])
         if any(len(item) != width for item in value):
             found.refuse(name, "lists of different lengths")
+        elif all(isinstance(title, str) and number(title) is None for title in titles) and len(set(titles)) == width > 0:
+            for title, *cells in zip(*value, strict=True):
+                _collect(found, _join(name, title), cells, depth + 1)
         elif (rows := [_numbers(found, name, item) for item in value]) and all(row is not None for row in rows):
             found.add(name, np.array(rows))
     elif isinstance(value, list):
@@ -87,7 +90,7 @@ def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
         found.add(name, numbers)
 
 
-def _collect_records(found: Gathering, name: str, records: Sequence[Any]) -> None:
+def collect_records(found: Gathering, name: str, records: Sequence[Any]) -> None:
     """One column per key; where a record lacks it, a number is missing."""
     places: dict[str, list[int]] = {}
     values: dict[str, list[Any]] = {}
