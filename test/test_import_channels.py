@@ -221,7 +221,8 @@ def test_a_rate_is_told_of_too(tmp_path: Path, rate: np.ndarray, of_angle: str |
 
 def test_a_rate_without_numbers_is_refused(tmp_path: Path) -> None:
     text = "  angle/left: {column: a, unit: deg}\n  rate/left: {column: w, unit: deg/s}\n"
-    assert "channel rate/left: no number in any of 600 rows" in refused(tmp_path, csv_of(tmp_path, t=T, a=T, w=np.nan * T), text)
+    said = refused(tmp_path, csv_of(tmp_path, t=T, a=T, w=np.nan * T), text)
+    assert "channel rate/left: no number in any of the 600 rows of angle/left" in said
 
 
 def test_one_side_in_degrees_and_one_in_radians_is_caught(tmp_path: Path) -> None:

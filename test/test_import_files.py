@@ -100,6 +100,8 @@ def test_text_among_numbers_is_refused_unless_it_is_said_to_be_missing(tmp_path:
         ("a,p\n1,5\n#N/A,5\n # remark\n4,5\n", Csv(), [1.0, np.nan, 4.0]),
         ("a,p\n,\n1,5\n,\n\n,\n4,5\n,\n", Csv(allow=("text_rows",)), [1.0, np.nan, np.nan, 4.0]),
         ("a\n1\n\n4\n\n", Csv(), [1.0, np.nan, 4.0]),
+        (" , \na,p\n , \n1,5\n,\n2,5\n", Csv(), [1.0, np.nan, 2.0]),
+        ('a,p\n1,"x\x0cy,z"\n', Csv(), [1.0]),
     ],
 )
 def test_no_row_of_numbers_gets_lost(tmp_path: Path, text: str, options: Csv, wanted: list[float]) -> None:

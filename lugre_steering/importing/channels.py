@@ -74,7 +74,7 @@ class Imported:
 
 def unusable(time_s: Array) -> int:
     """Samples that a reader of the bag leaves out: their clock was set back, or their time is that of another."""
-    stamp = np.round(1e9 * time_s).astype(np.int64)
+    stamp = np.round(1e9 * np.clip(time_s - np.median(time_s), -9e9, 9e9)).astype(np.int64)  # as far as 64 bits go
     return int(stamp.size - np.unique(stamp[~set_back(stamp)]).size)
 
 
@@ -152,5 +152,5 @@ def _rate(columns: Columns, mapping: ImportMap, angle: Imported, name: str) -> A
     rate = np.where(np.isfinite(value), value, np.nan)[angle.rows]
     if np.isnan(rate).all():
         expected = "expected some, or no such channel in the map"
-        raise MapFileError(f"{columns.table.file}: channel {name}: no number in any of {rate.size} rows, {expected}")
+        raise MapFileError(f"{columns.table.file}: channel {name}: no number in any of the {rate.size} rows of {angle.name}, {expected}")
     return rate

@@ -72,7 +72,7 @@ def read_text(file: Path, options: Csv) -> Table:
     """The columns of a CSV file."""
     check_text(file)
     rows = read_rows(file, options)
-    filled = (row for row in rows if any(row[1]))
+    filled = (row for row in rows if any(map(str.strip, row[1])))
     count = int(options.header_rows)
     header = [row for _, row in zip(range(count), filled, strict=False)]
     first = next(filled, None)
@@ -110,7 +110,7 @@ def is_comment(line: str, comment: str, delimiter: str) -> bool:
 
 def holds_rows(row: Sequence[str], delimiter: str) -> bool:
     """Whether a cell goes on over what are rows: its quote is not closed."""
-    return any(delimiter in line for cell in row for line in cell.splitlines()[1:])
+    return any(delimiter in line for cell in row for line in _LINE_BREAK.split(cell)[1:])
 
 
 def _split(file: Path, lines: Iterator[tuple[int, str]], delimiter: str) -> Iterator[Row]:
@@ -149,7 +149,8 @@ def _lines(file: Path, stream: TextIO) -> Iterator[str]:
     count = 0
     while line := stream.readline(_MAX_LINE):
         count += 1
-        line = line if line.strip(f"{_NUL}\r\n") or _NUL not in line else _NUL  # of any length
+        if _NUL in line and not line.strip(f"{_NUL}\r\n"):
+            line = _NUL  # of any length
         if len(line) == _MAX_LINE:
             raise MapFileError(f"{file}: line {count}: is longer than {_MAX_LINE} characters, expected a table")
         yield line
