@@ -101,6 +101,7 @@ def test_csv_with_two_clocks_units_rate_and_an_epoch(tmp_path: Path) -> None:
     assert [round(seconds(m) - 1.5e9, 3) for m in pressures] == [0.5, 1.0, 2.0]
     rows = {row["channel"]: row for row in result["channels"]}
     assert rows["angle/right"]["missing"] == 1
+    assert (rows["rate/right"]["samples"], rows["rate/right"]["missing"], rows["rate/right"]["unit"]) == (2, 1, "rad/s")
     assert rows["angle/right"]["rate_Hz"] == pytest.approx(100.0)
     assert rows["pressure/main_a"]["samples"] == 3
 
@@ -231,7 +232,9 @@ def test_mistakes_in_the_map_are_named(tmp_path: Path, text: str, message: str) 
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ("t,b\n0,1\n", "no column 'a'; there are: t, b"),
+        ("t,b\n0,1\n", r"no column 'a'; there are: t, b \(key 'channels\.angle/left' of the map\)"),
+        ("x,a\n0,1\n", r"no column 't'; there are: x, a \(key 'time' of the map\)"),
+        ("t;a\n0;1\n", r"no column 'a'; there are: none; without numbers: t;a \(line 2, .* got '0;1', .*\); is csv\.delimiter right\?"),
         ("t,A\n0,1\n", "no column 'a'"),
         ("t,a\n0,1\n1,x\n", "line 3, column 'a': got 'x', expected a number"),
         ("t,a\n0,1\n1,1_0\n", "line 3, column 'a': got '1_0', expected a number"),
@@ -300,7 +303,7 @@ def test_two_runs_in_one_table_are_not_mixed_into_one(tmp_path: Path) -> None:
     channels = [channel for channel in load(VEHICLE).channels if channel.name == "left"]
     recording = read_recording(tmp_path / "bag", channels)
     assert recording.angle["left"].value[:499] == pytest.approx(np.radians(0.1 * once[:499]), abs=1e-7)
-    assert recording.rejected["/steering/left/joint_state"]["backward"] >= once.size - 2
+    assert sum(recording.rejected["/steering/left/joint_state"].values()) == row["unusable"] >= once.size - 2
 
 
 def test_one_wild_time_costs_one_sample(tmp_path: Path) -> None:

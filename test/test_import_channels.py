@@ -109,8 +109,11 @@ def test_the_angle_from_stroke_and_pivots_is_the_one_that_turned_the_pivot(
 def test_a_stroke_beyond_the_triangle_is_refused(tmp_path: Path) -> None:
     table = csv_of(tmp_path, t=np.arange(3.0), stroke=np.array([0.0, 1.0, 900.0]))
     text = "{pivots: {column: stroke, unit: mm, chassis_m: [0.9, 0.1], knuckle_m: [0.3, 0.4]}}"
-    with pytest.raises(MapFileError, match=r"row 3 of the data makes the pivots 1\.571 m apart, expected 0\.4055 to 1\.406 m"):
+    with pytest.raises(MapFileError, match=r"1 of 3 values .*: 900 puts the pivots 1\.571 m apart, expected 0\.4055 to 1\.406 m"):
         channels(tmp_path, table, f"time: {{column: t}}\nchannels: {{angle/left: {text}}}\n")
+    table = csv_of(tmp_path, t=T, stroke=np.where(T == 1.0, -9999.0, 0.0))
+    found = channels(tmp_path, table, f"time: {{column: t}}\nchannels: {{angle/left: {text}}}\n")["angle/left"]
+    assert (found.value.size, found.missing) == (T.size - 1, 1)
 
 
 def test_time_from_seconds_and_nanoseconds_or_from_a_rate(tmp_path: Path) -> None:
@@ -133,7 +136,7 @@ GOOD = HEAD + "time: {column: t}\nchannels: {measured_torque: {expression: a * b
         (GOOD.replace("{column: t}", "{column: t, rate_Hz: 5}"), r"key 'time': got \['column', 'rate_Hz'\], expected exactly one of"),
         (GOOD.replace("{column: t}", "{unit: s}"), "key 'time': got nothing, expected exactly one of"),
         (GOOD + "signed: {a: 2.5}\n", "key 'signed.a': got 2.5, expected a whole number"),
-        (GOOD + "signed: {z: 16}\n", "no column 'z'"),
+        (GOOD + "signed: {z: 16}\n", r"no column 'z'.* \(key 'signed' of the map\)"),
         (GOOD + "names: {'a b': a}\n", "key 'names': got 'a b'"),
         (GOOD + "names: {sin: a}\n", "key 'names': got 'sin'"),
         (GOOD + "names: {z: gone}\n", None),
@@ -197,6 +200,31 @@ def test_small_degrees_labelled_as_radians_are_caught_by_the_rate(tmp_path: Path
     assert import_table(table, map_file, tmp_path / "bag")["channels"][0]["doubts"] == []
 
 
+@pytest.mark.parametrize(
+    ("rate", "of_angle", "of_rate"),
+    [
+        (np.full_like(T, 9000.0), "moves otherwise than its rate says", []),
+        (np.zeros_like(T), "moves otherwise than its rate says", []),
+        (np.where(T == 1.0, 1e30, 30.0 * np.cos(T)), None, ["1 sample beyond 1000 rad/s, which count as missing: is the unit deg/s?"]),
+        (np.where(T < 4.0, 30.0 * np.cos(T), np.inf), None, []),
+    ],
+)
+def test_a_rate_is_told_of_too(tmp_path: Path, rate: np.ndarray, of_angle: str | None, of_rate: list[str]) -> None:
+    table = csv_of(tmp_path, t=T, a=30.0 * np.sin(T), w=rate)
+    text = HEAD + "time: {column: t}\nchannels:\n  angle/left: {column: a, unit: deg}\n  rate/left: {column: w, unit: deg/s}\n"
+    angle, row = import_table(table, save(tmp_path, "map.yaml", text), tmp_path / "bag")["channels"]
+    assert row["channel"] == "rate/left"
+    assert row["missing"] == np.sum(~np.isfinite(rate))
+    assert row["doubts"] == of_rate
+    assert (of_angle is None and angle["doubts"] == []) or (of_angle is not None and of_angle in angle["doubts"][0])
+
+
+def test_a_rate_without_numbers_is_refused(tmp_path: Path) -> None:
+    text = "  angle/left: {column: a, unit: deg}\n  rate/left: {column: w, unit: deg/s}\n"
+    said = refused(tmp_path, csv_of(tmp_path, t=T, a=T, w=np.nan * T), text)
+    assert "channel rate/left: no number in any of the 600 rows of angle/left" in said
+
+
 def test_one_side_in_degrees_and_one_in_radians_is_caught(tmp_path: Path) -> None:
     table = csv_of(tmp_path, t=T, l=2.0 * np.sin(T), r=np.radians(1.9 * np.sin(T)))
     said = refused(tmp_path, table, "  angle/left: {column: l, unit: rad}\n  angle/right: {column: r, unit: rad}\n")
@@ -213,6 +241,8 @@ def test_one_side_in_degrees_and_one_in_radians_is_caught(tmp_path: Path) -> Non
         ("pressure/a", 200.0 + T, "Pa", "is the unit Pa?"),
         ("pressure/a", 2e7 + T, "bar", "is the unit bar?"),
         ("pressure/a", 200.0 + T, "bar", None),
+        ("pressure/a", np.where(T < 2.0, -62.5, 100.0), "bar", "200 samples below a vacuum, down to -62.5 bar: a broken wire"),
+        ("pressure/a", 100.0 * T - 1.0, "bar", None),
         ("air_temperature", 293.0 + 0.0 * T, "degC", "is the unit degC?"),
         ("air_temperature", 293.0 + 0.0 * T, "K", None),
     ],

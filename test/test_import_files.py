@@ -20,6 +20,7 @@ from scipy.io import savemat
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing import read_table, table
 from lugre_steering.importing.map import Csv
+from lugre_steering.importing.sniff import sniff
 
 needs_h5py = pytest.mark.skipif(importlib.util.find_spec("h5py") is None, reason="h5py is not installed")
 needs_pyarrow = pytest.mark.skipif(importlib.util.find_spec("pyarrow") is None, reason="pyarrow is not installed")
@@ -80,11 +81,58 @@ def test_trailing_commas_and_unequal_columns(tmp_path: Path) -> None:
 def test_text_among_numbers_is_refused_unless_it_is_said_to_be_missing(tmp_path: Path) -> None:
     file = write(tmp_path, "log.csv", "t,a\n0,1\n1,OVER\n2,3\n")
     assert list(read_table(file).column("t")) == [0.0, 1.0, 2.0]
-    with pytest.raises(MapFileError, match="line 3, column 'a': got 'OVER'"):
+    with pytest.raises(MapFileError, match=r"line 3, column 'a': got 'OVER', .* csv\.allow: \[text_cells\] takes text as missing$"):
         read_table(file).column("a")
     found = read_table(file, Csv(allow=("text_cells",)))
     assert found.column("a") == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
     assert found.left_out == {"cells of text (count as missing)": 1}
+    with pytest.raises(MapFileError, match="got 'OVER OUT', expected"):  # one line
+        read_table(write(tmp_path, "log.csv", 't,a\n0,1\n1,"OVER\nOUT"\n')).column("a")
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "wanted"),
+    [
+        ('t,a\n0,1\n# event, "valve open\n2,3\n3,4\n', Csv(), [1.0, 3.0, 4.0]),
+        ('Remark,"open\nt,a\n0,1\n1,2\n', Csv(skip_rows=1), [1.0, 2.0]),
+        ('t,a,note\n0,1,"two\nlines"\n1,2,\n', Csv(), [1.0, 2.0]),
+        ('t,"a\n"\n0,1\n1,2\n', Csv(), [1.0, 2.0]),
+        ("a,p\n1,5\n#N/A,5\n # remark\n4,5\n", Csv(), [1.0, np.nan, 4.0]),
+        ("a,p\n,\n1,5\n,\n\n,\n4,5\n,\n", Csv(allow=("text_rows",)), [1.0, np.nan, np.nan, 4.0]),
+        ("a\n1\n\n4\n\n", Csv(), [1.0, np.nan, 4.0]),
+        (" , \na,p\n , \n1,5\n,\n2,5\n", Csv(), [1.0, np.nan, 2.0]),
+        ('a,p\n1,"x\x0cy,z"\n', Csv(), [1.0]),
+    ],
+)
+def test_no_row_of_numbers_gets_lost(tmp_path: Path, text: str, options: Csv, wanted: list[float]) -> None:
+    assert read_table(write(tmp_path, "log.csv", text), options).column("a") == pytest.approx(wanted, nan_ok=True)
+
+
+@pytest.mark.parametrize("rows", [3, 20_000])
+def test_a_quote_that_is_not_closed_is_told_where_it_is(tmp_path: Path, rows: int) -> None:
+    file = write(tmp_path, "log.csv", '# a\nt,a,note\n0,1,"5\n' + "1,2,\n" * rows + '3,4,"x"\n')
+    with pytest.raises(MapFileError, match=r"log\.csv: line 3: a cell begins with a quote that its row does not close"):
+        read_table(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("0,0;1,5\n0,1;2,5\n", Csv(";", ",", columns=("t", "a"))), ("12:00:00,1\n12:00:01,2\n", Csv(columns=("t", "a"))),
+        ("0,1\n1,2\n", Csv(columns=("t", "a"))), ("0.5,,1\n0.6,1,2\n", Csv()),
+    ],
+)  # fmt: skip
+def test_a_first_row_of_numbers_is_no_header(tmp_path: Path, text: str, options: Csv) -> None:
+    with pytest.raises(MapFileError, match=r"line 1: the header holds numbers, expected .* csv\.header_rows: 0"):
+        read_table(write(tmp_path, "log.csv", text), options)
+    assert list(read_table(write(tmp_path, "log.csv", "1,2,3\n0,1,2\n")).columns) == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize("cell", ["#NV", "#DIV/0!", "1.#QNAN", "-1.#IND", "--.--"])
+def test_what_programs_write_where_there_is_no_number(tmp_path: Path, cell: str) -> None:
+    found = read_table(write(tmp_path, "log.csv", f"t,a\n0,1\n1,{cell}\n"))
+    assert found.column("a") == pytest.approx([1.0, np.nan], nan_ok=True)
+    assert found.left_out == {"cells of '-', '?', '#N/A' and the like (count as missing)": 1}
 
 
 def test_columns_apart_by_blanks_and_other_encodings(tmp_path: Path) -> None:
@@ -102,11 +150,19 @@ def test_columns_apart_by_blanks_and_other_encodings(tmp_path: Path) -> None:
     [
         ("2026-11-22 05:30:00", 1795325400.0), ("2026-11-22T05:30:00.25Z", 1795325400.25),
         ("2026-11-22T07:30:00,125+02:00", 1795325400.125), ("1970-01-01T00:00:01-0130", 5401.0),
+        ("2026/11/22 05:30:00:250", 1795325400.25), ("2026.11.22 05:30:00 UTC", 1795325400.0), ("2026-11-22T07:30:00+02", 1795325400.0),
     ],
 )  # fmt: skip
 def test_dates_are_unix_times(tmp_path: Path, cell: str, unix: float) -> None:
     file = write(tmp_path, "log.csv", f"stamp;a\n{cell};1\n")
     assert list(read_table(file, Csv(delimiter=";")).column("stamp")) == [pytest.approx(unix, abs=1e-6)]
+
+
+@pytest.mark.parametrize("cell", ["25.10.26 05:30:00", "59:57.00", "22-11-2026", "05:30"])
+def test_dates_of_other_forms_are_told_what_is_read(tmp_path: Path, cell: str) -> None:
+    file = write(tmp_path, "log.csv", f"stamp;a\n{cell};1\n")
+    with pytest.raises(MapFileError, match=rf"got '{cell}', expected a number .* a date or time as 2026-11-22 05:30:00\.25\+01:00"):
+        read_table(file, Csv(delimiter=";")).column("stamp")
 
 
 def test_a_day_that_is_none_is_no_number(tmp_path: Path) -> None:
@@ -145,10 +201,31 @@ def test_json_records_columns_matrices_and_single_numbers(tmp_path: Path) -> Non
         found.column("entries.tt")
 
 
+def test_json_rows_below_a_row_of_names(tmp_path: Path) -> None:
+    found = read_table(write(tmp_path, "log.json", '{"log": [["t", "a"], [0, 1], [1, null], [2, "3"]]}'))
+    assert list(found.column("log.t")) == [0.0, 1.0, 2.0]
+    assert found.column("log.a") == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
+
+
 @pytest.mark.parametrize("name", ["log.jsonl", "log.json"])
 def test_one_json_object_per_line(tmp_path: Path, name: str) -> None:
     found = read_table(write(tmp_path, name, '{"t": 0, "a": 1}\n\n{"t": 1, "a": NaN}\n'))
     assert found.column("a") == pytest.approx([1.0, np.nan], nan_ok=True)
+
+
+@pytest.mark.parametrize("end", ['{"t": 3, "a', '{"t": 3, "a\0\0', "\0" * 512, ""])
+def test_json_lines_that_the_end_of_the_file_cuts_off(tmp_path: Path, end: str) -> None:
+    found = read_table(write(tmp_path, "log.jsonl", '{"t": 0, "a": "\u2028"}\r\n{"t": 1}\n' + end))
+    assert list(found.column("t")) == [0.0, 1.0]
+    assert found.left_out == ({"records that the end of the file cuts off": 1} if "t" in end else {})
+
+
+def test_a_tail_of_nul_is_no_row(tmp_path: Path) -> None:
+    file = write(tmp_path, "log.csv", "t,a\n0,1\n1,2\n" + "\0" * (3 << 20))
+    found = read_table(file)
+    assert list(found.column("a")) == [1.0, 2.0]
+    assert list(found.left_out) == ["lines of NUL (was the power lost?)"]
+    assert sniff(file)[0] == Csv()
 
 
 @pytest.mark.parametrize(
@@ -156,7 +233,9 @@ def test_one_json_object_per_line(tmp_path: Path, name: str) -> None:
     [
         ('{"t": [0, 1', "is not readable JSON"),
         ("", "is not readable JSON"),
-        ('{"t": 0}\n{"t": ', "line 2: Expecting value at character"),
+        ('{"t": 0}\n{"t": \n', "line 2: Expecting value at character"),
+        ('{"t": 0}{"t": 1}', "line 1: Extra data at character"),
+        ('{"t": 0}\n{"t": 1}{"t": 2}', "line 2: Extra data at character"),
         ("[" * 100_000, "nested too deeply"),
         ('{"a":' * 500 + "1" + "}" * 500, "nested more than 64 deep"),
         ("[" + '{"a":' * 500 + "1" + "}" * 500 + "]", "nested too deeply|not a readable JSON"),
@@ -236,6 +315,26 @@ def test_what_unpacks_to_far_more_than_any_recording_is_refused(tmp_path: Path, 
     monkeypatch.setattr(np.lib.format, "read_array", lambda *_, **__: pytest.fail("unpacked"))
     with pytest.raises(MapFileError, match="to 180000 numbers, expected at most 100000 in one of this size"):
         read_table(tmp_path / "zeros.npz")
+
+
+def structs(*rows: dict) -> np.ndarray:
+    """A struct array of MATLAB."""
+    array = np.empty((1, len(rows)), [(key, object) for key in rows[0]])
+    for place, row in enumerate(rows):
+        array[0, place] = tuple(row.values())
+    return array
+
+
+@pytest.mark.parametrize(
+    ("labels", "names"), [(("q", "p"), ("s.q.values", "s.p.values")), (("q", "q"), ("s[1].values", "s[2].values"))]
+)
+def test_struct_arrays_of_matlab(tmp_path: Path, labels: tuple[str, str], names: tuple[str, str]) -> None:
+    signals = structs(*({"values": np.arange(3.0)[:, None] + i, "label": label} for i, label in enumerate(labels)))
+    log = structs({"t": 0.0, "a": 1.0}, {"t": 0.1, "a": np.empty((0, 0))}, {"t": 0.2, "a": 3.0})
+    savemat(tmp_path / "d.mat", {"s": signals, "log": log})
+    found = read_table(tmp_path / "d.mat")
+    assert [list(found.column(name)) for name in names] == [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]
+    assert found.column("log.a") == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
 
 
 def test_a_matlab_variable_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,8 +16,9 @@ from typer.testing import CliRunner
 
 from lugre_steering.cli import app
 from lugre_steering.errors import MapFileError
-from lugre_steering.importing import import_table, load_map
+from lugre_steering.importing import import_table, load_map, read_table
 from lugre_steering.importing.propose import propose
+from lugre_steering.importing.sniff import sniff
 
 T = np.arange(0.0, 20.0, 0.01)
 ANGLE, RATE = np.radians(30.0) * np.sin(T), np.radians(30.0) * np.cos(T)
@@ -105,6 +106,36 @@ def test_names_between_a_row_of_groups_and_one_of_units(tmp_path: Path) -> None:
         "time": ("Time", "ms"), "angle/left": ("Angle left", "mrad"), "angle/right": ("Angle right", "mrad"),
         "pressure/main_a": ("p main A", "kPa"), "pressure/main_b": ("p main B", "kPa"), "air_temperature": ("T air", "K"),
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("Logger,DL\nSerial,12345\n\nt [s],angle [deg]\n", "{t:.2f},{a}\n"), ("# t [s];angle [deg]\n", "{t:.2f};{a}\n"),
+        ("# t_[s] angle_[deg]\n# s deg\n", "{t:.2f} {a}\n"), ("#,t [s],angle [deg]\n", "7,{t:.2f},{a}\n"),
+        ('"t\n[s]","angle\n[deg]"\n', "{t:.2f},{a}\n"), ('Remark,"open\nt [s],angle [deg]\n', "{t:.2f},{a}\n"),
+        ("Remark \x85\u2028\x0c.\nt [s],angle [deg]\n", "{t:.2f},{a}\n"),
+    ],
+)  # fmt: skip
+def test_names_below_remarks_in_comments_and_over_several_lines(tmp_path: Path, head: str, row: str) -> None:
+    (tmp_path / "log.csv").write_text(head + "".join(row.format(t=0.01 * i, a=i % 7) for i in range(60)), encoding="utf-8")
+    found = {key: (name.replace("_", " "), unit) for key, (name, unit) in units(proposal(tmp_path / "log.csv")).items()}
+    assert found == {"time": ("t [s]", "s"), "angle/left": ("angle [deg]", "deg")}
+
+
+def test_a_unit_with_an_open_quote_is_told(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text('t,stroke\ns,"\n' + "".join(f"{0.01 * i:.2f},{i}\n" for i in range(60)))
+    with pytest.raises(MapFileError, match="line 2: a cell begins with a quote that its row does not close"):
+        propose(tmp_path / "log.csv", tmp_path / "map.yaml")
+
+
+def test_the_encoding_of_a_large_file(tmp_path: Path) -> None:
+    rows = "".join(f"{0.01 * i:.2f},{i % 50}\n" for i in range(120_000))
+    for head, foot in (("t,Winkel [°]\n", ""), ("t,Winkel [deg]\n", "# °\n")):
+        (tmp_path / "log.csv").write_bytes((head + rows + foot).encode("latin-1"))
+        assert sniff(tmp_path / "log.csv")[0].encoding == "latin-1"
+        (tmp_path / "log.csv").write_bytes((head + rows + foot).encode("utf-8"))
+        assert sniff(tmp_path / "log.csv")[0].encoding == "utf-8"
 
 
 @pytest.mark.parametrize("commas", [",", ",,,"])
@@ -253,6 +284,7 @@ def test_days_of_a_spreadsheet_are_unix_time(tmp_path: Path) -> None:
         ({"time": np.repeat(T[::100], np.random.default_rng(1).permutation([20, 180] * 10))}, "many stamps repeat the one before"),
         ({"time": (86395.0 + T) % 86400.0}, "s before it begins"),
         ({"time [s]": np.repeat([0.0, 1.0, 2.0, 1.0, 2.0], 400)[: T.size]}, "many stamps repeat the one before"),
+        ({"time": T % 7.0}, "runs back, after which 1301 of 2000 samples are of no use"),
         ({"time": T[::-1]}, "key 'time'"),
         ({"sample": np.arange(T.size)}, "key 'time'"),
         ({"time [ticks]": T}, "key 'time'"),
@@ -284,6 +316,7 @@ def stamps(form: str) -> list[str]:
         (["Datum"], ["%d.%m.%Y %H:%M:%S,%f"], NOON.timestamp()),
         (["Timestamp"], ["%m/%d/%Y %I:%M:%S.%f %p"], NOON.timestamp()),
         (["Stamp"], ["%d/%m/%Y %H:%M:%S.%f"], NOON.timestamp()),
+        (["Stamp"], ["%d-%m-%Y %H:%M:%S.%f"], NOON.timestamp()),
         (["Time"], ["%H:%M:%S.%f"], 11 * 3600 + 59 * 60 + 50),
         (["Date", "Time"], ["%Y-%m-%d", "%H:%M:%S.%f"], NOON.timestamp()),
         (["Time", "Date"], ["%I:%M:%S.%f %p", "%d.%m.%Y"], NOON.timestamp()),
@@ -360,7 +393,7 @@ def test_tabs_beside_names_with_blanks(tmp_path: Path) -> None:
 def test_dashes_and_question_marks_are_missing_numbers_and_no_units(tmp_path: Path) -> None:
     rows = [[f"{0.01 * i:.2f}", {1: "-", 2: "---"}.get(i % 10, f"{i % 7}"), "?" if i == 5 else f"{i}"] for i in range(600)]
     found = proposal(written(tmp_path, ["t", "angle left", "p_main_a"], [["s", "-", "bar"], *rows]))
-    assert "121 cells of '-', '?' or '#N/A' (count as missing)" in found["format"]
+    assert "121 cells of '-', '?', '#N/A' and the like (count as missing)" in found["format"]
     assert units(found)["pressure/main_a"] == ("p_main_a", "bar")
     missing = import_table(tmp_path / "log.csv", tmp_path / "map.yaml", tmp_path / "bag2")["channels"]
     assert [row["missing"] for row in missing] == [120, 1]
@@ -439,6 +472,8 @@ def test_tables_that_are_no_text_are_told_what_to_do(tmp_path: Path, name: str, 
     (tmp_path / name).write_bytes(begin + bytes(100))
     with pytest.raises(MapFileError, match=wanted):
         propose(tmp_path / name, tmp_path / "map.yaml")
+    with pytest.raises(MapFileError, match=wanted):
+        read_table(tmp_path / name)
 
 
 TIME_ANGLE = {"time_s": T, "angle_left_deg": np.degrees(ANGLE)}

@@ -237,11 +237,7 @@ def _usable(
         usual = np.percentile(offset[use], 50.0, method="lower")
         reject("time_jump", np.abs(offset[use] - usual) > STRAY_NS)
     if len(use):
-        s = stamp[use]
-        believed = confirmed(s)
-        reject("backward", (s > believed + LATE_NS) | (s < np.maximum.accumulate(believed) - LATE_NS))
-    if len(use):
-        reject("backward", _doubled(stamp[use]))
+        reject("backward", set_back(stamp[use]))
     reordered = int(_late(stamp[use]).sum()) if len(use) else 0
     use = use[np.argsort(stamp[use], kind="stable")]
     reject("duplicate", np.diff(stamp[use], prepend=np.int64(-1)) == 0)
@@ -252,6 +248,14 @@ def confirmed(stamp: IntArray) -> IntArray:
     """How far (n,) each stamp is believed: until one of the next two has come as far. One wild stamp must not outdate the rest."""
     following = np.maximum(np.append(stamp[1:], stamp[-1:]), np.append(stamp[2:], stamp[-2:]))
     return np.asarray(np.minimum(stamp, following))
+
+
+def set_back(stamp: IntArray) -> Mask:
+    """Which messages, as sent, come from a clock that was set back, or run ahead of all that follow."""
+    believed = confirmed(stamp)
+    found = np.asarray((stamp > believed + LATE_NS) | (stamp < np.maximum.accumulate(believed) - LATE_NS))
+    found[~found] = _doubled(stamp[~found])
+    return found
 
 
 def _late(stamp: IntArray) -> Mask:

@@ -8,13 +8,14 @@ import importlib
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from lugre_steering.errors import MapFileError
+from lugre_steering.importing.structured import collect_records
 from lugre_steering.importing.table import MAX_COLUMNS, MAX_DEPTH, UNIT_KEYS, Gathering, Table, most_numbers, size_of
 
 _CHUNK = 1 << 16
@@ -159,10 +160,23 @@ def _collect(found: Gathering, name: str, value: Any, depth: int = 0) -> None:
         for key, inner in value.items():
             _collect(found, f"{name}.{key}" if name else key, inner, depth + 1)
         found.state(name, value)
+    elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+        _collect_structs(found, name, value, depth)
     elif isinstance(value, list):
-        found.refuse(name, "a cell array of several kinds")
+        found.refuse(name, "a cell array")
     else:
         found.add(name, value)
+
+
+def _collect_structs(found: Gathering, name: str, structs: Sequence[Mapping[str, Any]], depth: int) -> None:
+    """A struct array: a table where all fields are single numbers, else each by its label, as Simulink has it, or its place."""
+    if all(np.size(field) <= 1 for each in structs for field in each.values()):
+        collect_records(found, name, [{key: field if np.size(field) else None for key, field in each.items()} for each in structs])
+        return
+    labels = [label for each in structs if isinstance(label := each.get("label"), str) and label]
+    for place, each in enumerate(structs):
+        ending = f".{labels[place]}" if len(set(labels)) == len(structs) else f"[{place + 1}]"
+        _collect(found, name + ending, each, depth + 1)
 
 
 # ----------------------------------------------------- HDF5, MATLAB 7.3

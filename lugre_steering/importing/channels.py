@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from lugre_steering.bag.load import set_back
 from lugre_steering.errors import MapFileError
 from lugre_steering.expression import ExpressionError
 from lugre_steering.importing.evaluate import Columns, evaluate, same_length, times, unit_of
@@ -36,6 +39,16 @@ class Imported:
     outside: int
     rate: Array | None = None
 
+    def own_rate(self) -> Imported | None:
+        """The rate of an angle as a channel, where the table has it."""
+        if self.rate is None:
+            return None
+        known = np.isfinite(self.rate)
+        rows = self.rows.copy()
+        rows[rows] = known
+        name, missing = self.name.replace("angle/", "rate/"), int(np.sum(~known))
+        return Imported(name, f"{self.unit}/s", self.time_s[known], self.rate[known], rows, missing, 0)
+
     def summary(self) -> dict[str, Any]:
         """Rate, gaps and outliers."""
         step = np.diff(self.time_s)
@@ -53,9 +66,16 @@ class Imported:
             "missing": self.missing,
             "outside_start_stop": self.outside,
             "not_increasing": int(np.sum(step <= 0.0)),
+            "unusable": unusable(self.time_s),
             "gaps_s": [[float(self.time_s[i]), float(self.time_s[i + 1])] for i in gaps],
             "outliers_s": [float(t) for t in self.time_s[outliers(self.value)]],
         }
+
+
+def unusable(time_s: Array) -> int:
+    """Samples that a reader of the bag leaves out: their clock was set back, or their time is that of another."""
+    stamp = np.round(1e9 * np.clip(time_s - np.median(time_s), -9e9, 9e9)).astype(np.int64)  # as far as 64 bits go
+    return int(stamp.size - np.unique(stamp[~set_back(stamp)]).size)
 
 
 def outliers(value: Array) -> IntArray:
@@ -75,7 +95,8 @@ def outliers(value: Array) -> IntArray:
 
 def read_channels(table: Table, mapping: ImportMap) -> dict[str, Imported]:
     """All channels of the map; a rate goes with its angle."""
-    columns = Columns(table, mapping)
+    with _asked_by("signed"):
+        columns = Columns(table, mapping)
     found: dict[str, Imported] = {}
     for name in sorted(mapping.channels, key=lambda name: name.startswith("rate/")):  # rates after their angles
         if name.startswith("rate/"):
@@ -86,11 +107,22 @@ def read_channels(table: Table, mapping: ImportMap) -> dict[str, Imported]:
     return found
 
 
+@contextmanager
+def _asked_by(key: str) -> Iterator[None]:
+    """Errors of a table name the key of the map that asks for what is not there."""
+    try:
+        yield
+    except MapFileError as error:
+        raise MapFileError(f"{error} (key '{key}' of the map)") from None
+
+
 def _channel(columns: Columns, mapping: ImportMap, name: str) -> Imported:
     table, source, clock = columns.table, mapping.channels[name], mapping.clock(name)
     try:
-        value = evaluate(columns, source)
-        time = times(columns, clock, value.size)
+        with _asked_by(f"channels.{name}"):
+            value = evaluate(columns, source)
+        with _asked_by("time" if source.time is None else f"channels.{name}.time"):
+            time = times(columns, clock, value.size)
     except ExpressionError as error:
         raise MapFileError(f"{table.file}: channel {name}: {error}") from error
     same_length(table, name, f"the {clock}", time, value)
@@ -111,9 +143,14 @@ def _channel(columns: Columns, mapping: ImportMap, name: str) -> Imported:
 def _rate(columns: Columns, mapping: ImportMap, angle: Imported, name: str) -> Array:
     """Rates (n,) at the rows of the angle."""
     try:
-        value = evaluate(columns, mapping.channels[name])
+        with _asked_by(f"channels.{name}"):
+            value = evaluate(columns, mapping.channels[name])
     except ExpressionError as error:
         raise MapFileError(f"{columns.table.file}: channel {name}: {error}") from error
     if value.size != angle.rows.size:
         raise MapFileError(f"{columns.table.file}: {name}: has {value.size} values, expected {angle.rows.size} as {angle.name}")
-    return value[angle.rows]
+    rate = np.where(np.isfinite(value), value, np.nan)[angle.rows]
+    if np.isnan(rate).all():
+        expected = "expected some, or no such channel in the map"
+        raise MapFileError(f"{columns.table.file}: channel {name}: no number in any of the {rate.size} rows of {angle.name}, {expected}")
+    return rate

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lugre_steering.importing.channels import unusable
 from lugre_steering.importing.evaluate import Columns, times
 from lugre_steering.importing.map import READABLE_UNITS, SCHEMA, Clock, ImportMap
 from lugre_steering.importing.stated import stated, unfit
@@ -35,6 +36,8 @@ _COUNTED = (
     (1e-7, 621355968000000000, "steps of 100 ns since the year 1, as .NET counts them"),
 )  # fmt: skip
 """Seconds per step, the step at which 1970 began, and what is counted."""
+_LOST = 0.01
+"""More samples than this share behind others of their clock are no stray ones."""
 _SECONDS, _NANOSECONDS = ("sec", "secs", "s", "seconds"), re.compile(r"(ns|nsecs?|nanosecs?|nanoseconds)$")
 
 
@@ -85,10 +88,14 @@ class ClockGuess:
             back = f"ends {-float(steps.sum()):.3g} s before it begins, expected it to rise (over midnight?)"
             return f"{table.file}: time '{self.column}': {back}"
         rate = 1.0 / _step(seconds)
-        if _can_be(rate):
-            return None
-        expected = f"expected {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g}: is it a time, and the unit right?"
-        return f"{table.file}: time '{self.column}' in {self.unit}: makes {rate:.3g} samples per second, {expected}"
+        if not _can_be(rate):
+            expected = f"expected {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g}: is it a time, and the unit right?"
+            return f"{table.file}: time '{self.column}' in {self.unit}: makes {rate:.3g} samples per second, {expected}"
+        lost = unusable(seconds[np.isfinite(seconds)]) - int(np.sum(steps == 0.0))
+        if lost > _LOST * steps.size:
+            back = f"runs back, after which {lost} of {steps.size + 1} samples are of no use"
+            return f"{table.file}: time '{self.column}': {back}, expected it to rise: split the file there, or time: {{rate_Hz: ...}}"
+        return None
 
 
 def clocks(table: Table) -> list[ClockGuess]:

@@ -158,7 +158,7 @@ class Csv:
     """How a CSV file is written.
 
     Below ``skip_rows`` lines come ``header_rows``, of which ``name_row`` (from 1) holds the column names; ``columns``
-    names them here instead. ``dates``: of dates by slashes, ``dmy`` or ``mdy``. ``allow``: what is otherwise refused, of
+    names them here instead. ``dates``: of dates by slashes or dashes, ``dmy`` or ``mdy``. ``allow``: what is otherwise refused, of
     ``ALLOWANCES``.
     """
 

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lugre_steering.counted import counted
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.channels import Imported
 from lugre_steering.importing.map import RADIANS, ImportMap
-from lugre_steering.recording import Array
+from lugre_steering.recording import RATE_LIMIT, Array
 
 DEGREES = 180.0 / math.pi
 _SHARE = 0.01
@@ -21,10 +22,14 @@ _SHARE = 0.01
 _ALIKE = 0.1
 """Relative deviation of a ratio from 57.3 that still means degrees for radians."""
 _CORRELATED = 0.9
+_UNRELATED, _MOVES = 0.5, 0.05
+"""A smaller correlation of an angle that travels farther [rad or m] with its rate is that of another motion."""
 _MIN_SAMPLES = 20
 
 _PRESSURES_PA = (2e4, 2e8)
 """Where the highest pressure of a hydraulic machine lies."""
+_VACUUM_PA = -1.05e5
+"""No gauge of a pressure reads less."""
 _AIR_DEGC = (-60.0, 80.0)
 
 
@@ -63,15 +68,30 @@ def doubts(mapping: ImportMap, channel: Imported, others: Iterable[Imported]) ->
             found.append(f"{math.degrees(low):.0f} ... {math.degrees(high):.0f} deg: is the unit {unit}, and the zero right?")
         if unit == "deg" and 0.0 < high - low < math.radians(3.0):
             found.append(f"travels {math.degrees(high - low):.2g} deg only: is the unit deg?")
-        ratio = None if channel.rate is None else _ratio(*_moved(channel))
-        if ratio is not None and not 0.8 < ratio < 1.25:
-            found.append(f"moves {ratio:.3g} times what its rate says")
     elif channel.unit == "Pa":
         if max(-low, high) > 0.0 and not _PRESSURES_PA[0] <= max(-low, high) <= _PRESSURES_PA[1]:
             found.append(f"up to {max(-low, high):.3g} Pa: is the unit {unit}?")
+        if below := int(np.sum(channel.value < _VACUUM_PA)):
+            samples = counted(below, "sample")
+            found.append(f"{samples} below a vacuum, down to {1e-5 * low:.3g} bar: a broken wire, or is the offset or zero wrong?")
     elif channel.unit == "degC" and not _AIR_DEGC[0] <= low <= high <= _AIR_DEGC[1]:
         found.append(f"{low:.3g} ... {high:.3g} degC: is the unit {unit}?")
-    return found
+    if channel.name.startswith("rate/") and (beyond := int(np.sum(np.abs(channel.value) >= RATE_LIMIT))):
+        found.append(f"{counted(beyond, 'sample')} beyond {RATE_LIMIT:g} {channel.unit}, which count as missing: is the unit {unit}?")
+    return found + _doubts_of_rate(channel)
+
+
+def _doubts_of_rate(angle: Imported) -> list[str]:
+    """Whether a rate tells of another motion than its angle."""
+    if angle.rate is None:
+        return []
+    turned, by_rate = _moved(angle)
+    ratio, correlation, (low, high) = _ratio(turned, by_rate), _correlation(turned, by_rate), _range(angle.value)
+    if ratio is not None and not 0.8 < ratio < 1.25:
+        return [f"moves {ratio:.3g} times what its rate says"]
+    if correlation is not None and abs(correlation) < _UNRELATED and high - low > _MOVES:
+        return [f"moves otherwise than its rate says (correlation {correlation:.2f}): is it the rate of this angle?"]
+    return []
 
 
 def _ceiling(low: float, high: float) -> float:
@@ -91,7 +111,8 @@ def _moved(channel: Imported) -> tuple[Array, Array]:
     """Angle covered between samples, by the angle and by its rate, where both are known."""
     assert channel.rate is not None
     step, turned = np.diff(channel.time_s), np.diff(channel.value)
-    by_rate = 0.5 * (channel.rate[1:] + channel.rate[:-1]) * step
+    rate = np.where(np.abs(channel.rate) < RATE_LIMIT, channel.rate, np.nan)
+    by_rate = 0.5 * (rate[1:] + rate[:-1]) * step
     known = np.isfinite(by_rate) & (step > 0.0)
     # Sums over about a hundredth of the recording: single steps are mostly the resolution of the sensor.
     edges = np.arange(0, int(known.sum()), max(1, int(known.sum()) // 100))
@@ -102,12 +123,18 @@ def _moved(channel: Imported) -> tuple[Array, Array]:
 
 def _ratio(value: Array, other: Array) -> float | None:
     """How many times ``other`` the ``value`` is, where both surely tell of the same motion."""
-    if value.size < _MIN_SAMPLES or not value.any() or not other.any():
-        return None
-    correlation = float(value @ other / math.sqrt((value @ value) * (other @ other)))
-    if abs(correlation) < _CORRELATED:
+    correlation = _correlation(value, other)
+    if correlation is None or abs(correlation) < _CORRELATED:
         return None
     return math.copysign(math.sqrt((value @ value) / (other @ other)), correlation)
+
+
+def _correlation(value: Array, other: Array) -> float | None:
+    """Without means, as both are zero at rest; nothing where too few tell."""
+    if value.size < _MIN_SAMPLES:
+        return None
+    power = math.sqrt(float(value @ value) * float(other @ other))
+    return float(value @ other) / power if power > 0.0 else 0.0
 
 
 def _refuse_degrees(file: Path, name: str, other: str, ratio: float) -> None:

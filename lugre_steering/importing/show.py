@@ -56,6 +56,7 @@ def _notes(channel: Mapping[str, Any]) -> list[str]:
         ("missing", channel["missing"]),
         ("outside start and stop", channel["outside_start_stop"]),
         ("not increasing in time", channel["not_increasing"]),
+        ("of no use, as their time repeats or runs back", channel["unusable"]),
     )
     notes = [f"{count} {what}" for what, count in counts if count]
     if gaps := channel["gaps_s"]:

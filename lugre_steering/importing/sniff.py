@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections import Counter
 from collections.abc import Sequence
 from itertools import islice
@@ -14,19 +15,13 @@ from lugre_steering.counted import counted
 from lugre_steering.errors import MapFileError
 from lugre_steering.importing.map import WHITESPACE, Csv
 from lugre_steering.importing.stamps import is_stamp, order_of
-from lugre_steering.importing.text import number
+from lugre_steering.importing.text import OPEN_QUOTE, Row, check_text, holds_rows, is_comment, number
 from lugre_steering.importing.words import unit_in
 
 _BYTES = 1 << 20
 _LINES = 400
 _DELIMITERS = (",", ";", "\t", "|", WHITESPACE)
 _COMMENTS = "#%!"
-_NO_TEXT = (
-    (b"\x1f\x8b", "is packed (gzip), expected a table: unpack it"),
-    (b"PK\x03\x04", "is packed, or a spreadsheet, expected a table: unpack it, or save it as CSV"),
-    (b"\x93NUMPY", "is an array without names, expected a table: save it by names, as .npz"),
-)
-"""How files begin that hold a table, but no text."""
 _RUN = 5
 """The data begin at a row of numbers of which most of so many are, itself included."""
 
@@ -34,14 +29,16 @@ _RUN = 5
 def sniff(file: Path) -> tuple[Csv, list[str]]:
     """Options to read the file with, and a reason for each that is not the default."""
     encoding, text = _decoded(file)
-    lines = list(islice(text.splitlines(), _LINES))
+    text = text.rstrip("\0")  # what a recorder leaves that loses power
+    lines = list(islice(io.StringIO(text, newline=""), _LINES))  # as the reader has them
     if "\0" in text or not lines:
         raise MapFileError(f"{file}: holds no text, expected a table")
     marks = Counter(line[0] for line in lines if line[:1] and line[0] in _COMMENTS)
     comment = max(marks, key=marks.__getitem__) if marks else "#"
     ways = [(delimiter, decimal) for decimal in (".", ",") for delimiter in _DELIMITERS]
     delimiter, decimal = max(ways, key=lambda way: _score(lines, comment, *way))
-    rows = [(i, cells) for i, cells in _split(lines, comment, delimiter) if any(cells)]
+    split = _split(lines, comment, delimiter)
+    rows = [(i, cells) for i, cells in split if any(cells)]
     begin = _begin(rows, decimal)
     if begin is None:
         raise MapFileError(f"{file}: no row of numbers among the first {len(lines)} lines, expected a table")
@@ -51,35 +48,65 @@ def sniff(file: Path) -> tuple[Csv, list[str]]:
     while top > 0 and _is_title(rows[top - 1][1], *widths, decimal):
         top -= 1
     header = [cells for _, cells in rows[top:begin]]
-    skip = rows[top][0] - 1 if any(line.strip() and line[0] != comment for line in lines[: rows[top][0] - 1]) else 0
+    for i, cells in split:
+        if not header and i < rows[top][0] and not cells and lines[i - 1].strip():
+            raise MapFileError(f"{file}: line {i}: {OPEN_QUOTE}")
+    above = lines[: rows[top][0] - 1]
+    columns = None if header else _commented(above, comment, delimiter, decimal, widths[0])
+    skip = len(above) if any(line.strip() and line[0] != comment for line in above) else 0
     name_row = 1 + max(range(len(header)), key=lambda i: (not _is_units(header[i]), _count(header[i]), -i), default=0)
     dates, why = order_of(cell for cells in data for cell in cells)
-    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), encoding=encoding, dates=dates)
+    options = Csv(delimiter, decimal, comment, float(skip), float(len(header)), float(name_row), columns, (), encoding, dates)
     return options, _reasons(options, header) + ([why] if why else [])
 
 
 def _decoded(file: Path) -> tuple[str, str]:
     with file.open("rb") as stream:
         raw = stream.read(_BYTES)
-    for begin, what in _NO_TEXT:
-        if raw.startswith(begin):
-            raise MapFileError(f"{file}: {what}")
+    check_text(file)
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16", raw.decode("utf-16", errors="ignore")
     try:
-        return "utf-8", raw.decode("utf-8-sig", errors="strict" if len(raw) < _BYTES else "ignore")
+        with file.open(encoding="utf-8") as text:
+            while text.read(_BYTES):
+                pass
     except UnicodeDecodeError:
         return "latin-1", raw.decode("latin-1")
+    return "utf-8", raw.decode("utf-8-sig", errors="ignore")  # the last letter may be cut
 
 
-def _split(lines: Sequence[str], comment: str, delimiter: str) -> list[tuple[int, list[str]]]:
-    kept = [(i, line) for i, line in enumerate(lines, 1) if not line.startswith(comment)]
+def _split(lines: Sequence[str], comment: str, delimiter: str) -> list[Row]:
+    """Line and cells of each row that is no comment; of one that leaves a quote open no cells."""
     if delimiter == WHITESPACE:
-        return [(i, line.split()) for i, line in kept]
-    try:
-        return [(i, next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])) for i, line in kept]
-    except csv.Error:
-        return []
+        return [(i, line.split()) for i, line in enumerate(lines, 1) if not is_comment(line, comment, delimiter)]
+    rows, begin = list[Row](), 0
+    while begin < len(lines):
+        reader = csv.reader(lines[begin:], delimiter=delimiter, skipinitialspace=True)
+        begin += 1
+        if is_comment(lines[begin - 1], comment, delimiter):
+            continue
+        try:
+            cells = next(reader)
+        except csv.Error:
+            cells = []
+        if holds_rows(cells, delimiter):
+            cells = []
+        rows.append((begin, cells))
+        if cells:
+            begin += reader.line_num - 1
+    return rows
+
+
+def _commented(lines: Sequence[str], comment: str, delimiter: str, decimal: str, width: int) -> tuple[str, ...] | None:
+    """Names in one of the two comments right above the data (the other may hold units), of which the mark itself may be one."""
+    found = []
+    for line in reversed([line for line in lines if is_comment(line, comment, delimiter)][-2:]):
+        for text in (line.lstrip(f"{comment} "), line):
+            cells = [cell.strip() for _, row in _split([text], "", delimiter) for cell in row]
+            if len(set(cells)) == len(cells) == width and all(number(cell, decimal) is None for cell in cells):
+                found.append(tuple(cells))
+                break
+    return next((cells for cells in found if not _is_units(cells)), found[-1] if found else None)
 
 
 def _score(lines: Sequence[str], comment: str, delimiter: str, decimal: str) -> int:
@@ -117,14 +144,22 @@ def _all_numbers(cells: Sequence[str], decimal: str) -> bool:
 
 
 def _begin(rows: Sequence[tuple[int, list[str]]], decimal: str) -> int | None:
-    """Index of the first of several rows of numbers."""
-    for i in range(len(rows)):
+    """Index of the first of several rows of numbers. 'Serial, 12345' is none where rows of numbers begin with a number."""
+    first = [_is_first(cells[0], decimal) for _, cells in rows if _is_data(cells, decimal)]
+    by_number = 2 * sum(first) > len(first)
+    for i, (_, cells) in enumerate(rows):
+        if by_number and not _is_first(cells[0], decimal):
+            continue
         run = [cells for _, cells in rows[i : i + _RUN]]
         widest = max(len(_filled(cells)) for cells in run)
         data = [_is_data(cells, decimal) and (2 * len(_filled(cells)) > widest or _all_numbers(cells, decimal)) for cells in run]
         if data[0] and 2 * sum(data) > len(run):
             return i
     return None
+
+
+def _is_first(cell: str, decimal: str) -> bool:
+    return number(cell, decimal) is not None or is_stamp(cell)
 
 
 def _is_title(cells: Sequence[str], numbers: int, width: int, decimal: str) -> bool:
@@ -151,7 +186,9 @@ def _reasons(options: Csv, header: Sequence[Sequence[str]]) -> list[str]:
         found.append(f"encoding {options.encoding}: the file is not UTF-8")
     if options.skip_rows:
         found.append(f"{counted(int(options.skip_rows), 'line')} above the column names left out")
-    if not header:
+    if options.columns is not None:
+        found.append("the column names stand in a comment")
+    elif not header:
         found.append("the first row holds numbers, so the columns are called c1, c2, ...: name them with csv.columns")
     if len(header) > 1:
         found.append(f"{len(header)} header rows, names in row {options.name_row:.0f} of them")

@@ -10,9 +10,15 @@ from datetime import UTC, datetime
 
 ORDERS = ("dmy", "mdy")
 """What 5/6/2026 may be: the fifth of June, or the sixth of May."""
-_DAY = r"(?:(?P<iso>\d{4}-\d\d-\d\d)|(?P<one>\d{1,2})(?P<sign>[./])(?P<two>\d{1,2})(?P=sign)(?P<year>\d{4}))"
-_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:[.,](?P<fraction>\d{1,9}))?(?:\s*(?P<half>[AP]M))?"
-_ZONE = r"(?:\s*(?P<zone>Z|[-+]\d\d:?\d\d))?"
+FORMS = "2026-11-22 05:30:00.25+01:00, 22.11.2026 05:30:00.25 or 05:30:00.25 (by slashes or dashes with csv.dates)"
+"""For messages."""
+_DAY = (
+    r"(?:(?P<iso>\d{4}(?P<apart>[-/.])\d\d(?P=apart)\d\d)|"
+    r"(?P<one>\d{1,2})(?P<sign>[-/.])(?P<two>\d{1,2})(?P=sign)(?P<year>\d{4}))"
+)
+_FRACTION = r"(?:[.,](?P<fraction>\d{1,9})|:(?P<milliseconds>\d{3}))?"
+_CLOCK = rf"(?P<hour>\d{{1,2}}):(?P<minute>\d\d):(?P<second>\d\d){_FRACTION}(?:\s*(?P<half>[AP]M))?"
+_ZONE = r"(?:\s*(?P<zone>Z|UTC|GMT|[-+]\d\d(?::?\d\d)?))?"
 _STAMP = re.compile(rf"{_DAY}(?:(?:T|,? +){_CLOCK}{_ZONE})?", re.ASCII | re.IGNORECASE)
 _TIME = re.compile(_CLOCK, re.ASCII | re.IGNORECASE)
 
@@ -20,7 +26,7 @@ _TIME = re.compile(_CLOCK, re.ASCII | re.IGNORECASE)
 def stamp(text: str, order: str | None = None) -> float | None:
     """Unix time [s] of a date, UTC unless it says otherwise, or seconds of the day of a time; nothing if it is neither.
 
-    ``order``: of day and month apart by slashes, which tell nothing without it.
+    ``order``: of day and month apart by slashes or dashes, which tell nothing without it.
     """
     if found := _TIME.fullmatch(text):
         return _of_day(found)
@@ -38,8 +44,9 @@ def is_stamp(text: str) -> bool:
 
 
 def order_of(cells: Iterable[str]) -> tuple[str | None, str | None]:
-    """The order of day and month in dates by slashes, and why: what exceeds 12 is a day, and AM and PM are said where months come first."""
-    found = [match for cell in cells if (match := _STAMP.fullmatch(cell.strip())) and match["sign"] == "/"]
+    """The order of day and month in dates by slashes or dashes, and why: what exceeds 12 is a day, and AM and PM are said where
+    months come first."""
+    found = [match for cell in cells if (match := _STAMP.fullmatch(cell.strip())) and match["sign"] in ("/", "-")]
     if not found:
         return None, None
     fitting = [order for order in ORDERS if all(_day(match, order) is not None for match in found)]
@@ -57,7 +64,7 @@ def _day(found: re.Match[str], order: str | None) -> float | None:
         return None
     day, month = (found["one"], found["two"]) if order == "dmy" else (found["two"], found["one"])
     try:
-        date = datetime.fromisoformat(found["iso"] or f"{found['year']}-{month:0>2}-{day:0>2}")
+        date = datetime.fromisoformat(re.sub("[/.]", "-", found["iso"] or "") or f"{found['year']}-{month:0>2}-{day:0>2}")
     except ValueError:
         return None
     return date.replace(tzinfo=UTC).timestamp()
@@ -72,12 +79,12 @@ def _of_day(found: re.Match[str]) -> float | None:
         hour = hour % 12 + (12 if found["half"].upper() == "PM" else 0)
     if hour > 23 or minute > 59 or second > 59:
         return None
-    return 3600.0 * hour + 60.0 * minute + second + float(f"0.{found['fraction'] or 0}")
+    return 3600.0 * hour + 60.0 * minute + second + float(f"0.{found['fraction'] or found['milliseconds'] or 0}")
 
 
 def _offset(zone: str | None) -> float:
     """Seconds by which a zone is ahead of UTC."""
-    if zone is None or zone in "Zz":
+    if zone is None or zone[0] not in "+-":
         return 0.0
-    ahead = 3600.0 * int(zone[1:3]) + 60.0 * int(zone[-2:])
+    ahead = 3600.0 * int(zone[1:3]) + 60.0 * int(zone[3:].lstrip(":") or 0)
     return -ahead if zone[0] == "-" else ahead

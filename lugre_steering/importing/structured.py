@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,22 +34,30 @@ def read_json(file: Path) -> Table:
     if memory > MAX_MEMORY:
         raise MapFileError(f"{file}: would take {memory / 1e9:.1f} GB as JSON, expected at most 1 GB; split it, or write CSV or Parquet")
     try:
-        content = _parsed(raw.decode("utf-8-sig"))
+        content, cut = _parsed(raw.decode("utf-8-sig").rstrip("\0"))
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise MapFileError(f"{file}: is not readable JSON: {reason}") from error
     found = Gathering(file)
     _collect(found, "", content, 0)
-    return found.table()
+    return replace(found.table(), left_out={"records that the end of the file cuts off": cut} if cut else {})
 
 
-def _parsed(text: str) -> Any:
+def _parsed(text: str) -> tuple[Any, int]:
+    """What a file holds, and how many records at its end are cut off, as a recorder does that loses power."""
     try:
-        return json.loads(text)
+        return json.loads(text), 0
     except json.JSONDecodeError as error:
         if not error.msg.startswith("Extra data"):
             raise
-    return [_record(line, row) for line, row in enumerate(text.splitlines(), 1) if row.strip()]
+    *lines, last = re.split(r"\r\n|\r|\n", text)
+    records = [_record(line, row) for line, row in enumerate(lines, 1) if row.strip()]
+    try:
+        return records + ([json.loads(last)] if last.strip() else []), 0
+    except json.JSONDecodeError as error:
+        if not records or error.msg.startswith("Extra data"):
+            raise ValueError(f"line {len(lines) + 1}: {error.msg} at character {error.colno}") from None
+        return records, 1
 
 
 def _record(line: int, row: str) -> Any:
@@ -65,11 +75,14 @@ def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
             _collect(found, _join(name, key), inner, depth + 1)
         found.state(name, value)
     elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
-        _collect_records(found, name, value)
+        collect_records(found, name, value)
     elif isinstance(value, list) and value and all(isinstance(item, list) for item in value):
-        width = len(value[0])
+        titles, width = value[0], len(value[0])
         if any(len(item) != width for item in value):
             found.refuse(name, "lists of different lengths")
+        elif all(isinstance(title, str) and number(title) is None for title in titles) and len(set(titles)) == width > 0:
+            for title, *cells in zip(*value, strict=True):
+                _collect(found, _join(name, title), cells, depth + 1)
         elif (rows := [_numbers(found, name, item) for item in value]) and all(row is not None for row in rows):
             found.add(name, np.array(rows))
     elif isinstance(value, list):
@@ -79,7 +92,7 @@ def _collect(found: Gathering, name: str, value: Any, depth: int) -> None:
         found.add(name, numbers)
 
 
-def _collect_records(found: Gathering, name: str, records: Sequence[Any]) -> None:
+def collect_records(found: Gathering, name: str, records: Sequence[Any]) -> None:
     """One column per key; where a record lacks it, a number is missing."""
     places: dict[str, list[int]] = {}
     values: dict[str, list[Any]] = {}

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -67,7 +68,10 @@ class Table:
             return MapFileError(f"{self.file}: {self.unusable[name]}")
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
         hint = f"did you mean '{near[0]}'?" if near else f"there are: {listed(known)}"
-        return MapFileError(f"{self.file}: no {what} '{name}'; {hint}")
+        if not near and self.unusable:
+            hint += f"; without numbers: {listed(self.unusable)} ({next(iter(self.unusable.values()))})"
+        joined = [other for other in (*self.columns, *self.unusable) if name in re.split(r"\s*[,;|\t]\s*", other)]
+        return MapFileError(f"{self.file}: no {what} '{name}'; {hint}{'; is csv.delimiter right?' if joined else ''}")
 
 
 def listed(names: Mapping[str, Any]) -> str:

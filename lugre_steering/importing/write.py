@@ -52,9 +52,8 @@ def import_table(file: Path, map_file: Path, out: Path, storage: str = "mcap") -
             writer.write([
                 Part(numbers[name], logged[name][part], _messages(channels[name], stamps[name], part)) for name, part in stretch.items()
             ])
-    summaries = [
-        {**channel.summary(), "doubts": doubts(mapping, channel, channels.values())} for channel in channels.values()
-    ]
+    told = [each for channel in channels.values() for each in (channel, channel.own_rate()) if each is not None]
+    summaries = [{**channel.summary(), "doubts": doubts(mapping, channel, channels.values())} for channel in told]
     left_out = dict(table.left_out)
     return {"bag": str(out), "table": str(file), "map": str(map_file), "left_out": left_out, "channels": summaries}
 
