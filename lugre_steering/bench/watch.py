@@ -30,6 +30,7 @@ from lugre_steering.bag.load import read_recording
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.estimator import Estimator
+from lugre_steering.proof.campaign import NOISES
 from lugre_steering.proof.field.hidden import IN_SERVICE as CHANGES
 from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
 from lugre_steering.proof.made import Wanted
@@ -99,8 +100,9 @@ def drawn(bags: Sequence[Scores], hours: float, rng: np.random.Generator) -> Arr
 
 
 def machine_of(seed: int, folder: Path) -> tuple[Setting, Vehicle, list[Scores]]:
-    """One dirty machine, calibrated on its first bag, and its undisturbed manoeuvres."""
-    setting = draw_setting(seed, "dirty", "white")
+    """One dirty machine, with white or coloured noise or ripple of its pressures, calibrated on its first bag, and its undisturbed
+    manoeuvres."""
+    setting = draw_setting(seed, "dirty", NOISES[seed % len(NOISES)])
     bags = simulate(setting, []).write(folder, folder / "unseen")
     vehicle = calibrate([bags[0]], load(folder / "vehicle.yaml")).calibrated
     return setting, vehicle, [found for bag in bags if (found := scores_of(vehicle, bag)).scores.shape[0] >= 10]
