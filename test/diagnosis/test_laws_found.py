@@ -559,10 +559,10 @@ def test_a_bad_law_in_a_catalogue_is_refused_by_key(tmp_path: Path) -> None:
     ("form", "values", "said"),
     [
         ("hinge", {"value": 0.0, "below": 0.0, "above": 1.2e5, "at": 0.5}, "(+1.2e+05 max(theta - 0.5, 0))"),
-        ("step", {"before": 0.0, "after": 30.0, "at": 0.2, "width": 0.01}, "(0 +15 (1 + tanh((theta - 0.2) / 0.01)))"),
+        ("step", {"before": 0.0, "after": 30.0, "at": 0.2, "width": 0.01}, "(+15 (1 + tanh((theta - 0.2) / 0.01)))"),
         ("window", {"outside": 0.0, "inside": 9.0, "start": 0.1, "end": 0.3}, "(9 from theta = 0.1 to 0.3, else 0)"),
         ("bump", {"value": 1.0, "height": 3.0, "at": 0.2, "width": 0.1}, "(+1 +3 exp(-((theta - 0.2) / 0.1)^2 / 2))"),
-        ("exponential", {"start": 4.0, "end": 1.0, "length": 0.1}, "(1 +3 exp(-(theta - -0.6) / 0.1))"),
+        ("exponential", {"start": 4.0, "end": 1.0, "length": 0.1}, "(+1 +3 exp(-(theta - -0.6) / 0.1))"),
     ],
 )
 def test_a_formula_has_its_numbers_and_a_sentence_what_fits_as_well(form: str, values: dict[str, float], said: str) -> None:

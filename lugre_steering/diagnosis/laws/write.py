@@ -204,7 +204,8 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
     if law["memory"] != "none":
         size = f"{law['memory_size']:.3g} {laws.MEMORIES[law['memory']] or laws.COORDINATES[law['coordinate']]}"
         return f"f({place}; {law['memory']} of {size})"
-    level = f"{v['value']:+.4g} " if v.get("value") else ""
+    begin = {"step": "before", "exponential": "end"}.get(form, "value")
+    level = f"{v[begin]:+.4g} " if v.get(begin) else ""
     if form == "linear":
         return f"({level}{v['slope']:+.4g} {place})"
     if form == "power":
@@ -217,13 +218,13 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
         arms = [f"{v[side]:+.4g} {least}({away}, 0)" for side, least in (("below", "min"), ("above", "max")) if v[side]]
         return f"({level}{' '.join(arms)})"
     if form == "step":
-        return f"({v['before']:.4g} {0.5 * (v['after'] - v['before']):+.4g} (1 + tanh(({place} - {v['at']:.4g}) / {v['width']:.4g})))"
+        return f"({level}{0.5 * (v['after'] - v['before']):+.4g} (1 + tanh(({place} - {v['at']:.4g}) / {v['width']:.4g})))"
     if form == "window":
         return f"({v['inside']:.4g} from {place} = {v['start']:.4g} to {v['end']:.4g}, else {v['outside']:.4g})"
     if form == "bump":
         return f"({level}{v['height']:+.4g} exp(-(({place} - {v['at']:.4g}) / {v['width']:.4g})^2 / 2))"
     if form == "exponential":
-        return f"({v['end']:.4g} {v['start'] - v['end']:+.4g} exp(-({place} - {law['range'][0]:.4g}) / {v['length']:.4g}))"
+        return f"({level}{v['start'] - v['end']:+.4g} exp(-({place} - {law['range'][0]:.4g}) / {v['length']:.4g}))"
     return f"f({place})"
 
 
