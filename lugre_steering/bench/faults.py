@@ -137,6 +137,11 @@ def _stamp(change: Callable[[int], int]) -> Callable[[int, Sample], Sample]:
     return lambda _, sample: sample._replace(stamp_ns=change(sample.stamp_ns))
 
 
+def _strays(ahead_ns: int) -> Callable[[int, Sample], Sample]:
+    """One stamp of twenty is so far ahead."""
+    return lambda tick, sample: sample._replace(stamp_ns=sample.stamp_ns + (ahead_ns if tick % 20 == 0 else 0))
+
+
 def _spike(samples: int, height: float = 1.0) -> Callable[[int, Sample], Sample]:
     return lambda tick, sample: sample._replace(value=sample.value + (height if tick % 20 < samples else 0.0))
 
@@ -205,6 +210,7 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
         "everything dropped": (_of(vehicle, (*angle, *pressure, *air), _silent), stale),
         "everything 0.5 s late": (_of(vehicle, (*angle, *pressure), _late(50)), ("stamps are not close", *stale)),
         "stamps 0.5 s behind": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns - SECOND // 2)), ("not close", "backward")),
+        "stray stamps 1.9 s ahead": (_of(vehicle, (*angle, *pressure), _strays(19 * SECOND // 10)), ("time_jump",)),
         "everything twice": (_of(vehicle, (*angle, *pressure), lambda _, sample: [sample, sample]), ("duplicate",)),
         "everything in wrong order": (_of(vehicle, (*angle, *pressure), _swapped()), ("backward",)),
         "ten messages at once": (_of(vehicle, (*angle, *pressure), _gathered(10)), NOTHING),
