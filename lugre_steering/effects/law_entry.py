@@ -89,7 +89,7 @@ def named(identity: str, title: str, source: str, entry: LawEntry) -> Effect:
     return laws.law_effect(
         identity, title, constants, stage=STAGE_OF.get(entry.channel, "measurement"), source=source, trace=entry.title or title,
         equation=f"{entry.channel} x {entry.form} of {entry.coordinate}", coordinate=TOLD_BY.get(entry.coordinate, "time"),
-        counts_from_start=entry.coordinate in ("time", "slip", "work"), needs=("rubber",) if entry.coordinate in THERMAL else (),
+        counts_from_start=entry.coordinate in ("time", "slip", "work", "passes"), needs=("rubber",) if entry.coordinate in THERMAL else (),
     )  # fmt: skip
 
 

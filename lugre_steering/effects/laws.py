@@ -33,10 +33,10 @@ inertia is what moves by a crank or a linkage: of the angle alone."""
 COORDINATES = {
     "none": "1", "angle": "rad", "abs_angle": "rad", "rate": "rad/s", "abs_rate": "rad/s", "direction": "1", "since_reversal": "rad",
     "torque": "N m", "abs_torque": "N m", "power": "W", "time": "s", "slip": "rad", "work": "J", "dwell": "s",
-    "rubber_temperature": "degC", "air_temperature": "degC", "opposing_torque": "N m",
+    "rubber_temperature": "degC", "air_temperature": "degC", "opposing_torque": "N m", "passes": "1",
 }  # fmt: skip
 """What f may depend on, with its unit; angle, slip and work are those of one track. The opposing torque is that against the motion,
-less than zero where it drives."""
+less than zero where it drives. Passes: how often this very place has been rubbed, half of the passage that is going on counted."""
 MEMORIES = {"none": "", "lag": "s", "play": "", "relay": "", "ring": "s"}
 """What stands between the coordinate and f: nothing, a first-order lag of so many seconds, a play or a relay of a half width in
 the unit of the coordinate; or how far beyond the coordinate a lightly damped mode of a period of so many seconds swings, excited by it."""
@@ -44,6 +44,8 @@ RINGS = ("conservative_torque", "torque")
 """Channel and coordinate of what rings."""
 RING_DAMPING = 0.03
 """Damping ratio of a mode that rings."""
+PLACE_RAD, PLACES = 0.02, 64
+"""Width of a place that passes are counted of, a third of a usual breakaway angle, and how many there are: the first follows the last."""
 CELL = ("channel", "coordinate", "memory", "memory_size", "low", "per_unit", "seen_low", "seen_high")
 LEAST_STIFFENING = -0.9
 
@@ -51,6 +53,7 @@ LINKED = ("linked_inertia", "angle")
 """Channel and coordinate of a linked inertia."""
 _LEVEL, _STIFFNESS, _TORQUE, _COULOMB, _LOAD, _VISCOUS, _TURBULENT, _GAIN, _INERTIA, _LAG, _LINKED = (float(i + 1) for i in range(11))
 _RING = float(list(MEMORIES).index("ring"))
+_PASSES = float(list(COORDINATES).index("passes"))
 
 
 @law
@@ -73,6 +76,19 @@ def coordinate(which, theta, omega, direction, since, torque, slip, work, dwell,
     if which < 16.0:
         return temperature if which == 14.0 else air
     return torque * direction
+
+
+@law
+def passed(places, theta, way, angle_unit):
+    """How often the place at an angle has been passed, in its widths of the ``way`` to here, which the two nearest of ``places`` share."""
+    at = theta / (PLACE_RAD * angle_unit)
+    share = at - math.floor(at)
+    here = math.floor(at) % PLACES
+    following = (here + 1) % PLACES
+    passage = way / (PLACE_RAD * angle_unit)
+    places[here] += (1.0 - share) * passage
+    places[following] += share * passage
+    return (1.0 - share) * places[here] + share * places[following]
 
 
 @law
@@ -117,8 +133,8 @@ def looked_up(f, position):
 
 @law
 def tangent(
-    cell, f, size, value, kept, speed, before, since, slip, work, outside, theta, omega, direction, d_theta, dwell, time, temperature,
-    air_temperature, last_torque, dt,
+    cell, f, size, value, kept, speed, before, since, slip, work, outside, places, theta, omega, direction, d_theta, resting, dwell, time,
+    temperature, air_temperature, last_torque, dt, angle_unit,
 ):  # fmt: skip
     """Memories and the value of f at this step; and what it adds to the stiffness, if that is its channel."""
     moved = abs(d_theta)
@@ -126,7 +142,10 @@ def tangent(
     work += abs(last_torque) * moved
     heading = direction if d_theta == 0.0 else math.copysign(1.0, d_theta)
     since = since + moved if heading == direction else moved
-    now = coordinate(cell[1], theta, omega, heading, since, last_torque, slip, work, dwell, time, temperature, air_temperature)
+    if cell[1] == _PASSES:
+        now = passed(places, theta, 0.0 if resting else moved, angle_unit)  # the noise of an angle at rest rubs nothing
+    else:
+        now = coordinate(cell[1], theta, omega, heading, since, last_torque, slip, work, dwell, time, temperature, air_temperature)
     if cell[2] == _RING:
         now -= value  # what it adds itself does not excite it: its period is that at which the torque rings
         if before != 0.0:  # what is there at the start has always been there
@@ -181,7 +200,9 @@ def limit(cell, value, torque, last_torque, dt):
 
 
 _HOOKS: dict[str, Callable[..., object]] = {"tangent": tangent, "level": level, "torque": torque, "loss": loss, "limit": limit}
-_MEMORY = dict.fromkeys(("value", "kept", "speed", "before", "since", "slip", "work", "outside"), 0.0)
+_MEMORY: Mapping[str, float | str | tuple[float, ...]] = {
+    **dict.fromkeys(("value", "kept", "speed", "before", "since", "slip", "work", "outside"), 0.0), "places": (0.0,) * PLACES,
+}  # fmt: skip
 _SIZE = Parameter("size", "1", "of the law as it was found", 1.0, 0.0, 10.0)
 Form = Callable[..., Array]
 

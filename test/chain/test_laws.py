@@ -170,6 +170,29 @@ def test_every_coordinate_drives_a_law() -> None:
         assert np.abs(with_it).max() > 0.1, name
 
 
+def test_passes_are_how_often_the_track_has_turned_over_a_place() -> None:
+    """As often as the angle was crossed before, and half of the passage that goes on; not told near where a stroke begins or ends, where a
+    place is rubbed in part. Two places share a passage within 0.05, and a step is at most a seventh of a place."""
+    entry = LawEntry("conservative_torque", "passes", "linear", (0.0, 20.0), {"value": 0.0, "slope": 1.0})
+    counted = with_law(entry) - with_law()
+    crossed = [np.count_nonzero((THETA[1:k] - at) * (THETA[: k - 1] - at) < 0.0) for k, at in enumerate(THETA) if k > 0]
+    ends = THETA[np.flatnonzero(np.diff(np.sign(OMEGA)) != 0.0)]
+    clear = np.abs(THETA[1:, None] - ends).min(axis=1) > 2.0 * laws.PLACE_RAD
+    assert set(np.asarray(crossed)[clear]) >= {0, 1, 2, 3}
+    assert counted[1:][clear] == pytest.approx(np.asarray(crossed)[clear] + 0.5, abs=0.05 + 0.5 / 7.0)
+
+
+def test_what_trembles_at_rest_passes_no_place() -> None:
+    entry = LawEntry("conservative_torque", "passes", "linear", (0.0, 20.0), {"value": 0.0, "slope": 1.0})
+    trembling = 1e-4 * np.random.default_rng(3).standard_normal(TIME.size)
+    still = np.zeros(TIME.size)
+    torques = []
+    for laws_of in ((entry,), ()):
+        model = build_model(vehicle().replace(laws=laws_of), lean=True)
+        torques.append(torque_side(model.parameters[0], model.rubber, TIME, trembling, still, still))
+    assert np.all(torques[0] == torques[1])
+
+
 def test_two_laws_add_up_and_all_share_one_compiled_code() -> None:
     one = constant("viscous_loss", 3e3)
     other = LawEntry("conservative_torque", "angle", "linear", (-1.0, 1.0), {"value": 5.0, "slope": 40.0})

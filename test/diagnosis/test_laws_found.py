@@ -108,6 +108,28 @@ def fading() -> Array:
     return by_run(lambda run: 200.0 * np.exp(-(run.time - run.time[0]) / 12.0))
 
 
+def polished() -> Array:
+    """Friction that falls where the very same place is rubbed again, by a third of what is left each time."""
+
+    def crossed(angle: Array) -> Array:
+        return np.array([np.count_nonzero((angle[1:k] - at) * (angle[: max(k - 1, 0)] - at) < 0.0) for k, at in enumerate(angle)])
+
+    def lost(angle: Array, rate: Array) -> Array:
+        return np.asarray(-400.0 * (1.0 - np.exp(-crossed(angle) / 3.0)) * np.tanh(rate / 2e-3))
+
+    return by_run(lambda run: sum(lost(*track) for track in zip(run.theta, run.omega, strict=True)))
+
+
+def test_a_place_that_is_polished_by_each_passage_is_told_from_wear_with_time_or_slip() -> None:
+    _, found = searched(polished())
+    assert found is not None
+    (law,) = entries(found)
+    assert (law.channel, law.coordinate, law.form) == ("coulomb_friction", "passes", "exponential")
+    assert law.values["length"] == pytest.approx(3.0, rel=0.2)  # places are of a width, at their ends rubbed in part
+    assert law.values["start"] - law.values["end"] == pytest.approx(400.0, rel=0.2)
+    assert not found.ties
+
+
 def test_a_closed_form_is_fitted_as_the_vehicle_file_runs_it() -> None:
     """Also where the vehicle goes beyond the range that the law was seen on: there a straight line goes on."""
     cell = Cell("conservative_torque", Axis("angle"), -0.05, 0.05)

@@ -38,7 +38,7 @@ LOOP = 0.3
 """Share of a change of the torque that a law may add to it in the mean: elsewhere it is more, and from one on nothing settles."""
 FED_BACK = ("torque", "abs_torque", "power", "opposing_torque")
 """Coordinates that a law's own torque changes."""
-ONCE = ("time", "slip", "work", "air_temperature")
+ONCE = ("time", "slip", "work", "passes", "air_temperature")
 """Coordinates that only go on: what lies along them happened once, so that of two laws that tie the other one is likelier to hold again."""
 
 

@@ -41,6 +41,7 @@ COORDINATE_WORDS = {
     "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "absolute torque",
     "power": "power", "time": "time", "slip": "accumulated slip", "work": "accumulated work", "dwell": "dwell",
     "rubber_temperature": "rubber temperature", "air_temperature": "air temperature", "opposing_torque": "torque against the motion",
+    "passes": "passages of the same place",
 }  # fmt: skip
 
 
