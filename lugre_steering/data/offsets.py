@@ -35,6 +35,8 @@ LAG_S = (0.1, 0.2, 0.3, 0.5)
 """Stiffness factors, backlash (in presliding lengths) and lags that may explain a late torque in place of a clock."""
 DRIFT_SHARE = 0.02
 """Share of the sensor range; smaller drifts are left to the catalogue effect pressure_drift alone."""
+APART = 0.5
+"""Share of the deviation of the times that must be left beside the rates: where they mostly rise or fall, a drift is not told from them."""
 
 
 @dataclass(frozen=True)
@@ -141,12 +143,17 @@ def _lowest(values: Array) -> float:
 
 
 def zero_drifts(vehicle: Vehicle, runs: Sequence[Run]) -> Iterator[Finding]:
-    """Lines whose level drifts over the runs, one after the other, while the other side of their cylinders does the work."""
+    """Lines whose level drifts over the runs, one after the other, while the other side of their cylinders does the work.
+
+    Oil that returns is under pressure that rises with the rate: what follows the rate is no zero, so it is taken out of level and time
+    alike (Frisch and Waugh 1933).
+    """
     if vehicle.hydraulics is None or not runs:
         return
     model = build_model(vehicle)
     expected = np.concatenate([nominal_torques(model, run).sum(axis=0) for run in runs])
     time, valid = (np.concatenate([getattr(run, name) for run in runs]) for name in ("time", "valid"))
+    rate = np.concatenate([np.abs(run.omega).mean(axis=0) for run in runs])
     pressures, gains = (np.concatenate([getattr(run, name) for run in runs], axis=1) for name in ("pressure", "torque_per_line"))
     limit = max(DRIFT_SHARE * vehicle.sensors.pressure_range_Pa, 10.0 * vehicle.sensors.pressure_noise_Pa)
     idle = np.abs(expected) > 0.2 * np.abs(expected).max()
@@ -155,9 +162,15 @@ def zero_drifts(vehicle: Vehicle, runs: Sequence[Run]) -> Iterator[Finding]:
         at = np.flatnonzero(idle & valid & (gain * expected < 0.0))
         if at.size < 100 or time[at[-1]] - time[at[0]] < 0.5 * duration:
             continue
-        parts = np.array_split(at, 20)
-        level = np.array([np.median(pressure[part]) for part in parts])
-        slope, _, low, high = theilslopes(level, [time[part].mean() for part in parts])
+        flow = np.column_stack([np.ones(at.size), rate[at], rate[at] ** 2]) / [1.0, rate.max(), rate.max() ** 2]
+        seen = np.column_stack([pressure[at], time[at]])
+        own = seen - flow @ np.linalg.lstsq(flow, seen, rcond=1e-10)[0]
+        parts = np.array_split(np.arange(at.size), 20)
+        level = np.array([np.median(own[part, 0]) for part in parts])
+        when, at_all = (np.array([times[part].mean() for part in parts]) for times in (own[:, 1], seen[:, 1]))
+        if np.std(when) < APART * np.std(at_all):
+            continue
+        slope, _, low, high = theilslopes(level, when)
         if abs(slope) * duration > limit and low * high > 0.0 and high - low < abs(slope):
             yield Finding(
                 "zero_drift", topic,

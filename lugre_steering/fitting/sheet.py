@@ -188,6 +188,8 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
         found = [*taking, *(tried for tried in found if tried not in taking)]
         best = found[0].suspect
     rest = (best.cost - floor) / max(baseline.cost - floor, 1e-30)
+    # An entry with which the rest of the sheet is as much of a surprise as before is not what is wrong, however little it leaves.
+    found.sort(key=lambda tried: (tried.stuck, tried.surprise > RELIEVED * surprise))
     return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), stuck=bool(stuck), rest=rest)
 
 

@@ -292,6 +292,28 @@ def test_a_large_drift_of_a_zero(sound: Recording) -> None:
     assert bar == pytest.approx(6e3 * float(sound.angle["left"].time_s[-1]) / 1e5, rel=0.15)
 
 
+def returning(recording: Recording) -> Recording:
+    """All lines under the pressure of the oil that returns, which rises with the square of the rate: 8 bar at 9 deg/s."""
+    left = recording.angle["left"]
+    rate = np.convolve(np.gradient(left.value, left.time_s), np.full(25, 0.04), mode="same")
+    back = 8e5 * (rate / math.radians(9.0)) ** 2
+    lines = {name: Signal(s.time_s, s.value + np.interp(s.time_s, left.time_s, back)) for name, s in recording.pressure.items()}
+    return replace(recording, pressure=lines)
+
+
+def test_the_pressure_of_returning_oil_is_no_drift_of_a_zero() -> None:
+    rates = (9.0, 9.0, 9.0, 6.0, 6.0, 4.0)
+    slower = Manoeuvre("slower", "", (Hold(2.0), *(Sweep(28.0 * (-1.0) ** i, rate, 2.0) for i, rate in enumerate(rates))))
+    made = simulate(VEHICLE, motion_of(slower, VEHICLE), sensing_of(VEHICLE))
+    signals = {channel.name: signal for channel, signal in made.signals.items()}
+    sides = {side: signals[side] for side in ("left", "right")}
+    returned = returning(Recording("slower", 0, sides, {line: signals[line] for line in LINES}))
+    assert "zero_drift" not in {finding.finding for finding in inspect(returned, VEHICLE).findings}
+    # A zero that does drift beside it still shows.
+    drifting = pressure(lambda s: Signal(s.time_s, s.value + 25e3 * s.time_s), "aux_a")(returned)
+    assert [f.topic for f in inspect(drifting, VEHICLE).findings if f.finding == "zero_drift"] == [PRESSURE["aux_a"]]
+
+
 BLOCKING: dict[str, tuple[str, str, Fault, str]] = {
     "left sign": ("sign_flipped", LEFT, angle("left", scaled(-1.0)), ""),
     "right sign": ("sign_flipped", RIGHT, angle("right", scaled(-1.0)), ""),

@@ -293,6 +293,21 @@ def test_a_wrong_level_is_told_beside_friction_of_another_form(slower: Problem, 
         assert not told.certain
 
 
+def test_an_entry_beside_which_the_sheet_stays_a_surprise_is_no_first_suspect(slower: Problem) -> None:
+    """Friction and kingpin arm are off, beside friction of another form: with less sticking a little less is left, but the level is as far
+    off as before."""
+    bare = Problem(slower.vehicle.replace(hydraulics=None), slower.runs, slower.calibrations)
+    levels = [entries.LEVEL, entries.CONSERVATIVE]
+    freed = bare.of_sheet(calibrations=[*levels, *(own for own in bare.calibrations if own.name != entries.LEVEL.name)])
+    along = np.concatenate([run.theta.mean(axis=0) for run in bare.runs])
+    uneven = freed.predict_all(np.concatenate([[0.55, 0.1], freed.start()[2:]])) * (1.0 + 0.02 * np.sin(60.0 * along))
+    told = sheet.wrong_sheet(with_torque(bare, uneven))
+    assert told is not None
+    keys = [suspect.key for suspect in told.suspects]
+    assert {"axle.load_N", "friction.coulomb"} < set(keys[:3])
+    assert not {"friction.static", "axle.kingpin_lever_arm_m"} & set(keys[:3])
+
+
 def test_bends_are_as_large_as_the_data_ask_for(slower: Problem) -> None:
     """None where the torque is the model's; as large as real rubber shows where it is bent by that."""
     shapes = np.random.default_rng(6).standard_normal((slower.measured.size, 4)) * 20.0 * SIGMA
