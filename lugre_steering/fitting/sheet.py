@@ -69,7 +69,8 @@ OFF, SEVERAL = 0.03, 1.1
 """Relative error from which an entry is wrong, and what several wrong entries must be worth against one."""
 TIED = 1.1
 """Cost over the lowest up to which a hypothesis is as good."""
-SHOWN = 5
+SHOWN, TOLD = 5, 3
+"""Most suspects of a result, and those told in words; with these all that are as good as the last of them."""
 SAME_SIZE = 0.1
 """Share by which torques differ that are told to be of one size."""
 LEVELS = ("friction_level", "stiffness")
@@ -126,7 +127,8 @@ class WrongSheet:
 
     @property
     def statement(self) -> str:
-        check = ", ".join(suspect.words for suspect in self.suspects[:3])
+        told = [one for i, one in enumerate(self.suspects) if i < TOLD or one.cost <= TIED * self.suspects[TOLD - 1].cost]
+        check = ", ".join(suspect.words for suspect in told)
         return f"{self._said}; check {check}"
 
     @property
@@ -189,8 +191,10 @@ def wrong_sheet(problem: Problem) -> WrongSheet | None:
         best = found[0].suspect
     rest = (best.cost - floor) / max(baseline.cost - floor, 1e-30)
     # An entry with which the rest of the sheet is as much of a surprise as before is not what is wrong, however little it leaves.
-    found.sort(key=lambda tried: (tried.stuck, tried.surprise > RELIEVED * surprise))
-    return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in found[:SHOWN]), stuck=bool(stuck), rest=rest)
+    relieving = [tried for tried in found if not tried.stuck and tried.surprise <= RELIEVED * surprise]
+    others = sorted((tried for tried in found if tried not in relieving), key=lambda tried: tried.stuck)
+    shown = [*relieving, *others][: min(SHOWN, max(TOLD, len(relieving)))]
+    return WrongSheet(_ratio(thin), tuple(tried.suspect for tried in shown), stuck=bool(stuck), rest=rest)
 
 
 def _takes_surprise(tried: _Tried, cost: float, surprise: float) -> bool:

@@ -286,6 +286,13 @@ def test_physics_that_leaves_less_than_a_suspected_entry_is_named_instead() -> N
     assert not physics_instead(mistyped, named, suspected(1e9, stuck=True))
 
 
+def test_entries_that_are_as_good_as_the_third_are_told_beside_it() -> None:
+    costs = {"axle.load_N": 100.0, "friction.coulomb": 101.0, "knuckle_m": 102.0, "bore_m": 110.0, "rod_m": 113.0}
+    told = WrongSheet(1.8, tuple(Suspect(key, 0.8, 0.06, cost) for key, cost in costs.items())).statement
+    assert [key in told for key in costs] == [True, True, True, True, False]
+    assert "rod_m" not in WrongSheet(1.8, (Suspect("axle.load_N", 0.8, 0.06, 100.0),)).statement
+
+
 def test_friction_of_another_form_is_no_wrong_sheet() -> None:
     """A presliding twice as soft takes the stiffness far off its sheet, unless the form of the friction law is free to be what does it."""
     assert VEHICLE.friction is not None

@@ -592,6 +592,19 @@ def test_names_stand_for_freedoms_beside_which_they_are_short(
         assert found[0].typical < hidden.typical
 
 
+@pytest.mark.parametrize("grows", [0.0, 2.0])
+def test_of_names_for_freedoms_none_may_have_acted_before_it_shows(slower: Problem, grows: float) -> None:
+    """A softening that is over within the shortest way is nothing but another stiffness; that a part of a law which need not be there is
+    none says nothing against the law."""
+    shortest = effect("mullins_softening", amplitude=0.8, width=0.001)
+    stop = effect("soil_shear", torque=900.0, span=0.1, growth=grows)
+    weights = np.where(split.split(slower).fit, weight(slower), 0.0)
+    both = slower.predict_all(slower.start(), [shortest, stop])
+    found = fit(with_torque(slower, both), weights, [shortest, stop])
+    refused = [search._acts_before_it_shows(slower, weights, split.split(slower), found, i) for i in (0, 1)]
+    assert refused == [True, False]
+
+
 @pytest.mark.parametrize("settles", [False, True])
 def test_names_are_doubted_by_what_they_took_as_far_as_their_laws_bend(problem: Problem, settles: bool) -> None:
     """A twenty-fifth of it; more of those that settle with time, bent or not; of what every joint has a hundredth of all that it does."""

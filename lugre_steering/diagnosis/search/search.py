@@ -388,7 +388,15 @@ def _in_place(
     for index in range(len(found)):
         if _spared(exact, now, weight, current, range(len(found)), index)[1].cost - current.cost < least:
             return None
+        if _acts_before_it_shows(now, weight, split, current, index):
+            return None
     return exact, _settled_in(exact, weight, (), free.x), best
+
+
+def _acts_before_it_shows(problem: Problem, weight: Array, split: Split, current: Fit, index: int) -> bool:
+    """Whether the law of a name may have acted before any recording shows it: beside others it is a part of the friction's own form."""
+    candidate, _ = current.effects[index]
+    return any(not candidate.parameter(key).optional for key in idle(problem, weight, split, current, index))
 
 
 def _settled_in(problem: Problem, weight: Array, effects: Effects, x: Array) -> Fit:

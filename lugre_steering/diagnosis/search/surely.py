@@ -77,11 +77,11 @@ def least_sure_name(problem: Problem, weight: Array, roles: Split, fitted: Fit, 
     return least if names > 1 and sizes[least] < SURE_OF_SIZE else None
 
 
-def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> bool:
-    """Whether a shape of one effect stands at its bound and may as well be zero: at so short a slip or time a law has acted before any
+def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> list[str]:
+    """Shapes of one effect that stand at their bound and may as well be zero: at so short a slip or time a law has acted before any
     recording shows it, and is another level of what is there."""
     candidate, values = fitted.effects[index]
-    form = moved_by_form(problem, weight, fitted, index)
+    form, found = moved_by_form(problem, weight, fitted, index), list[str]()
     for key, known in zip(candidate.free, deviations(problem, weight, roles, fitted)[_columns(problem, fitted, index)], strict=True):
         parameter = candidate.parameter(key)
         if key in candidate.effect.amplitudes or parameter.low < 0.0 < parameter.high:
@@ -90,5 +90,5 @@ def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int)
         low, high = sorted((parameter.scaled(parameter.low), parameter.scaled(parameter.high)))
         at_bound = not low + END * (high - low) < at < high - END * (high - low)
         if at_bound and abs(values[key]) < float(np.hypot(NORMAL * known, form[key])):
-            return True
-    return False
+            found.append(key)
+    return found
