@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import zipfile
 from pathlib import Path
@@ -60,7 +61,7 @@ def test_the_watch_learns_tells_once_and_knows_since_when() -> None:
     watch, rng, alarms = Watch(VEHICLE), np.random.default_rng(3), []
     for i in range(40_000):
         t = 0.05 * i
-        watch.turned(0.3 * math.sin(0.9 * t))
+        watch.turned([0.3 * math.sin(0.9 * t)])
         if watch.add(T0 + round(t * 1e9), (2000.0 if t > 1500.0 else 400.0) * float(rng.standard_normal())):
             alarms.append(t)
             since_s = (watch.since_ns - T0) * 1e-9
@@ -74,7 +75,7 @@ def test_a_change_that_lasts_is_not_what_is_usual_and_is_over_when_it_is_mended(
     unlike = []
     for i in range(50_000):
         t = 0.15 * i
-        watch.turned(0.3 * math.sin(0.9 * t))
+        watch.turned([0.3 * math.sin(0.9 * t)])
         watch.add(T0 + round(t * 1e9), (2000.0 if 1000.0 < t < 6900.0 else 400.0) * float(rng.standard_normal()))
         unlike.append(watch.since_ns != 0)
     told = 0.15 * np.flatnonzero(unlike)
@@ -83,10 +84,63 @@ def test_a_change_that_lasts_is_not_what_is_usual_and_is_over_when_it_is_mended(
     assert told.max() == pytest.approx(7000.0, abs=100.0)
 
 
+def watched(watch: Watch, begin: int, end: int, changed_s: float) -> list[tuple[float, int]]:
+    """Residuals of noise, larger from ``changed_s`` on, from one sample to another; when alarms began, and since when they say."""
+    alarms = []
+    for i in range(begin, end):
+        t = 0.15 * i
+        watch.turned([0.3 * math.sin(0.9 * t)])
+        noise = float(np.random.default_rng(i).standard_normal())
+        if watch.add(T0 + round(t * 1e9), (2000.0 if t > changed_s else 400.0) * noise):
+            alarms.append((t, watch.since_ns))
+    return alarms
+
+
+def test_what_the_watch_has_learned_and_found_survives_a_restart() -> None:
+    """One that is restarted before the change finds it as soon as one that is not; one restarted while it lasts knows since when it does."""
+    whole, first = Watch(VEHICLE), Watch(VEHICLE)
+    expected = watched(whole, 0, 9000, 900.0)
+    assert len(expected) == 1
+    assert not watched(first, 0, 5900, 900.0)
+    resumed = Watch(VEHICLE)
+    resumed.resume(json.loads(json.dumps(first.memory)))
+    assert resumed.learned == first.learned > 60
+    ((told_s, since_ns),) = watched(resumed, 5900, 9000, 900.0)
+    assert told_s == pytest.approx(expected[0][0], abs=10.0)  # a manoeuvre that is under way is lost
+    assert since_ns == pytest.approx(expected[0][1], abs=10_000_000_000)
+    again = Watch(VEHICLE)
+    again.resume(resumed.memory)
+    assert again.since_ns == since_ns
+    assert not watched(again, 9000, 9300, 900.0)  # which has been told
+    assert again.learned == resumed.learned
+    assert not watched(Watch(VEHICLE), 6100, 9000, 900.0)  # without, what is wrong is what is usual
+
+
+@pytest.mark.parametrize("spoil", ["another form", "cut", "no text", "nothing"])
+def test_what_another_version_of_the_watch_has_learned_is_refused(spoil: str) -> None:
+    memory = dict(Watch(VEHICLE).memory)
+    changed = {"another form": ("form", "[]"), "cut": ("record", memory["record"][:400]), "no text": ("record", "?")}
+    memory = memory | dict([changed[spoil]]) if spoil in changed else {}
+    watch = Watch(VEHICLE)
+    with pytest.raises(DataError, match="the watch had learned"):
+        watch.resume(memory)
+    assert watch.memory == Watch(VEHICLE).memory
+
+
+def test_the_vehicle_steers_by_the_mean_of_its_sides() -> None:
+    """Two sides that turn against each other go nowhere; one alone is all there is."""
+    for angles, goes in (((0.3, -0.3), False), ((0.3, 0.1), True), ((0.3,), True)):
+        watch = Watch(VEHICLE)
+        for i in range(400):
+            watch.turned([angle * math.sin(0.1 * i) for angle in angles])
+            watch.add(T0 + i, 400.0)
+        assert bool(watch.scores) == goes
+
+
 def test_a_standing_vehicle_is_not_judged() -> None:
     watch, rng = Watch(VEHICLE), np.random.default_rng(4)
     for i in range(20_000):
-        watch.turned(1e-4 * float(rng.standard_normal()))
+        watch.turned([1e-4 * float(rng.standard_normal())])
         assert not watch.add(T0 + i, 1e5 * i)
     assert watch.scores == []
 

@@ -58,10 +58,10 @@ def scores_of(vehicle: Vehicle, bag: Path) -> Scores:
     samples = in_stamp_order(recording, vehicle.channels)
     estimates, residuals = Estimator(vehicle).push_block(*samples)
     watch, found, at = Watch(vehicle, math.inf), [], 0
-    angles = estimates["theta"][:, : len(vehicle.sides)].mean(axis=1)
+    angles = estimates["theta"][:, : len(vehicle.sides)].tolist()
     for row in residuals:
         while at < estimates.size and estimates["stamp_ns"][at] <= row["stamp_ns"]:
-            watch.turned(float(angles[at]))
+            watch.turned(angles[at])
             at += 1
         watch.scores = []
         watch.add(int(row["stamp_ns"]), float(row["residual"]))

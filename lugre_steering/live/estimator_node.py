@@ -18,9 +18,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
+from lugre_steering.counted import counted
 from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
-from lugre_steering.estimator.state_file import Ownership, read_state, write_state
+from lugre_steering.estimator.state_file import Ownership, read_learned, read_state, write_state
 from lugre_steering.live.console import Console
 from lugre_steering.live.later import Later, Work
 from lugre_steering.live.parameters import changed, check_files, declare, undeclared
@@ -329,6 +330,7 @@ class SteeringTorqueEstimator(LifecycleNode):
     def _restore(self, session: Session) -> None:
         file = self.settings.state_file
         if file is None:
+            self.get_logger().info("temperatures, bristles and what the watch learns are lost at the end: name a 'state_file' to keep them")
             return
         # The node in whose place this one comes may still be leaving.
         session.health.state_trouble = self._ownership.take(file, LEAVE_S + 1.0)
@@ -337,10 +339,21 @@ class SteeringTorqueEstimator(LifecycleNode):
             return
         if not file.exists():
             return
+        self._remember_usual(session, file)
         if session.simulated:  # its clock comes as a topic, not before the first samples
             session.before_first = lambda stamp_ns: self._resume(session, file, stamp_ns)
         else:
             self._resume(session, file, time.time_ns())
+
+    def _remember_usual(self, session: Session, file: Path) -> None:
+        """What the watch has learned is as true after a year."""
+        try:
+            learned = read_learned(file, session.vehicle)
+            if learned is not None:
+                session.watch.resume(learned)
+                self.get_logger().info(f"{file}: the watch goes on from {counted(session.watch.learned, 'manoeuvre')}")
+        except DataError as error:
+            self.get_logger().warning(f"the watch learns anew: {error}")
 
     def _resume(self, session: Session, file: Path, now_ns: int) -> None:
         try:
@@ -365,19 +378,19 @@ class SteeringTorqueEstimator(LifecycleNode):
         """What writes the present state, if there is to be a file and anything to keep; a failure is told, not raised."""
         self._saved_ns = time.monotonic_ns()
         file, session = self.settings.state_file, self.session
-        memory, vehicle = None, None
+        memory, learned, vehicle = None, None, None
         if session is not None:
             trouble = self._ownership.take(file) if file is not None else ""
             if file is None or trouble:
                 session.health.state_trouble = trouble
             else:
-                memory, vehicle = session.estimator.memory, session.vehicle
+                memory, learned, vehicle = session.estimator.memory, session.watch.memory, session.vehicle
 
         def write() -> None:
             if file is None or session is None or vehicle is None or not memory or not memory["sides"]:
                 return
             try:
-                write_state(file, vehicle, memory)
+                write_state(file, vehicle, memory, learned)
                 session.health.state_trouble = ""
             except (OSError, ValueError) as error:
                 session.health.state_trouble = f"{file}: state cannot be written: {error}"

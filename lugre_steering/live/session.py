@@ -218,7 +218,7 @@ class Session:
         if stamp_ns <= self._torque_ns:  # the estimator began anew
             outputs.interrupt_commands()
         self._torque_ns = stamp_ns
-        self.watch.turned(float(row["theta"][0]))
+        self.watch.turned(row["theta"][: len(self.vehicle.sides)].tolist())
         if row["doubts"] != self._doubts:
             self._doubts, self.news = int(row["doubts"]), True
         if self._doubts:
