@@ -22,6 +22,7 @@ from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.estimator import PLAN_POINTS
+from lugre_steering.estimator.known import like_seen
 from lugre_steering.estimator.plan import planned_angles
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
@@ -556,6 +557,29 @@ def test_motion_that_the_calibration_has_not_seen_is_told() -> None:
     farther = np.abs([row["theta"][0] for row in rows]) > math.radians(11.0)
     np.testing.assert_array_equal(told, farther)
     assert 300 < told.sum() < 700
+
+
+@pytest.mark.parametrize(("seen", "told"), [([15.0, 20.0], False), ([-5.0, 0.0], True), ([40.0, 50.0], True), (None, False)])
+def test_rubber_unlike_any_that_the_calibration_has_seen_is_told(seen: list[float] | None, told: bool) -> None:
+    """It begins at 15 degC. The table of the sheet has 1.22 times the friction of that at 0 degC, 0.79 times at 40 degC."""
+    vehicle = VEHICLE.replace(provenance={"calibration": {"seen": {"angle_deg": 30.0, "rubber_degC": seen}}})
+    estimator, rows = Estimator(vehicle), []
+    for i in range(200):
+        for side in (0, 1):
+            rows += [row.copy() for row in estimator.push(side, T0 + i * PERIOD_NS, 0.3 * math.sin(0.7 * 0.01 * i))[0]]
+    said = {text for row in rows for text in doubts(row)}
+    assert ("rubber temperature outside the range of the calibration" in said) == told
+    assert any(row["feed_forward"].any() for row in rows) != told
+
+
+def test_how_far_rubber_may_be_from_what_was_seen_follows_from_its_table() -> None:
+    """Friction 2 % a degree: a tenth more below, a tenth less above."""
+    degC = np.arange(-40.0, 61.0, 0.1)
+    low, high = like_seen((10.0, 20.0), degC, np.exp(-0.02 * degC))
+    assert low == pytest.approx(10.0 - math.log(1.1) / 0.02, abs=0.11)
+    assert high == pytest.approx(20.0 - math.log(0.9) / 0.02, abs=0.11)
+    assert like_seen((10.0, 20.0), degC, np.ones(degC.size)) == (-math.inf, math.inf)
+    assert like_seen((-math.inf, math.inf), degC, np.exp(-0.02 * degC)) == (-math.inf, math.inf)
 
 
 @pytest.mark.parametrize("heldout", [800.0, {"nominal": 1e5, "calibrated": 800.0}])

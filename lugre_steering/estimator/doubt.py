@@ -78,11 +78,11 @@ DOUBTS = (
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
     "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
     "command refused", "time jumped", "pressures exchanged",
-    "pressure below range",
+    "pressure below range", "rubber temperature outside the range of the calibration",
 )  # fmt: skip
 (
     JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED, SET_BACK,
-    EXCHANGED, BROKEN,
+    EXCHANGED, BROKEN, HEAT,
 ) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
 INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK | EXCHANGED | BROKEN

@@ -24,7 +24,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD
 from lugre_steering.estimator.held import hold
-from lugre_steering.estimator.known import known_range
+from lugre_steering.estimator.known import known_range, like_seen
 from lugre_steering.estimator.layout import (
     CHANNEL,
     CONFIG,
@@ -412,6 +412,10 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["side_ratio"] = _side_ratio(vehicle)
     known = known_range(vehicle)
     config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
+    p = model.parameters[0][0]
+    degC = p["table_low"] + p["table_step"] * np.arange(len(model.rubber))
+    seen = known.rubber if vehicle.rubber is None else like_seen(known.rubber, degC, model.rubber[:, 1])
+    config["seen_coldest"], config["seen_warmest"] = seen
     return config
 
 

@@ -13,6 +13,7 @@ from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.chain.rates import follow
 from lugre_steering.estimator.admission import ACCEPTED, RUNNING, restart
 from lugre_steering.estimator.doubt import (
+    HEAT,
     LAW,
     LEAP_RATE_RAD_S,
     RANGE,
@@ -153,6 +154,8 @@ def _outside(c, state, motion, saturated, beyond):
     doubts = (TABLE if state.saturated > saturated else 0) | (LAW if beyond else 0)
     if abs(motion.theta) > c.seen_angle or abs(motion.omega) > c.seen_rate:
         doubts |= RANGE
+    if not c.seen_coldest < state.temperature < c.seen_warmest:
+        doubts |= HEAT
     return doubts
 
 
