@@ -746,6 +746,27 @@ def test_a_clock_set_back_takes_the_feed_forward_to_zero_until_the_bristle_is_kn
     assert after[-1][1]["feed_forward"] == pytest.approx(after[-1][1]["torque"])
 
 
+@pytest.mark.parametrize("begin_s", [5.0, 6.0, 6.7, 8.9])
+def test_after_a_clock_set_back_the_measured_torque_tells_what_the_bristle_holds(begin_s: float) -> None:
+    """Long before the joint has turned far enough to make all starts alike (1.2 s or more without)."""
+    vehicle = VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor())
+    estimator, never, off, doubted = Estimator(vehicle), Estimator(vehicle), [], []
+    for i in range(1200):
+        t = 0.01 * i
+        back_ns = 3600 * SECOND if t >= begin_s else 0
+        for side, share in enumerate((1.0, 0.95)):
+            angle = share * 0.3 * math.sin(0.7 * t)
+            true = [float(row["total"]) for row in never.push(side, T0 + i * PERIOD_NS, angle)[0]]
+            for row in estimator.push(side, T0 + i * PERIOD_NS - back_ns, angle)[0]:
+                off.append((t - begin_s, abs(float(row["total"]) - true[0])))
+                doubted += [t - begin_s] if row["doubts"] else []
+                estimator.push(2, T0 + i * PERIOD_NS - back_ns, true[0])
+    assert estimator.restarts == 1
+    assert max(doubted) < 0.5
+    assert max(error for since, error in off if 0.0 < since < 0.1) > 0.3 * STATIC_NM  # nothing had told of it yet
+    assert max(error for since, error in off if since > 0.25) < 0.06 * STATIC_NM
+
+
 def test_the_inertia_of_a_plan_counts() -> None:
     """A track of 500 kg m2 more that the plan accelerates by 2 rad/s2 needs 1 kN m more."""
     wanted = []

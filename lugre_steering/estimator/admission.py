@@ -110,6 +110,8 @@ def _forget_samples(core, k):
     core.channels[k].reasons[RESTART] += 1
     core.channels[k].reasons[OVERRUN] += c.pending_count
     c.start_ns = 0
+    c.start_known = False
+    c.start_residual_ns = c.begin_ns = 0
     c.lagged_ns = 0
     c.pending_count = 0
     c.plan_size = 0
