@@ -21,7 +21,7 @@ from lugre_steering.provenance import provenance
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
 from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, Watch, weigh
-from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, read_window, write_window
+from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, part_since, read_window, write_window
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
 VEHICLE = load(FILE)
@@ -173,6 +173,19 @@ def test_the_ring_keeps_the_latest() -> None:
     rows = samples.copy()
     assert rows.size == CAPACITY
     assert (rows["stamp_ns"][0], rows["stamp_ns"][-1]) == (11, CAPACITY + 10)
+
+
+@pytest.mark.parametrize(("onset_s", "missed_s"), [(0.0, 0.0), (5.0, 5.0), (9.5, 0.5), (10.5, 0.0)])
+def test_a_window_says_how_much_of_what_it_is_to_show_is_no_longer_kept(onset_s: float, missed_s: float) -> None:
+    """The ring holds what came from 10 s on: of earlier it is empty, or has been filled anew."""
+    samples, onset_ns = SampleRing(), T0 + round(onset_s * 1e9) if onset_s else 0
+    for i in range(100):
+        samples.add(0, T0 + 10_000_000_000 + i * 10_000_000, 0.0, math.nan)
+    part = part_since(samples.copy(), T0 + round((onset_s - 0.2) * 1e9), onset_ns)
+    assert part.missed_s == pytest.approx(missed_s)
+    assert part.missing == (f"its samples begin {missed_s:.1f} s after that did: no more are kept" if missed_s else "")
+    assert part.seconds == pytest.approx(0.99 - max(0.0, onset_s - 0.2 - 10.0))
+    assert part_since(samples.copy(), T0 + 20_000_000_000, onset_ns).samples.size == 0
 
 
 def test_bad_windows_are_refused_in_words(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from lugre_steering.live.parameters import changed, check_files, declare, undecl
 from lugre_steering.live.session import LEAVE_S, TICK_S, Session
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.watch.window import Part
 
 LATENCY_WINDOW = 4096
 REPORT_S = 1.0
@@ -279,16 +280,17 @@ class SteeringTorqueEstimator(LifecycleNode):
         if self.session is not None:
             self.session.change(self.settings)
 
-    def _write_window(self, session: Session, write: Callable[[], tuple[Path, float]]) -> None:
+    def _write_window(self, session: Session, write: Callable[[], tuple[Path, Part]]) -> None:
         """Write the window of an alarm; that a disk is full is no fault of the torques."""
         try:
-            file, _ = write()
+            file, part = write()
         except OSError as error:
             session.health.window_trouble = str(error)
             self.get_logger().warning(f"window not written: {error}")
         else:
             session.health.window_trouble = ""
-            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}")
+            missing = f" ({part.missing})" if part.missing else ""
+            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}{missing}")
 
     def _mark(self) -> Work:
         """Tell the mark in the report; with a folder for windows, write the one up to now, for diagnose."""
@@ -299,10 +301,10 @@ class SteeringTorqueEstimator(LifecycleNode):
         if write is None:
             return True, f"marked at {session.health.mark}; no window, as parameter 'watch_folder' names no folder for them"
         try:
-            file, seconds = yield write
+            file, part = yield write
         except OSError as error:
             return False, str(error)
-        return True, f"{file}\n{seconds:.1f} s"
+        return True, "\n".join(filter(None, [str(file), f"{part.seconds:.1f} s", part.missing]))
 
     def _reload(self) -> Work:
         """Take over what ``vehicle_file`` says now, all of it or nothing."""
