@@ -20,7 +20,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.provenance import provenance
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
-from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, Watch, weigh
+from lugre_steering.watch.detector import LEARN, SCORES, THRESHOLD, Watch, new_state, weigh
 from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, part_since, read_window, write_window
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
@@ -38,8 +38,8 @@ def coloured(count: int, seed: int) -> Array:
 
 
 def sums(scores: Array) -> Array:
-    state = np.zeros(1, STATE)[0]
-    return np.array([weigh(state, row) for row in scores])
+    state = new_state(VEHICLE)[0]
+    return np.array([weigh(state, row, math.inf) for row in scores])
 
 
 def test_scores_that_only_scatter_raise_no_alarm() -> None:

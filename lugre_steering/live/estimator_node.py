@@ -28,6 +28,7 @@ from lugre_steering.live.parameters import changed, check_files, declare, undecl
 from lugre_steering.live.session import LEAVE_S, TICK_S, Session
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.watch.detector import UNCALIBRATED
 from lugre_steering.watch.window import Part
 
 LATENCY_WINDOW = 4096
@@ -97,6 +98,8 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.fault(error)
             return TransitionCallbackReturn.ERROR
         self._restore(self.session)
+        if not self.session.watch.calibrated:
+            self.get_logger().info(f"the watch tells changes only: {UNCALIBRATED}")
         if unknown := undeclared(self):
             self.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
         self.get_logger().info(
@@ -220,7 +223,7 @@ class SteeringTorqueEstimator(LifecycleNode):
             self._go_on_reporting(session, now_ns)
         if session.alarm:
             session.alarm = False
-            write = session.window("the residual is not what it was")
+            write = session.window(session.watch.trouble)
             if write is not None:
                 threading.Thread(target=self.guarded(self._write_window), args=(session, write), daemon=True).start()
 
@@ -290,7 +293,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         else:
             session.health.window_trouble = ""
             missing = f" ({part.missing})" if part.missing else ""
-            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}{missing}")
+            self.get_logger().warning(f"{session.watch.trouble}: lugre-steering diagnose --window {file}{missing}")
 
     def _mark(self) -> Work:
         """Tell the mark in the report; with a folder for windows, write the one up to now, for diagnose."""

@@ -66,7 +66,9 @@ class Health:
         self._node = node
         self.active = True
         self.leaving = False
-        self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
+        self.mismatch = ""  # what does not match, as the watch says
+        self.mismatch_s = math.nan  # and since when
+        self.watching = ""  # what the watch can tell
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
         self.state_trouble = ""  # why the state cannot be kept
@@ -305,9 +307,9 @@ class Health:
         if large:
             message = "; ".join(filter(None, [message, "residual as large as the torque: check units, signs, plugs; then diagnose"]))
         words = self._wrong_sheet()
-        unlike = math.isfinite(self.mismatch_s)
+        unlike = self.mismatch != ""
         if unlike:  # without the time, which would make news of it each second
-            message = "; ".join(filter(None, [message, "the residual is not what it was: the model no longer matches; diagnose"]))
+            message = "; ".join(filter(None, [message, f"{self.mismatch}; diagnose"]))
         withheld = f"withheld: {', '.join(line_troubles)}" if line_troubles else ""
         message = "; ".join(filter(None, [withheld, message, words]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
@@ -316,6 +318,8 @@ class Health:
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
+        if self.watching:
+            values["the watch tells"] = self.watching
         if unlike:
             values["no longer matches since [s]"] = self.mismatch_s
         if self.mark:
