@@ -20,7 +20,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.provenance import provenance
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
-from lugre_steering.watch.detector import LEARN, SCORES, THRESHOLD, Watch, new_state, weigh
+from lugre_steering.watch.detector import SCORES, THRESHOLD, Watch, new_state, weigh
 from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, part_since, read_window, write_window
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
@@ -85,7 +85,7 @@ def test_a_change_that_lasts_is_not_what_is_usual_and_is_over_when_it_is_mended(
 
 
 def watched(watch: Watch, begin: int, end: int, changed_s: float) -> list[tuple[float, int]]:
-    """Residuals of noise, larger from ``changed_s`` on, from one sample to another; when alarms began, and since when they say."""
+    """Residuals of noise, larger from ``changed_s`` on, from one sample to another; when alarms began, and since when."""
     alarms = []
     for i in range(begin, end):
         t = 0.15 * i

@@ -412,10 +412,11 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["side_ratio"] = _side_ratio(vehicle)
     known = known_range(vehicle)
     config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
-    p = model.parameters[0][0]
-    degC = p["table_low"] + p["table_step"] * np.arange(len(model.rubber))
-    seen = known.rubber if vehicle.rubber is None else like_seen(known.rubber, degC, model.rubber[:, 1])
-    config["seen_coldest"], config["seen_warmest"] = seen
+    config["seen_coldest"], config["seen_warmest"] = -math.inf, math.inf
+    if vehicle.rubber is not None:
+        p = model.parameters[0][0]
+        degC = p["table_low"] + p["table_step"] * np.arange(len(model.rubber))
+        config["seen_coldest"], config["seen_warmest"] = like_seen(known.rubber, degC, model.rubber[:, 1])
     return config
 
 
