@@ -767,6 +767,30 @@ def test_after_a_clock_set_back_the_measured_torque_tells_what_the_bristle_holds
     assert max(error for since, error in off if since > 0.25) < 0.06 * STATIC_NM
 
 
+@pytest.mark.parametrize("hours", [1, -1])
+def test_a_clock_that_is_wrong_for_a_second_costs_no_heat(hours: int) -> None:
+    """An hour ahead and back again, or back and ahead again: the torque is soon that of a sound clock, the temperature at once."""
+    vehicle = VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor())
+    estimator, never, rows = Estimator(vehicle), Estimator(vehicle), []
+    for i in range(2600):
+        t = 0.01 * i
+        stamp_ns = T0 + i * PERIOD_NS
+        wrong_ns = stamp_ns + (hours * 3600 * SECOND if 20.0 <= t < 21.0 else 0)
+        for side, share in enumerate((1.0, 0.95)):
+            angle = share * 0.3 * math.sin(0.7 * t)
+            true = [row.copy() for row in never.push(side, stamp_ns, angle)[0]]
+            for row in estimator.push(side, wrong_ns, angle)[0]:
+                rows.append((t, row.copy(), true[0]))
+                estimator.push(2, wrong_ns, float(true[0]["total"]))
+        never.push(2, stamp_ns, float(true[0]["total"]))
+    heat = [abs(row["temperature"] - true["temperature"]).max() for t, row, true in rows if t > 21.1]
+    assert max(rows[2000][2]["temperature"]) > 18.0
+    assert max(heat) < 0.2
+    off = [abs(float(row["total"] - true["total"])) for t, row, true in rows if t > 21.4]
+    assert max(off) < 0.06 * STATIC_NM
+    assert max(t for t, row, _ in rows if row["doubts"]) < 21.6
+
+
 def test_the_inertia_of_a_plan_counts() -> None:
     """A track of 500 kg m2 more that the plan accelerates by 2 rad/s2 needs 1 kN m more."""
     wanted = []

@@ -20,7 +20,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.provenance import provenance
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import load
-from lugre_steering.watch.detector import SCORES, THRESHOLD, Watch, new_state, weigh
+from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, UNCALIBRATED, Watch, weigh
 from lugre_steering.watch.window import CAPACITY, SAMPLE, SampleRing, part_since, read_window, write_window
 
 FILE = Path(__file__).resolve().parents[1] / "config" / "test_vehicle.yaml"
@@ -38,8 +38,8 @@ def coloured(count: int, seed: int) -> Array:
 
 
 def sums(scores: Array) -> Array:
-    state = new_state(VEHICLE)[0]
-    return np.array([weigh(state, row, math.inf) for row in scores])
+    state = np.zeros(1, STATE)[0]
+    return np.array([weigh(state, row) for row in scores])
 
 
 def test_scores_that_only_scatter_raise_no_alarm() -> None:
@@ -97,7 +97,7 @@ def watched(watch: Watch, begin: int, end: int, changed_s: float) -> list[tuple[
 
 
 def test_what_the_watch_has_learned_and_found_survives_a_restart() -> None:
-    """One that is restarted before the change finds it as soon as one that is not; one restarted while it lasts knows since when it does."""
+    """One restarted before the change finds it as soon as one that is not; one restarted while it lasts knows since when it does."""
     whole, first = Watch(VEHICLE), Watch(VEHICLE)
     expected = watched(whole, 0, 9000, 900.0)
     assert len(expected) == 1
@@ -125,6 +125,16 @@ def test_what_another_version_of_the_watch_has_learned_is_refused(spoil: str) ->
     with pytest.raises(DataError, match="the watch had learned"):
         watch.resume(memory)
     assert watch.memory == Watch(VEHICLE).memory
+
+
+def test_the_watch_says_what_it_can_tell() -> None:
+    """Without a calibration nothing tells a model that was wrong from the start; with one that is the bound of the residual."""
+    watch, calibrated = Watch(VEHICLE), Watch(VEHICLE.replace(provenance={"heldout_rmse_Nm": 80.0}))
+    assert watch.words == f"changes once 60 manoeuvres have told what is usual (0 so far); {UNCALIBRATED}"
+    assert calibrated.words == "changes once 60 manoeuvres have told what is usual (0 so far)"
+    watched(calibrated, 0, 3000, 900.0)
+    assert calibrated.words == "changes"
+    assert (watch.bound_Nm, calibrated.bound_Nm) == (0.0, 400.0)
 
 
 def test_the_vehicle_steers_by_the_mean_of_its_sides() -> None:

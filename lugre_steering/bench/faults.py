@@ -62,9 +62,6 @@ SENT_S = 0.005
 """From the moment for which a command is made until it is sent no more than this passes."""
 NOTHING: tuple[str, ...] = ()
 """Nothing need be told."""
-AHEAD = "clock an hour ahead"
-ANEW = (AHEAD, "clock an hour back")
-"""After these the estimator begins anew, and so does what it is compared with."""
 LINE = "one pressure"
 CONTRADICTED, THREE, SIMULATED = "rate against angle", "three nodes of one name", "simulated time"
 LIMITED = "slower"
@@ -201,8 +198,7 @@ def faults_of(vehicle: Vehicle, rng: np.random.Generator) -> Mapping[str, tuple[
     frozen, stale, framed = ("angle frozen",), ("stale",), ("of another frame",)
     unlike = ("residual implausible", "pressure frozen", "below_range")  # "residual formed" is told all the time
     return {
-        # First, while the rubber is as cold as at the beginning to which the latter goes back.
-        AHEAD: (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns + hour)), ("time_jump",)),
+        "clock an hour ahead": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns + hour)), ("time_jump",)),
         "clock an hour back": (_of(vehicle, (*angle, *pressure), _stamp(lambda ns: ns - hour)), ("time_jump",)),
         "both angles frozen": (_of(vehicle, angle, _held()), frozen),
         "left angle frozen": (_of(vehicle, angle, _held(), 0), frozen),
@@ -327,8 +323,6 @@ class Campaign:
         time.sleep(FAULT_S)
         end()
         end_ns = neighbour.now_ns()
-        if name in ANEW:
-            neighbour.clean.clear()
         time.sleep(REST_S)
         begin_ns = next(iter(first), begin_ns)
         told = neighbour.told[mark[1] :]

@@ -36,7 +36,7 @@ from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
 from lugre_steering.proof.made import Wanted
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle, load
-from lugre_steering.watch.detector import MOST, SCORES, THRESHOLD, Watch, new_state, weigh
+from lugre_steering.watch.detector import SCORES, STATE, THRESHOLD, Watch, weigh
 
 STRETCH = 30.0
 THRESHOLDS = np.array([5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0, 150.0, 200.0])
@@ -75,7 +75,7 @@ def _excursions(state, scores, thresholds, counts):
     """Count, for each threshold, how often the cumulative sum rises above it anew from zero."""
     highest = 0.0
     for score in scores:
-        level = weigh(state, score, np.inf)
+        level = weigh(state, score)
         if level > 0.0:
             highest = max(highest, level)
         else:
@@ -104,7 +104,7 @@ def machine_of(seed: int, folder: Path) -> tuple[Setting, Vehicle, list[Scores]]
     manoeuvres."""
     setting = draw_setting(seed, "dirty", NOISES[seed % len(NOISES)])
     bags = simulate(setting, []).write(folder, folder / "unseen")
-    vehicle = calibrate([bags[0]], load(folder / "vehicle.yaml")).with_provenance()
+    vehicle = calibrate([bags[0]], load(folder / "vehicle.yaml")).calibrated
     return setting, vehicle, [found for bag in bags if (found := scores_of(vehicle, bag)).scores.shape[0] >= 10]
 
 
@@ -115,11 +115,11 @@ def delays(setting: Setting, vehicle: Vehicle, bags: Sequence[Scores], folder: P
         changed = simulate(setting, [Wanted(effect, STRENGTH)]).write(folder / effect, folder / effect / "unseen")
         after = np.concatenate([scores_of(vehicle, bag).scores for bag in changed])
         before = drawn(bags, BEFORE * bags[0].hours, rng)
-        state = new_state(vehicle)
+        state = np.zeros(1, STATE)
         for score in before:
-            weigh(state[0], score, MOST * THRESHOLD)
+            weigh(state[0], score)
         state[0]["sum"] = 0.0
-        told = (i for i in range(200) if weigh(state[0], after[i % len(after)], MOST * THRESHOLD) > THRESHOLD)
+        told = (i for i in range(200) if weigh(state[0], after[i % len(after)]) > THRESHOLD)
         found[name] = 1.0 + next(told, math.inf)
     return found
 
@@ -146,7 +146,7 @@ def run(argv: list[str]) -> None:
                 print(f"machine {i}: left out (too little motion)", file=sys.stderr, flush=True)
                 continue
             rng = np.random.default_rng([options.seed, i])
-            _excursions(new_state(vehicle)[0], drawn(bags, options.hours, rng), THRESHOLDS, counts[i])
+            _excursions(np.zeros(1, STATE)[0], drawn(bags, options.hours, rng), THRESHOLDS, counts[i])
             hours[i] = options.hours
             if i % 4 == 0:
                 late.append(delays(setting, vehicle, bags, folder, rng))

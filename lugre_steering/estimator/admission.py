@@ -99,6 +99,7 @@ def _set_side_back(core, side, stamp_ns):
     fastest = g.fastest
     core.motion[side], core.trust[side], core.guard[side] = nothing.motion, nothing.trust, nothing.guard
     g.fastest, g.set_back = fastest, state.started != 0.0
+    g.back_from_ns, g.back_to_ns = core.channels[side].last_ns, stamp_ns
 
 
 @inner

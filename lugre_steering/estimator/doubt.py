@@ -115,6 +115,8 @@ GUARD = np.dtype(
         ("set_back", np.bool_),  # it is not known because the clock was set back
         ("jumped_ns", np.int64),  # stamp of the sample before the time last jumped forward; 0: it never did
         ("jumped_to_ns", np.int64),  # stamp that it jumped to
+        ("back_from_ns", np.int64),  # stamp of the sample before the clock was last set back; 0: it was not, or has been set forth again
+        ("back_to_ns", np.int64),  # stamp that it was set back to
         ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not
         ("frozen_at", np.float64),  # reading then [rad]
         ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault

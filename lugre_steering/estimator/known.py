@@ -17,6 +17,8 @@ SLACK = 1.1
 """The causal estimates of a motion swing a little farther than the smoothed ones that were kept."""
 LIKE_SHARE = 0.1
 """Rubber may be so much colder or warmer than it was that its table changes the friction by this share."""
+BOUND_RMSE = 5.0
+"""A residual this many times as large as the held-out one of the calibration is implausible."""
 _DEG = math.pi / 180.0
 
 
@@ -44,6 +46,11 @@ def known_range(vehicle: Vehicle) -> KnownRange:
         for keys in ((("position_m", 1.0), ("angle_deg", _DEG)), (("rate_m_s", 1.0), ("rate_deg_s", _DEG)))
     )
     return KnownRange(SLACK * angle, SLACK * rate, _positive(rmse), _ends(seen.get("rubber_degC")))
+
+
+def residual_bound(vehicle: Vehicle) -> float:
+    """Size [N m] from which on a residual is implausible, by what the calibration left; 0 without one."""
+    return BOUND_RMSE * known_range(vehicle).rmse
 
 
 def like_seen(seen: tuple[float, float], degC: Array, friction: Array) -> tuple[float, float]:

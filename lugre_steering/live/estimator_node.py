@@ -98,7 +98,7 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.fault(error)
             return TransitionCallbackReturn.ERROR
         self._restore(self.session)
-        if not self.session.watch.calibrated:
+        if not self.session.watch.bound_Nm:
             self.get_logger().info(f"the watch tells changes only: {UNCALIBRATED}")
         if unknown := undeclared(self):
             self.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
@@ -223,7 +223,7 @@ class SteeringTorqueEstimator(LifecycleNode):
             self._go_on_reporting(session, now_ns)
         if session.alarm:
             session.alarm = False
-            write = session.window(session.watch.trouble)
+            write = session.window("the residual is not what it was")
             if write is not None:
                 threading.Thread(target=self.guarded(self._write_window), args=(session, write), daemon=True).start()
 
@@ -293,7 +293,7 @@ class SteeringTorqueEstimator(LifecycleNode):
         else:
             session.health.window_trouble = ""
             missing = f" ({part.missing})" if part.missing else ""
-            self.get_logger().warning(f"{session.watch.trouble}: lugre-steering diagnose --window {file}{missing}")
+            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}{missing}")
 
     def _mark(self) -> Work:
         """Tell the mark in the report; with a folder for windows, write the one up to now, for diagnose."""

@@ -66,9 +66,9 @@ class Health:
         self._node = node
         self.active = True
         self.leaving = False
-        self.mismatch = ""  # what does not match, as the watch says
-        self.mismatch_s = math.nan  # and since when
+        self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
         self.watching = ""  # what the watch can tell
+        self.bound_Nm = 0.0  # of residuals, by the calibration; 0: none
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
         self.state_trouble = ""  # why the state cannot be kept
@@ -307,9 +307,9 @@ class Health:
         if large:
             message = "; ".join(filter(None, [message, "residual as large as the torque: check units, signs, plugs; then diagnose"]))
         words = self._wrong_sheet()
-        unlike = self.mismatch != ""
+        unlike = math.isfinite(self.mismatch_s)
         if unlike:  # without the time, which would make news of it each second
-            message = "; ".join(filter(None, [message, f"{self.mismatch}; diagnose"]))
+            message = "; ".join(filter(None, [message, "the residual is not what it was: the model no longer matches; diagnose"]))
         withheld = f"withheld: {', '.join(line_troubles)}" if line_troubles else ""
         message = "; ".join(filter(None, [withheld, message, words]))
         message = message or ("residual formed" if count else "no residual: pressures missing or not around the stamps")
@@ -318,6 +318,8 @@ class Health:
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
+        if self.bound_Nm:
+            values["implausible from [N m]"] = self.bound_Nm
         if self.watching:
             values["the watch tells"] = self.watching
         if unlike:

@@ -170,8 +170,8 @@ class Session:
         self.news = False
         estimator, now_ns = self.estimator, self._now_ns()
         self.health.simulated, self.health.active = self.simulated, self.active
-        self.health.mismatch, self.health.mismatch_s = self.watch.trouble, (now_ns - self.watch.since_ns) * 1e-9
-        self.health.watching = self.watch.words
+        self.health.mismatch_s = (now_ns - self.watch.since_ns) * 1e-9 if self.watch.since_ns else math.nan
+        self.health.bound_Nm, self.health.watching = self.watch.bound_Nm, self.watch.words
         self.health.told(now_ns, estimator.rejections)
         counters, steps = estimator.counters, estimator.saturated_steps
         return self.health.statuses(now_ns, monotonic_ns, elapsed_s, counters, steps, estimator.line_troubles)

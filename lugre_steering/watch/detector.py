@@ -9,9 +9,9 @@ the next) is learned from the machine itself: robustly, from the latest ``KEPT``
 may already have spoiled, and nothing while the model does not match. The squares of the innovations, cut at ``CUT`` standard
 deviations, go into a cumulative sum (Page 1954, Biometrika 41, 100-115), which forgets ``SLACK`` a manoeuvre.
 
-Of a machine that has never been as it should be, what is usual says nothing. Where the vehicle file tells what error its calibration
-left on held-out data, a second sum of the same kind takes how far the error of a manoeuvre is above that, in units of ``ABOVE`` (of its
-logarithm): from the first manoeuvre on, and of a machine that drifts away so slowly that it takes its usual along.
+A machine that has never been as it should be is as usual to it. Where the vehicle file tells the error that its calibration left, one that
+is far beyond is told at once as an implausible residual (``estimator.doubt``), and days of sound machines differ too much for a closer look
+(``docs/online_watch.md``); where it does not, the watch says that it can tell changes only.
 
 How often it speaks although nothing has changed is measured, not computed: ``python -m lugre_steering.bench watch``.
 """
@@ -27,7 +27,7 @@ from numba import njit
 
 from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
-from lugre_steering.estimator.known import known_range
+from lugre_steering.estimator.known import residual_bound
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import baseline_parameters, most_friction_of_all
 
@@ -42,8 +42,6 @@ WIDE, WIDE_SIGMA = 0.95, 1.96
 """Quantile of the deviations that tells their scatter, and what it is of a normal one: days of two kinds have two humps."""
 LEAST_SCATTER = (0.1, 0.01, 0.1)
 """A tenth more or less error, or a hundredth of the friction, is never unusual."""
-ABOVE = 0.7
-"""Days are unlike those of the calibration: an error of e^(ABOVE sqrt(SLACK)), 2.7 times as large as was left there, is still no news."""
 THRESHOLD = 40.0
 """Of the cumulative sum, for one false alarm in about 1000 h; see ``bench watch``."""
 MOST = 2.0
@@ -52,9 +50,7 @@ MOST = 2.0
 Memory = Mapping[str, str]
 """The record ``STATE`` as texts, and what it looked like."""
 
-CHANGED = "the residual is not what it was: the model no longer matches"
-BEYOND = "the residual is larger than the calibration left it: the model does not match"
-UNCALIBRATED = "the vehicle file has no calibration (lugre-steering calibrate), so a model that is wrong from the start is usual"
+UNCALIBRATED = "the vehicle file has no calibration (lugre-steering calibrate), so that a model which is wrong from the start is usual"
 RING = KEPT + LAG
 STATE = np.dtype(
     [
@@ -64,11 +60,8 @@ STATE = np.dtype(
         ("scatter", np.float64, (SCORES,)),
         ("memory", np.float64, (SCORES,)),
         ("sum", np.float64),
-        ("expected", np.float64),  # logarithm of the error that the calibration left; inf: not told
-        ("above", np.float64),  # sum of what was above that
         ("last", np.float64, (SCORES,)),
         ("sound_ns", np.int64),  # stamp at which the sum was last zero
-        ("beyond", np.bool_),  # the calibration's error is what it does not match
         ("since_ns", np.int64),  # stamp from which the model does not match, so that what comes is not what is usual; 0: it does
     ]
 )
@@ -92,8 +85,8 @@ def _learn(s):
 
 
 @njit(cache=True)
-def weigh(s, scores, most):
-    """The larger of the cumulative sums, each no more than ``most``, after the scores of one more manoeuvre."""
+def weigh(s, scores):
+    """The cumulative sum after the scores of one more manoeuvre; 0 while the usual is not known."""
     if s.since_ns == 0:
         for k in range(SCORES):
             s.scores[s.count % RING, k] = scores[k]
@@ -106,24 +99,15 @@ def weigh(s, scores, most):
             innovation = scores[k] - s.level[k] - s.memory[k] * (s.last[k] - s.level[k])
             squares += min(CUT**2, innovation**2 / (s.scatter[k] ** 2 * (1.0 - s.memory[k] ** 2)))
         s.last[k] = scores[k]
-    if known:
-        s.sum = min(most, max(0.0, s.sum + squares / SCORES - SLACK))
-    above = max(0.0, scores[0] - s.expected) / ABOVE
-    s.above = min(most, max(0.0, s.above + min(CUT**2, above**2) - SLACK))
-    return max(s.sum, s.above)
+    if not known:
+        return 0.0
+    s.sum = max(0.0, s.sum + squares / SCORES - SLACK)
+    return s.sum
 
 
 def warm_up() -> None:
     """Compile, or load from the cache, what a manoeuvre calls."""
-    weigh(np.zeros(1, STATE)[0], (0.0,) * SCORES, math.inf)
-
-
-def new_state(vehicle: Vehicle) -> Records:
-    """Of a watch that has learned nothing yet."""
-    state: Records = np.zeros(1, STATE)
-    rmse, floor = known_range(vehicle).rmse, FLOOR_SHARE * most_friction_of_all(vehicle)
-    state["expected"] = math.log(math.hypot(rmse, floor)) if rmse > 0.0 else math.inf
-    return state
+    weigh(np.zeros(1, STATE)[0], (0.0,) * SCORES)
 
 
 class Watch:
@@ -133,9 +117,9 @@ class Watch:
         self._friction = most_friction_of_all(vehicle)
         self._travel = MANOEUVRE * self._friction / len(vehicle.sides) / baseline_parameters(vehicle)["sigma_0"]
         self._threshold = threshold
-        self._state = new_state(vehicle)
-        self.calibrated = bool(np.isfinite(self._state[0]["expected"]))
-        """Whether the vehicle file tells what error is to be expected."""
+        self._state: Records = np.zeros(1, STATE)
+        self.bound_Nm = residual_bound(vehicle)
+        """Residuals beyond it are implausible by the calibration; 0 without one."""
         self._angle, self._gone, self._fresh = math.nan, 0.0, False
         self._squares, self._directed, self._largest, self._count, self._direction = 0.0, 0.0, 0.0, 0, 0.0
         self.scores: list[tuple[float, ...]] = []
@@ -147,13 +131,6 @@ class Watch:
         return int(self._state[0]["since_ns"])
 
     @property
-    def trouble(self) -> str:
-        """What does not match, in words; "" while nothing is known to."""
-        if not self.since_ns:
-            return ""
-        return BEYOND if self._state[0]["beyond"] else CHANGED
-
-    @property
     def learned(self) -> int:
         """Manoeuvres that have told what is usual."""
         return int(self._state[0]["count"])
@@ -161,9 +138,8 @@ class Watch:
     @property
     def words(self) -> str:
         """What it can tell now."""
-        usual = min(self.learned, LEARN)
-        learning = f"changes once {LEARN} manoeuvres have told what is usual ({usual} so far)" if usual < LEARN else "changes"
-        return learning + (", and errors beyond those of the calibration" if self.calibrated else f" only: {UNCALIBRATED}")
+        usual = f"once {LEARN} manoeuvres have told what is usual ({self.learned} so far)" if self.learned < LEARN else ""
+        return " ".join(filter(None, ["changes", usual])) + ("" if self.bound_Nm else f"; {UNCALIBRATED}")
 
     @property
     def memory(self) -> Memory:
@@ -204,7 +180,8 @@ class Watch:
             self._count += 1
         if self._gone < self._travel or self._count == 0:
             return False
-        floor, rms = FLOOR_SHARE * self._friction, math.sqrt(self._squares / self._count)
+        floor = FLOOR_SHARE * self._friction
+        rms = math.sqrt(self._squares / self._count)
         scores = (
             math.log(math.hypot(rms, floor)),
             self._directed / self._count / self._friction,
@@ -217,10 +194,11 @@ class Watch:
 
     def _judge(self, stamp_ns: int, scores: tuple[float, ...]) -> bool:
         state = self._state[0]
-        level = float(weigh(state, scores, MOST * self._threshold))
+        level = float(weigh(state, scores))
+        state["sum"] = min(level, MOST * self._threshold)
         if level == 0.0:
             state["since_ns"], state["sound_ns"] = 0, stamp_ns
         elif level > self._threshold and not state["since_ns"]:
-            state["since_ns"], state["beyond"] = state["sound_ns"], state["above"] > state["sum"]
+            state["since_ns"] = state["sound_ns"]
             return True
         return False

@@ -38,7 +38,6 @@ from lugre_steering.estimator import Estimator
 from lugre_steering.estimator.layout import REASONS
 from lugre_steering.live.health import Health
 from lugre_steering.vehicle import load
-from lugre_steering.watch.detector import CHANGED
 
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 
@@ -129,7 +128,7 @@ def test_a_residual_as_large_as_the_torque_is_told(estimate: float, residual: fl
 
 def test_a_model_that_no_longer_matches_is_told_with_the_time_since() -> None:
     health = Health(load(VEHICLE), 0.2, 0.5, 10)
-    health.mismatch, health.mismatch_s = CHANGED, 12.3
+    health.mismatch_s = 12.3
     status = next(s for s in health.statuses(1, 1, 1.0, {}, 0) if s.name.endswith("residual"))
     assert status.level == WARN
     assert status.message == "the residual is not what it was: the model no longer matches; diagnose"
