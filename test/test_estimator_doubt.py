@@ -599,6 +599,22 @@ def test_a_residual_of_five_times_the_calibrations_is_implausible_for_as_long_as
     assert not any(told[1000:])
 
 
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_a_machine_that_never_was_as_its_calibration_is_told_at_once(calibrated: bool) -> None:
+    """Its torque is 1.4 times the estimate from the first sample on; without a calibration that is how it may be."""
+    note = {"calibration": {"heldout_rmse_Nm": {"sheet": 1e5, "calibrated": 800.0}}} if calibrated else {}
+    estimator, told = Estimator(VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor(), provenance=note)), []
+    for i in range(1500):
+        for side in (0, 1):
+            for row in estimator.push(side, T0 + i * PERIOD_NS, 0.3 * math.sin(0.7 * 0.01 * i))[0]:
+                told += [0.01 * i] if "residual implausible" in doubts(row) else []
+                estimator.push(2, T0 + i * PERIOD_NS, 1.4 * float(row["predicted"]))
+    assert bool(told) == calibrated
+    if calibrated:
+        assert min(told) < 1.5  # the joint has hardly turned by then
+        assert len(told) > 1000  # and for most of each stroke
+
+
 def test_a_plan_of_more_points_than_are_kept_is_not_even_read() -> None:
     joints = ["left", "right"]
     message = SimpleNamespace(joint_names=joints, points=[None] * (PLAN_POINTS + 1))
