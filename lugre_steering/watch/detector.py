@@ -65,6 +65,7 @@ STATE = np.dtype(
         ("since_ns", np.int64),  # stamp from which the model does not match, so that what comes is not what is usual; 0: it does
     ]
 )
+_FORM = str(STATE)  # made once: it takes longer than all that is in it
 
 
 @njit(cache=True)
@@ -144,11 +145,11 @@ class Watch:
     @property
     def memory(self) -> Memory:
         """What it has learned and found, for ``resume``; of a manoeuvre that is under way nothing."""
-        return {"form": str(STATE), "record": base64.b64encode(self._state.tobytes()).decode("ascii")}
+        return {"form": _FORM, "record": base64.b64encode(self._state.tobytes()).decode("ascii")}
 
     def resume(self, memory: Memory) -> None:
         """Go on with what one of this vehicle has learned; ``DataError``, and nothing changed, if it is of another version."""
-        if memory.get("form") != str(STATE):
+        if memory.get("form") != _FORM:
             raise DataError("what the watch had learned is of another version")
         try:
             record = np.frombuffer(base64.b64decode(memory["record"], validate=True), STATE)
