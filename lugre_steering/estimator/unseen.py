@@ -92,8 +92,8 @@ def drive_bounds(core, side, dt):
 
 
 @inner
-def learn_start(core, stamp_ns, residual):
-    """The first measured torque is ``residual`` [N m] more than the estimate of that instant: how much bristles held at the start.
+def learn_start(core, e, residual):
+    """The first measured torque is ``residual`` [N m] more than the estimate ``e`` of that instant: how much bristles held at the start.
 
     Pressures tell only by their next samples whether the first ones were astray, so it is believed at the next residual. All sides hold
     the same share of what they can, as one torque does not tell them apart.
@@ -101,13 +101,14 @@ def learn_start(core, stamp_ns, residual):
     c, most = core.config[0], 0.0
     first, first_ns = c.start_residual, c.start_residual_ns
     if first_ns == 0:
-        c.start_residual, c.start_residual_ns = residual, stamp_ns
+        c.start_residual, c.start_residual_ns = residual, e.stamp_ns
         c.start_known = abs(residual) <= AGREED_SHARE * c.friction
         return
     c.start_known = True
     for side in range(core.motion.size):
         p = row(core.parameters, side, BASELINE)
-        most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, row(core.state, side, STATE).temperature)[0]
+        warm = e.temperature[side] if core.guard[side].set_back else p.rubber_temperature
+        most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, warm)[0]
     if most > 0.0:
         c.start_share = max(-1.0, min(1.0, first / most))
         c.begin_ns = first_ns + BEGIN_NS
