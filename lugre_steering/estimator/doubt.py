@@ -70,7 +70,7 @@ SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.35
 """A residual as large as the torque, where that is at least this share of the static friction, needs no long look."""
 REFUSED_S = 0.5
 """A command that could not be used, with no plan in force, is forgotten after this."""
-BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
+BOUND_MEMORY_S, BOUND_CAP = 0.4, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
 
 DOUBTS = (
