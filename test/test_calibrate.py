@@ -231,6 +231,23 @@ def test_what_is_hardly_determined_is_told_by_its_title_and_once_on_a_terminal(c
         assert title not in shown.getvalue()
 
 
+def test_what_was_seen_of_the_rubber_is_told_from_the_coldest_start_to_the_warmest_end():
+    """Standing rubber follows lambda A / (rho c A h) towards the air: one run cools down, the other warms up."""
+    time = np.arange(0.0, 600.0, 0.5)
+    still = np.zeros((2, time.size))
+    run = SimpleNamespace(time=time, theta=still, omega=still, alpha=still)
+    rubber = SHEET.rubber
+    left = np.exp(-time[-1] * rubber.heat_transfer_W_m2K / (rubber.density_kg_m3 * rubber.specific_heat_J_kgK * rubber.tread_thickness_m))
+    low, high = seen_range(SHEET, [run, run], [(30.0, 10.0), (5.0, 50.0)])["rubber_degC"]
+    assert low == 5.0
+    assert high == pytest.approx(max(30.0, 50.0 - 45.0 * left), abs=0.06)
+    low, _ = seen_range(SHEET, [run], [(30.0, 10.0)])["rubber_degC"]
+    assert low == pytest.approx(10.0 + 20.0 * left, abs=0.06)
+    assert known_range(SHEET.replace(provenance={"seen": {"rubber_degC": [low, 30.0]}})).rubber == (low, 30.0)
+    for nothing in (None, [3.0], [5.0, 3.0], ["a", "b"], [1.0, np.nan]):
+        assert known_range(SHEET.replace(provenance={"seen": {"rubber_degC": nothing}})).rubber == (-np.inf, np.inf)
+
+
 def test_what_was_seen_of_a_linear_axis_is_told_in_metres_and_earlier_files_still_read():
     axis = vehicle_file.load(ROOT / "config" / "linear_axis_example.yaml")
     runs = [SimpleNamespace(theta=np.array([[0.1, -0.15]]), omega=np.array([[0.0123456, 0.0]]))]

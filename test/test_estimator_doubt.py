@@ -22,6 +22,7 @@ from lugre_steering.chain.step import Records
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
 from lugre_steering.estimator.estimator import PLAN_POINTS
+from lugre_steering.estimator.known import like_seen
 from lugre_steering.estimator.plan import planned_angles
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import TorqueSensor, Vehicle, load
@@ -558,6 +559,29 @@ def test_motion_that_the_calibration_has_not_seen_is_told() -> None:
     assert 300 < told.sum() < 700
 
 
+@pytest.mark.parametrize(("seen", "told"), [([15.0, 20.0], False), ([-5.0, 0.0], True), ([40.0, 50.0], True), (None, False)])
+def test_rubber_unlike_any_that_the_calibration_has_seen_is_told(seen: list[float] | None, told: bool) -> None:
+    """It begins at 15 degC. The table of the sheet has 1.22 times the friction of that at 0 degC, 0.79 times at 40 degC."""
+    vehicle = VEHICLE.replace(provenance={"calibration": {"seen": {"angle_deg": 30.0, "rubber_degC": seen}}})
+    estimator, rows = Estimator(vehicle), []
+    for i in range(200):
+        for side in (0, 1):
+            rows += [row.copy() for row in estimator.push(side, T0 + i * PERIOD_NS, 0.3 * math.sin(0.7 * 0.01 * i))[0]]
+    said = {text for row in rows for text in doubts(row)}
+    assert ("rubber temperature outside the range of the calibration" in said) == told
+    assert any(row["feed_forward"].any() for row in rows) != told
+
+
+def test_how_far_rubber_may_be_from_what_was_seen_follows_from_its_table() -> None:
+    """Friction 2 % a degree: a tenth more below, a tenth less above."""
+    degC = np.arange(-40.0, 61.0, 0.1)
+    low, high = like_seen((10.0, 20.0), degC, np.exp(-0.02 * degC))
+    assert low == pytest.approx(10.0 - math.log(1.1) / 0.02, abs=0.11)
+    assert high == pytest.approx(20.0 - math.log(0.9) / 0.02, abs=0.11)
+    assert like_seen((10.0, 20.0), degC, np.ones(degC.size)) == (-math.inf, math.inf)
+    assert like_seen((-math.inf, math.inf), degC, np.exp(-0.02 * degC)) == (-math.inf, math.inf)
+
+
 @pytest.mark.parametrize("heldout", [800.0, {"nominal": 1e5, "calibrated": 800.0}])
 def test_a_residual_of_five_times_the_calibrations_is_implausible_for_as_long_as_it_lasts(heldout: object) -> None:
     """800 N m held out; of 24 kN m, 3.2 and 4.8 are no residual that would be told without that."""
@@ -573,6 +597,22 @@ def test_a_residual_of_five_times_the_calibrations_is_implausible_for_as_long_as
     assert not any(told[:700])
     assert all(told[750:900])
     assert not any(told[1000:])
+
+
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_a_machine_that_never_was_as_its_calibration_is_told_at_once(calibrated: bool) -> None:
+    """Its torque is 1.4 times the estimate from the first sample on; without a calibration that is how it may be."""
+    note = {"calibration": {"heldout_rmse_Nm": {"sheet": 1e5, "calibrated": 800.0}}} if calibrated else {}
+    estimator, told = Estimator(VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor(), provenance=note)), []
+    for i in range(1500):
+        for side in (0, 1):
+            for row in estimator.push(side, T0 + i * PERIOD_NS, 0.3 * math.sin(0.7 * 0.01 * i))[0]:
+                told += [0.01 * i] if "residual implausible" in doubts(row) else []
+                estimator.push(2, T0 + i * PERIOD_NS, 1.4 * float(row["predicted"]))
+    assert bool(told) == calibrated
+    if calibrated:
+        assert min(told) < 1.5  # the joint has hardly turned by then
+        assert len(told) > 1000  # and for most of each stroke
 
 
 def test_a_plan_of_more_points_than_are_kept_is_not_even_read() -> None:
@@ -720,6 +760,51 @@ def test_a_clock_set_back_takes_the_feed_forward_to_zero_until_the_bristle_is_kn
     steps = np.diff([row["feed_forward"] for _, row, _ in rows], axis=0)
     assert np.abs(steps).max() < 0.0101 * STIFFNESS
     assert after[-1][1]["feed_forward"] == pytest.approx(after[-1][1]["torque"])
+
+
+@pytest.mark.parametrize("begin_s", [5.0, 6.0, 6.7, 8.9])
+def test_after_a_clock_set_back_the_measured_torque_tells_what_the_bristle_holds(begin_s: float) -> None:
+    """Long before the joint has turned far enough to make all starts alike (1.2 s or more without)."""
+    vehicle = VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor())
+    estimator, never, off, doubted = Estimator(vehicle), Estimator(vehicle), [], []
+    for i in range(1200):
+        t = 0.01 * i
+        back_ns = 3600 * SECOND if t >= begin_s else 0
+        for side, share in enumerate((1.0, 0.95)):
+            angle = share * 0.3 * math.sin(0.7 * t)
+            true = [float(row["total"]) for row in never.push(side, T0 + i * PERIOD_NS, angle)[0]]
+            for row in estimator.push(side, T0 + i * PERIOD_NS - back_ns, angle)[0]:
+                off.append((t - begin_s, abs(float(row["total"]) - true[0])))
+                doubted += [t - begin_s] if row["doubts"] else []
+                estimator.push(2, T0 + i * PERIOD_NS - back_ns, true[0])
+    assert estimator.restarts == 1
+    assert max(doubted) < 0.5
+    assert max(error for since, error in off if 0.0 < since < 0.1) > 0.3 * STATIC_NM  # nothing had told of it yet
+    assert max(error for since, error in off if since > 0.25) < 0.06 * STATIC_NM
+
+
+@pytest.mark.parametrize("hours", [1, -1])
+def test_a_clock_that_is_wrong_for_a_second_costs_no_heat(hours: int) -> None:
+    """An hour ahead and back again, or back and ahead again: the torque is soon that of a sound clock, the temperature at once."""
+    vehicle = VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor())
+    estimator, never, rows = Estimator(vehicle), Estimator(vehicle), []
+    for i in range(2600):
+        t = 0.01 * i
+        stamp_ns = T0 + i * PERIOD_NS
+        wrong_ns = stamp_ns + (hours * 3600 * SECOND if 20.0 <= t < 21.0 else 0)
+        for side, share in enumerate((1.0, 0.95)):
+            angle = share * 0.3 * math.sin(0.7 * t)
+            true = [row.copy() for row in never.push(side, stamp_ns, angle)[0]]
+            for row in estimator.push(side, wrong_ns, angle)[0]:
+                rows.append((t, row.copy(), true[0]))
+                estimator.push(2, wrong_ns, float(true[0]["total"]))
+        never.push(2, stamp_ns, float(true[0]["total"]))
+    heat = [abs(row["temperature"] - true["temperature"]).max() for t, row, true in rows if t > 21.1]
+    assert max(rows[2000][2]["temperature"]) > 18.0
+    assert max(heat) < 0.2
+    off = [abs(float(row["total"] - true["total"])) for t, row, true in rows if t > 21.4]
+    assert max(off) < 0.06 * STATIC_NM
+    assert max(t for t, row, _ in rows if row["doubts"]) < 21.6
 
 
 def test_the_inertia_of_a_plan_counts() -> None:

@@ -21,7 +21,7 @@ from lugre_steering.chain.step import torque_side
 from lugre_steering.data.dataset import prepare
 from lugre_steering.errors import DataError
 from lugre_steering.estimator import Estimator, Options, doubts
-from lugre_steering.estimator.state_file import Ownership, read_state, write_state
+from lugre_steering.estimator.state_file import Ownership, read_learned, read_state, write_state
 from lugre_steering.fitting.causal import causal_rmse
 from lugre_steering.recording import Array, Recording
 from lugre_steering.vehicle import EffectEntry, Vehicle, load
@@ -128,6 +128,30 @@ def test_a_state_that_is_of_no_use_is_refused(tmp_path: Path, spoil: str) -> Non
         write_state(file, VEHICLE, memory)
     with pytest.raises(DataError):
         read_state(file, vehicle, now_ns, 3600.0)
+
+
+def test_of_state_and_what_was_learned_damage_costs_one_and_age_only_the_state(tmp_path: Path) -> None:
+    file, estimator, learned = tmp_path / "state.json", Estimator(VEHICLE), {"record": "AAAA"}
+    steer(estimator, 0, 100)
+    write_state(file, VEHICLE, estimator.memory)
+    assert read_learned(file, VEHICLE) is None  # as earlier versions wrote it
+    write_state(file, VEHICLE, estimator.memory, learned)
+    text, now_ns = file.read_text(), T0 + 2 * SECOND
+    assert read_learned(file, VEHICLE) == learned
+    assert read_state(file, VEHICLE, now_ns, 3600.0) == estimator.memory
+    with pytest.raises(DataError, match="old"):
+        read_state(file, VEHICLE, now_ns + 10_000 * SECOND, 3600.0)
+    with pytest.raises(DataError, match="of another vehicle file"):
+        read_learned(file, VEHICLE.replace(name="another"))
+    for damaged in ("BAAA", None):
+        file.write_text(text.replace('{"record": "AAAA"', f'{{"record": {json.dumps(damaged)}'))
+        with pytest.raises(DataError, match="damaged"):
+            read_learned(file, VEHICLE)
+        assert read_state(file, VEHICLE, now_ns, 3600.0) == estimator.memory
+    file.write_text(text.replace('"z": ', '"z": 1'))
+    with pytest.raises(DataError, match="damaged"):
+        read_state(file, VEHICLE, now_ns, 3600.0)
+    assert read_learned(file, VEHICLE) == learned
 
 
 def test_a_state_of_another_model_is_refused_and_nothing_changed() -> None:

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What feed-forward is worth: a hydraulic steering axle in closed loop with the real node, over real topics.
 
-The node runs in simulated time and in step with the plant: each period (5 ms) the plant sends its angles, the node answers with
-its feed-forward, and the controller acts upon it in the next period. So the figures do not depend on how busy the computer is. The
-plan is published as steering/command; the node looks one period and the valve's delay ahead. Compared: no feed-forward; a friction of
-constant size against the planned motion; the original LuGre model (no heating) and the improved one, both calibrated on recordings of
-this plant without feed-forward, whose sheet does not know its rubber stop; the vehicle file that a diagnosis of the same recordings
-writes; nine tenths of what these say; and a wrong model (twice the friction), without and with the limit of value that the node keeps.
-At last the seals of the same axle's cylinders rub too: nothing fed forward, the diagnosed file that does not know of it, and the same
-file with that friction declared.
+The node runs in simulated time and in step with the plant: each period (5 ms) the plant sends its angles and line pressures, the node
+answers with its feed-forward, and the controller acts upon it in the next period. So the figures do not depend on how busy the computer
+is. With the pressures the node judges its model too: one whose residual is implausible is not fed forward. The plan is published as
+steering/command; the node looks one period and the valve's delay ahead. Compared: no feed-forward; a friction of constant size against
+the planned motion; the original LuGre model (no heating) and the improved one, both calibrated on recordings of this plant without feed-
+forward, whose sheet does not know its rubber stop; the vehicle file that a diagnosis of the same recordings writes; nine tenths of what
+these say; and a wrong model (twice the friction), without and with the limit of value that the node keeps. At last the seals of the same
+axle's cylinders rub too: nothing fed forward, the diagnosed file that does not know of it, and what a diagnosis of the axle as it is now
+writes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -33,15 +34,14 @@ from lugre_steering.bench.hydraulic_loop import Side, hydraulics_of
 from lugre_steering.bench.neighbour import SECOND, NodeProcess, use_own_domain
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.diagnosis.library import diagnose
-from lugre_steering.proof.field.hidden import cylinder_friction
 from lugre_steering.proof.field.hydraulics import gains
 from lugre_steering.proof.field.machine import Machine, track_angles
 from lugre_steering.proof.field.motion import strokes
 from lugre_steering.proof.field.rubber import table
 from lugre_steering.proof.field.simulator import Setting, draw_setting
 from lugre_steering.provenance import Provenance, provenance
-from lugre_steering.recording import NODE, Array, Recording
-from lugre_steering.vehicle import EffectEntry, Vehicle, load, save
+from lugre_steering.recording import NODE, Array, Kind, Recording
+from lugre_steering.vehicle import Vehicle, load, save
 from lugre_steering.vehicle.actuation import line_pressures, total_gains
 from lugre_steering.vehicle.model import baseline_parameters
 
@@ -97,14 +97,15 @@ def reference(machine: Machine, seconds: float, way: float = 1.0) -> tuple[Array
 class Controller:
     """The node's neighbour in step with it: angles, clock and plans out, feed-forward in."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, pressures: bool = True) -> None:
+        """``pressures``: whether they are published, too."""
         import rclpy
         from rclpy.qos import QoSProfile, qos_profile_sensor_data
         from rosgraph_msgs.msg import Clock
-        from sensor_msgs.msg import JointState
+        from sensor_msgs.msg import FluidPressure, JointState
         from trajectory_msgs.msg import JointTrajectory
 
-        self._topics = vehicle.topics
+        self.vehicle, self._topics = vehicle, vehicle.topics
         self._context = rclpy.Context()
         rclpy.init(context=self._context, args=[])
         self.node = rclpy.create_node("controller", context=self._context)
@@ -112,6 +113,8 @@ class Controller:
         self._executor.add_node(self.node)
         topics = vehicle.topics.left, vehicle.topics.right
         self._angle = [self.node.create_publisher(JointState, topic, QoSProfile(depth=10)) for topic in topics]
+        lines = [channel.topic for channel in vehicle.channels if pressures and channel.kind is Kind.PRESSURE]
+        self._pressure = [self.node.create_publisher(FluidPressure, topic, QoSProfile(depth=10)) for topic in lines]
         self._clock = self.node.create_publisher(Clock, "/clock", qos_profile_sensor_data)
         self._plan = self.node.create_publisher(JointTrajectory, "steering/command", QoSProfile(depth=10))
         self._heard: tuple[int, list[float]] = (0, [0.0, 0.0])
@@ -123,7 +126,8 @@ class Controller:
     def join(self) -> None:
         """Until the node has joined the topics."""
         end = time.monotonic() + 60.0
-        while any(p.get_subscription_count() == 0 for p in (*self._angle, self._clock, self._plan)) and time.monotonic() < end:
+        own = (*self._angle, *self._pressure, self._clock, self._plan)
+        while any(publisher.get_subscription_count() == 0 for publisher in own) and time.monotonic() < end:
             time.sleep(0.02)
         time.sleep(0.5)
 
@@ -131,14 +135,18 @@ class Controller:
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    def ask(self, stamp_ns: int, angles: list[float]) -> list[float] | None:
-        """The feed-forward [N m] for these angles; None if none came in time."""
+    def ask(self, stamp_ns: int, angles: list[float], pressures: Sequence[float]) -> list[float] | None:
+        """The feed-forward [N m] for these angles; None if none came in time. The pressures [Pa] of the same instant come before them."""
         from builtin_interfaces.msg import Time
         from rosgraph_msgs.msg import Clock
-        from sensor_msgs.msg import JointState
+        from sensor_msgs.msg import FluidPressure, JointState
 
         stamp = Time(sec=stamp_ns // SECOND, nanosec=stamp_ns % SECOND)
         self._clock.publish(Clock(clock=stamp))
+        for publisher, pressure in zip(self._pressure, pressures, strict=False):  # there may be none
+            message = FluidPressure(fluid_pressure=pressure)
+            message.header.stamp = stamp
+            publisher.publish(message)
         for publisher, joint, angle in zip(self._angle, (self._topics.left_joint, self._topics.right_joint), angles, strict=True):
             message = JointState(name=[joint], position=[angle])
             message.header.stamp = stamp
@@ -189,8 +197,8 @@ def drive(
         if controller is not None:
             if i % PLAN_EVERY == 0:
                 controller.plan(stamp_ns, wanted[:, i : i + round(PLAN_S / PERIOD_S)])
-            seen = [side.angle + np.radians(0.01) * float(rng.standard_normal()) for side in sides]
-            answer = controller.ask(stamp_ns, seen)
+            seen, shown = shown_by(controller.vehicle, angles[:, i : i + 1], loads[:, i : i + 1], rng)
+            answer = controller.ask(stamp_ns, seen[:, 0].tolist(), shown[:, 0].tolist())
             late += answer is None
             fed = answer or fed
     error = np.degrees(wanted - angles)
@@ -209,31 +217,41 @@ def sheet_of(setting: Setting, folder: Path) -> Vehicle:
     return load(folder / "vehicle.yaml")
 
 
-def recorded(setting: Setting, sheet: Vehicle, way: float) -> Recording:
+def shown_by(sheet: Vehicle, angles: Array, loads: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Angles (2, n) [rad] and pressures (lines, n) [Pa] as the sensors show them."""
+    sensors = sheet.sensors
+    pressures = line_pressures(loads.sum(axis=0), total_gains(sheet, angles))
+    pressures = pressures + sensors.pressure_noise_Pa * rng.standard_normal(pressures.shape)
+    return angles + np.radians(sensors.angle_noise_deg) * rng.standard_normal(angles.shape), pressures
+
+
+def recorded(setting: Setting, sheet: Vehicle, way: float, seals: bool = False) -> Recording:
     """The plant without feed-forward, as its sensors show it."""
     assert sheet.hydraulics is not None
-    run_, rng, sensors = drive(NONE, setting, RECORD_S, way=way), np.random.default_rng(2), sheet.sensors
-    pressures = line_pressures(run_.loads.sum(axis=0), total_gains(sheet, run_.angles))
-    pressures = pressures + sensors.pressure_noise_Pa * rng.standard_normal(pressures.shape)
-    angles = run_.angles + np.radians(sensors.angle_noise_deg) * rng.standard_normal(run_.angles.shape)
+    run_ = drive(NONE, setting, RECORD_S, way=way, seals=seals)
+    angles, pressures = shown_by(sheet, run_.angles, run_.loads, np.random.default_rng(2))
     named = dict(zip(sheet.sides, angles, strict=True)), dict(zip(sheet.hydraulics.lines, pressures, strict=True))
     return Recording.from_arrays(run_.time, angle=named[0], pressure=named[1], name="there" if way > 0.0 else "mirrored")
+
+
+def found_in(recordings: Sequence[Recording], sheet: Vehicle) -> Vehicle:
+    """The vehicle file that a diagnosis writes; what it says and how long it took goes to the standard error."""
+    begin = time.monotonic()
+    diagnosis = diagnose(recordings, sheet)
+    print(f"({time.monotonic() - begin:.0f} s) {diagnosis.statement}", file=sys.stderr, flush=True)
+    return diagnosis.augmented.vehicle
 
 
 def models(setting: Setting, folder: Path) -> Mapping[str, Fed]:
     """What to compare, calibrated on and found in recordings of the plant."""
     sheet = sheet_of(setting, folder)
     recordings = [recorded(setting, sheet, way) for way in (1.0, -1.0)]
-    improved, diagnosis = calibrate(recordings, sheet).calibrated, diagnose(recordings, sheet)
-    print(diagnosis.statement, file=sys.stderr, flush=True)
-    found = diagnosis.augmented.vehicle
+    improved, found = calibrate(recordings, sheet).with_provenance(), found_in(recordings, sheet)
+    rubbing = found_in([recorded(setting, sheet, way, seals=True) for way in (1.0, -1.0)], sheet)
     axle = improved.axle
     assert axle is not None
     wrong = improved.replace(axle=dataclasses.replace(axle, load_N=2.0 * axle.load_N))
     limit = 1.1 * float(baseline_parameters(found)["static_torque"])
-    coulomb_Nm = 2.0 * SEAL_SHARE * setting.ground.sliding_Nm  # of both sides
-    seals = EffectEntry(cylinder_friction.__name__, {"coulomb": coulomb_Nm, "load_share": SEAL_LOAD_SHARE, "holding": 0.0})
-    others = tuple(effect for effect in found.effects if effect.id != seals.id)
     return {
         "original LuGre": Fed(improved.replace(rubber=None)),
         "improved": Fed(improved),
@@ -243,12 +261,12 @@ def models(setting: Setting, folder: Path) -> Mapping[str, Fed]:
         "wrong model": Fed(wrong),
         "wrong model, limited": Fed(wrong, ("-p", f"feed_forward_limit_Nm:={limit:.1f}")),
         "seals rub, not known": Fed(found, share=0.9, seals=True),
-        "seals rub, known": Fed(found.replace(effects=(*others, seals)), share=0.9, seals=True),
+        "seals rub, as diagnosed": Fed(rubbing, share=0.9, seals=True),
     }
 
 
-def campaign(seed: int, seconds: float) -> list[Run]:
-    """All runs."""
+def campaign(seed: int, seconds: float, pressures: bool = True) -> list[Run]:
+    """All runs; ``pressures``: whether the node gets them."""
     setting = draw_setting(seed, "clean", "white")
     runs = [drive(NONE, setting, seconds)]
     with tempfile.TemporaryDirectory() as name:
@@ -262,7 +280,7 @@ def campaign(seed: int, seconds: float) -> list[Run]:
             save(fed.vehicle, file)
             common = ("-p", "use_sim_time:=true", "-p", f"feed_forward_horizon_s:={AHEAD_S}", "-p", "recovery_ramp_s:=0.2")
             node = NodeProcess(file, folder / "node.log", *common, *fed.arguments)
-            controller = Controller(fed.vehicle)
+            controller = Controller(fed.vehicle, pressures)
             try:
                 controller.join()
                 runs.append(drive(label, setting, seconds, controller, share=fed.share, seals=fed.seals))
@@ -295,11 +313,12 @@ def run(argv: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="bench closed_loop", description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="of the manoeuvre, at most")
     parser.add_argument("--seed", type=int, default=11, help="of the machine")
+    parser.add_argument("--no-pressures", action="store_true", help="the node gets angles only, so that nothing judges its model")
     parser.add_argument("--out", type=Path, help="file of the picture (.png)")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args(argv)
     use_own_domain()
-    runs = campaign(options.seed, options.seconds)
+    runs = campaign(options.seed, options.seconds, not options.no_pressures)
     _tell(runs, options.json)
     if options.out is not None:
         made = provenance("bench closed_loop", {"seed": options.seed, "seconds": options.seconds})

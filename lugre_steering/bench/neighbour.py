@@ -142,10 +142,10 @@ class Neighbour:
         self.sent: list[Sample] = []
         self.clean: list[Sample] = []
         self.torque: list[tuple[int, float]] = []
-        self.feed_forward: list[tuple[int, float]] = []
+        self.feed_forward: list[tuple[int, list[float]]] = []
         self.residual: list[tuple[int, float]] = []
-        self.left: list[tuple[int, float]] = []
-        self.commands: list[tuple[float, float]] = []
+        self.estimate: list[tuple[int, list[float]]] = []
+        self.commands: list[tuple[float, list[float]]] = []
         self.told: list[tuple[int, str]] = []
         self.phase = 0.0
         self.moved: Callable[[float], None] = lambda _: None
@@ -168,8 +168,8 @@ class Neighbour:
 
         listen(WrenchStamped, f"/{NODE}/torque", lambda m: self.torque.append((_ns(m.header.stamp), m.wrench.torque.z)))
         listen(WrenchStamped, f"/{NODE}/residual", lambda m: self.residual.append((_ns(m.header.stamp), m.wrench.torque.z)))
-        listen(JointState, f"/{NODE}/feed_forward", lambda m: self.feed_forward.append((_ns(m.header.stamp), m.effort[0])))
-        listen(JointState, f"/{NODE}/estimate", lambda m: self.left.append((_ns(m.header.stamp), m.effort[0])))
+        listen(JointState, f"/{NODE}/feed_forward", lambda m: self.feed_forward.append((_ns(m.header.stamp), list(m.effort))))
+        listen(JointState, f"/{NODE}/estimate", lambda m: self.estimate.append((_ns(m.header.stamp), list(m.effort))))
         # At the time of sending: how fast they change must not depend on when this busy process hears them.
         listen(Float64MultiArray, f"/{NODE}/feed_forward/commands", self._keep_command)
         listen(DiagnosticArray, "/diagnostics", self._keep_told)
@@ -250,7 +250,7 @@ class Neighbour:
             self._clock.publish(message)
 
     def _keep_command(self, message: Any, info: Any) -> None:
-        self.commands.append((info["source_timestamp"] / SECOND, message.data[0]))
+        self.commands.append((info["source_timestamp"] / SECOND, list(message.data)))
 
     def _keep_told(self, message: Any) -> None:
         text = "; ".join(status.message for status in message.status)

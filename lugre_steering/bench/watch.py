@@ -8,6 +8,9 @@ of neighbouring manoeuvres (30 on average) from either bag again and again: what
 next is kept, and days unlike the one of the calibration come and go. The threshold that gives the nominal rate is found on
 one half of the machines and checked on the other.
 
+Beside it is told how large the error of a manoeuvre of each recording is (median), as a multiple of what the calibration left on held-out
+stretches of the first: why no bound near that can tell a wrong model from another day.
+
 The delay is counted from a change, after a thousand undisturbed manoeuvres, to manoeuvres of the same drive with a hidden effect.
 """
 
@@ -30,6 +33,7 @@ from lugre_steering.bag.load import read_recording
 from lugre_steering.calibration.library import calibrate
 from lugre_steering.errors import LugreSteeringError
 from lugre_steering.estimator import Estimator
+from lugre_steering.estimator.known import known_range
 from lugre_steering.proof.campaign import NOISES
 from lugre_steering.proof.field.hidden import IN_SERVICE as CHANGES
 from lugre_steering.proof.field.simulator import Setting, draw_setting, simulate
@@ -58,10 +62,10 @@ def scores_of(vehicle: Vehicle, bag: Path) -> Scores:
     samples = in_stamp_order(recording, vehicle.channels)
     estimates, residuals = Estimator(vehicle).push_block(*samples)
     watch, found, at = Watch(vehicle, math.inf), [], 0
-    angles = estimates["theta"][:, : len(vehicle.sides)].mean(axis=1)
+    angles = estimates["theta"][:, : len(vehicle.sides)].tolist()
     for row in residuals:
         while at < estimates.size and estimates["stamp_ns"][at] <= row["stamp_ns"]:
-            watch.turned(float(angles[at]))
+            watch.turned(angles[at])
             at += 1
         watch.scores = []
         watch.add(int(row["stamp_ns"]), float(row["residual"]))
@@ -104,7 +108,7 @@ def machine_of(seed: int, folder: Path) -> tuple[Setting, Vehicle, list[Scores]]
     manoeuvres."""
     setting = draw_setting(seed, "dirty", NOISES[seed % len(NOISES)])
     bags = simulate(setting, []).write(folder, folder / "unseen")
-    vehicle = calibrate([bags[0]], load(folder / "vehicle.yaml")).calibrated
+    vehicle = calibrate([bags[0]], load(folder / "vehicle.yaml")).with_provenance()
     return setting, vehicle, [found for bag in bags if (found := scores_of(vehicle, bag)).scores.shape[0] >= 10]
 
 
@@ -150,7 +154,8 @@ def run(argv: list[str]) -> None:
             hours[i] = options.hours
             if i % 4 == 0:
                 late.append(delays(setting, vehicle, bags, folder, rng))
-            print(f"machine {i}: {counts[i].tolist()}", file=sys.stderr, flush=True)
+            times = ", ".join(f"{np.exp(np.median(bag.scores[:, 0])) / known_range(vehicle).rmse:.1f}" for bag in bags)
+            print(f"machine {i}: {counts[i].tolist()}; errors {times} times the calibration's", file=sys.stderr, flush=True)
     _tell(counts, hours, late, options.json)
 
 

@@ -212,7 +212,7 @@ def _summed_up(
         data_quality=tuple(found),
         statement=units.words(problem.vehicle, first + statement(rows, rmse, held, weak, assumed)),
         calibrated=calibrated,
-        seen=seen_range(problem.vehicle, problem.runs),
+        seen=seen_range(calibrated, problem.runs, problem.starts(fitted.fit.x)),
         per_bag=tuple(_per_bag(problem, fitted)),
         vehicle_name=problem.vehicle.name,
     )

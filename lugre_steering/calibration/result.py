@@ -126,8 +126,9 @@ class Calibration(Result):
     data_quality: tuple[BagFinding, ...] = field(metadata=in_order("bag", "finding", "topic", "statement", "intervals_s"))
     statement: str
     calibrated: Vehicle = field(repr=False, metadata=IN_MEMORY)
-    seen: Mapping[str, float] = field(repr=False, metadata=IN_MEMORY)
-    """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``; of a linear axis ``position_m``, ``rate_m_s``."""
+    seen: Mapping[str, float | list[float]] = field(repr=False, metadata=IN_MEMORY)
+    """Largest angle and rate in the recordings: ``angle_deg``, ``rate_deg_s``; of a linear axis ``position_m``, ``rate_m_s``; and
+    ``rubber_degC``, the coldest and the warmest rubber."""
     picture: str | None = None
     picture_note: str | None = None
     per_bag: tuple[BagErrors, ...] = field(default=(), metadata=ADDED)

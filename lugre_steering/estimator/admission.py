@@ -99,6 +99,7 @@ def _set_side_back(core, side, stamp_ns):
     fastest = g.fastest
     core.motion[side], core.trust[side], core.guard[side] = nothing.motion, nothing.trust, nothing.guard
     g.fastest, g.set_back = fastest, state.started != 0.0
+    g.back_from_ns, g.back_to_ns = core.channels[side].last_ns, stamp_ns
 
 
 @inner
@@ -110,6 +111,8 @@ def _forget_samples(core, k):
     core.channels[k].reasons[RESTART] += 1
     core.channels[k].reasons[OVERRUN] += c.pending_count
     c.start_ns = 0
+    c.start_known = False
+    c.start_residual_ns = c.begin_ns = 0
     c.lagged_ns = 0
     c.pending_count = 0
     c.plan_size = 0

@@ -70,7 +70,7 @@ SUDDEN_MEMORY_S, SUDDEN_SHARE = 0.1, 0.35
 """A residual as large as the torque, where that is at least this share of the static friction, needs no long look."""
 REFUSED_S = 0.5
 """A command that could not be used, with no plan in force, is forgotten after this."""
-BOUND_MEMORY_S, BOUND_CAP = 0.5, 4.0
+BOUND_MEMORY_S, BOUND_CAP = 0.4, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
 
 DOUBTS = (
@@ -78,11 +78,11 @@ DOUBTS = (
     "outside the range of the calibration", "plan far from the angle", "plan has run out", "pressure frozen", "unseen motion",
     "outside the range of a law", "left and right angle contradict", "angle and rate contradict",
     "command refused", "time jumped", "pressures exchanged",
-    "pressure below range",
+    "pressure below range", "rubber temperature outside the range of the calibration",
 )  # fmt: skip
 (
     JUMPED, FROZEN, NOISY, RESIDUAL, TABLE, RANGE, PLAN_AWAY, PLAN_OUT, LINE, UNSEEN, LAW, APART, CONTRARY, REFUSED, SET_BACK,
-    EXCHANGED, BROKEN,
+    EXCHANGED, BROKEN, HEAT,
 ) = (1 << bit for bit in range(len(DOUBTS)))  # fmt: skip
 
 INPUTS = JUMPED | FROZEN | NOISY | LINE | UNSEEN | APART | CONTRARY | SET_BACK | EXCHANGED | BROKEN
@@ -115,6 +115,8 @@ GUARD = np.dtype(
         ("set_back", np.bool_),  # it is not known because the clock was set back
         ("jumped_ns", np.int64),  # stamp of the sample before the time last jumped forward; 0: it never did
         ("jumped_to_ns", np.int64),  # stamp that it jumped to
+        ("back_from_ns", np.int64),  # stamp of the sample before the clock was last set back; 0: it was not, or has been set forth again
+        ("back_to_ns", np.int64),  # stamp that it was set back to
         ("frozen_ns", np.int64),  # since when it has stood where it is frozen; 0: it is not
         ("frozen_at", np.float64),  # reading then [rad]
         ("stands", np.bool_),  # it seemed frozen and went on from there: to stand but for its noise is no fault

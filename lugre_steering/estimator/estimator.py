@@ -24,7 +24,7 @@ from lugre_steering.errors import DataError
 from lugre_steering.estimator.admission import REJECTED, admit
 from lugre_steering.estimator.doubt import DOUBTS, GUARD
 from lugre_steering.estimator.held import hold
-from lugre_steering.estimator.known import known_range
+from lugre_steering.estimator.known import known_range, like_seen, residual_bound
 from lugre_steering.estimator.layout import (
     CHANNEL,
     CONFIG,
@@ -58,8 +58,6 @@ WAITING_RING = 1024  # one side may come two seconds later than the other, at 50
 PLAN_POINTS = 1024
 LIMIT_FRICTION = 3.0
 LIMIT_RATE_RAD_S = 1.0
-BOUND_RMSE = 5.0
-"""A residual this many times as large as the held-out one of the calibration is implausible."""
 
 
 @dataclass(frozen=True)
@@ -411,7 +409,12 @@ def _config(vehicle: Vehicle, model: Model) -> Records:
     config["weight"] = 1.0
     config["side_ratio"] = _side_ratio(vehicle)
     known = known_range(vehicle)
-    config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, BOUND_RMSE * known.rmse
+    config["seen_angle"], config["seen_rate"], config["residual_bound"] = known.angle, known.rate, residual_bound(vehicle)
+    config["seen_coldest"], config["seen_warmest"] = -math.inf, math.inf
+    if vehicle.rubber is not None:
+        p = model.parameters[0][0]
+        degC = p["table_low"] + p["table_step"] * np.arange(len(model.rubber))
+        config["seen_coldest"], config["seen_warmest"] = like_seen(known.rubber, degC, model.rubber[:, 1])
     return config
 
 

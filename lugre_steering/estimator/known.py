@@ -8,20 +8,29 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
 
 SLACK = 1.1
 """The causal estimates of a motion swing a little farther than the smoothed ones that were kept."""
+LIKE_SHARE = 0.1
+"""Rubber may be so much colder or warmer than it was that its table changes the friction by this share."""
+BOUND_RMSE = 5.0
+"""A residual this many times as large as the held-out one of the calibration is implausible."""
 _DEG = math.pi / 180.0
 
 
 @dataclass(frozen=True)
 class KnownRange:
-    """Largest angle [rad] and rate [rad/s] that the calibration saw (inf: not told), and its held-out RMSE [N m] (0: none)."""
+    """Largest angle [rad] and rate [rad/s] that the calibration saw (inf: not told), its held-out RMSE [N m] (0: none), and the coldest and
+    the warmest rubber [degC] (infinite: not told)."""
 
     angle: float = math.inf
     rate: float = math.inf
     rmse: float = 0.0
+    rubber: tuple[float, float] = (-math.inf, math.inf)
 
 
 def known_range(vehicle: Vehicle) -> KnownRange:
@@ -36,7 +45,30 @@ def known_range(vehicle: Vehicle) -> KnownRange:
         next((si * value for key, si in keys if (value := _positive(seen.get(key)))), math.inf)
         for keys in ((("position_m", 1.0), ("angle_deg", _DEG)), (("rate_m_s", 1.0), ("rate_deg_s", _DEG)))
     )
-    return KnownRange(SLACK * angle, SLACK * rate, _positive(rmse))
+    return KnownRange(SLACK * angle, SLACK * rate, _positive(rmse), _ends(seen.get("rubber_degC")))
+
+
+def residual_bound(vehicle: Vehicle) -> float:
+    """Size [N m] from which on a residual is implausible, by what the calibration left; 0 without one."""
+    return BOUND_RMSE * known_range(vehicle).rmse
+
+
+def like_seen(seen: tuple[float, float], degC: Array, friction: Array) -> tuple[float, float]:
+    """From where to where [degC] the friction of a rubber table, at ``degC`` (n,), is still nearly that at the ends of what was ``seen``:
+    where the table says little of a change, it can be little wrong."""
+    (coldest, warmest), ends = seen, np.interp(seen, degC, friction)
+    unlike = [np.abs(friction / end - 1.0) > LIKE_SHARE for end in ends]
+    colder, warmer = degC[unlike[0] & (degC < coldest)], degC[unlike[1] & (degC > warmest)]
+    return float(colder.max(initial=-math.inf)), float(warmer.min(initial=math.inf))
+
+
+def _ends(value: object) -> tuple[float, float]:
+    """Two numbers in order, or all there are for anything else."""
+    if isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(end, (int, float)) for end in value):
+        low, high = map(float, value)
+        if math.isfinite(high - low) and low <= high:
+            return low, high
+    return -math.inf, math.inf
 
 
 def _positive(value: object) -> float:

@@ -91,6 +91,8 @@ CONFIG = np.dtype(
         ("friction", np.float64),  # the larger of static and sliding friction of all sides [N m]
         ("seen_angle", np.float64),  # largest angle [rad] and rate [rad/s] that the calibration saw; inf: not told
         ("seen_rate", np.float64),
+        ("seen_coldest", np.float64),  # rubber [degC] unlike all that it saw, colder or warmer; infinite: not told
+        ("seen_warmest", np.float64),
         ("released_ns", np.int64),  # stamp of the last feed-forward
         ("weight", np.float64),  # of the feed-forward, 0 ... 1
         ("limit", np.float64),  # of its value [N m] and rate [N m/s], each side

@@ -54,7 +54,7 @@ def form_residuals(core, first_line, residuals, count):
         look_for_exchange(core, e, at_ns, value, measured)
         if not c.start_known:
             if believed and c.exchanged == 0:
-                learn_start(core, e.stamp_ns, measured - e.predicted)
+                learn_start(core, e, measured - e.predicted)
             else:
                 c.start_residual_ns = 0
         if before_start(c, e.stamp_ns):

@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The file in which rubber temperature, bristles and memories survive a restart of the node."""
+"""The file in which rubber temperature, bristles, memories and what the watch has learned survive a restart of the node."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import json
 import os
 import tempfile
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,8 @@ LARGEST_BYTES = 1_000_000
 AHEAD_S = 1.0
 """A state may be this much ahead of the clock: clocks are set."""
 RETRY_S = 0.05
+Learned = Mapping[str, str]
+"""Texts, made and read by who has learned (``watch.detector``)."""
 
 
 class Ownership:
@@ -69,10 +72,16 @@ def _lock_of(file: Path) -> Path:
     return file.with_name(f".{file.name}.lock")
 
 
-def write_state(file: Path, vehicle: Vehicle, memory: Memory) -> None:
-    """Replace the file as a whole: after a power cut there is the old one or the new one. ``OSError`` if it cannot be."""
+def write_state(file: Path, vehicle: Vehicle, memory: Memory, learned: Learned | None = None) -> None:
+    """Replace the file as a whole: after a power cut there is the old one or the new one. ``OSError`` if it cannot be.
+
+    ``learned``: what else has been learned of this vehicle; it has a hash of its own, so that damage costs one or the other.
+    """
     body = {"schema": SCHEMA, "vehicle": identity(vehicle), "memory": memory}
-    text = json.dumps({**body, "sha256": _digest(body)}, allow_nan=False)
+    parts: dict[str, object] = {**body, "sha256": _digest(body)}
+    if learned is not None:
+        parts["learned"] = {**learned, "sha256": _digest(learned)}
+    text = json.dumps(parts, allow_nan=False)
     handle, name = tempfile.mkstemp(prefix=f".{file.name}.", dir=file.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as part:
@@ -88,28 +97,59 @@ def write_state(file: Path, vehicle: Vehicle, memory: Memory) -> None:
 
 def read_state(file: Path, vehicle: Vehicle, now_ns: int, max_age_s: float) -> Memory:
     """The memory in the file. ``DataError`` says why one is not used: damaged, of another vehicle file, too old, ahead."""
+    content = _content(file, vehicle)
+    content.pop("learned", None)
     try:
-        refuse_irregular(file)
-        with file.open("rb") as stream:
-            content: Any = json.loads(stream.read(LARGEST_BYTES))
-        found = content.pop("sha256")
-        sound = content["schema"] == SCHEMA and found == _digest(content)
+        sound = content.pop("sha256") == _digest(content)
         stamps_ns = [side["stamp_ns"] for side in content["memory"]["sides"].values()]
         sound = sound and all(abs(stamp_ns) < 2**63 for stamp_ns in stamps_ns)
         last_ns = max(stamps_ns)
-    except OSError as error:
-        raise DataError(f"{file}: cannot be read ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise DataError(f"{file}: is damaged or no state of this node") from error
+        raise _damaged(file) from error
     if not sound:
-        raise DataError(f"{file}: is damaged or of another version")
-    if content["vehicle"] != identity(vehicle):
-        raise DataError(f"{file}: is of another vehicle file")
+        raise _damaged(file)
     age_s = (now_ns - last_ns) * 1e-9
     if not -AHEAD_S <= age_s <= max_age_s:
         raise DataError(f"{file}: its last sample is {age_s:.0f} s old, expected at most state_max_age_s ({max_age_s:g})")
     memory: Memory = content["memory"]
     return memory
+
+
+def read_learned(file: Path, vehicle: Vehicle) -> Learned | None:
+    """What else has been learned of the vehicle, however long ago; None in a file of an earlier version. ``DataError`` if it is damaged
+    or of another vehicle file."""
+    learned = _content(file, vehicle).get("learned")
+    if learned is None:
+        return None
+    try:
+        sound = learned.pop("sha256") == _digest(learned)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise _damaged(file) from error
+    if not sound:
+        raise _damaged(file)
+    return {str(key): str(text) for key, text in learned.items()}
+
+
+def _content(file: Path, vehicle: Vehicle) -> dict[str, Any]:
+    """All that is in the file, if it is of this vehicle; the hashes of its parts are not looked at."""
+    try:
+        refuse_irregular(file)
+        with file.open("rb") as stream:
+            content: dict[str, Any] = json.loads(stream.read(LARGEST_BYTES))
+        known, owner = content["schema"] == SCHEMA, content["vehicle"]
+    except OSError as error:
+        raise DataError(f"{file}: cannot be read ({error.strerror})") from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise _damaged(file) from error
+    if not known:
+        raise _damaged(file)
+    if owner != identity(vehicle):
+        raise DataError(f"{file}: is of another vehicle file")
+    return content
+
+
+def _damaged(file: Path) -> DataError:
+    return DataError(f"{file}: is damaged, of another version, or no state of this node")
 
 
 def _digest(body: object) -> str:

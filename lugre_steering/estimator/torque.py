@@ -13,6 +13,7 @@ from lugre_steering.chain.layout import BASELINE, STATE
 from lugre_steering.chain.rates import follow
 from lugre_steering.estimator.admission import ACCEPTED, RUNNING, restart
 from lugre_steering.estimator.doubt import (
+    HEAT,
     LAW,
     LEAP_RATE_RAD_S,
     RANGE,
@@ -105,7 +106,17 @@ def _complete(core, k, stamp_ns, e):
 
 
 @inner
-def _elapsed(c, ch, state, stamp_ns):
+def _set_forth(c, g, ahead_ns):
+    """How much of ``ahead_ns`` [ns] since the last sample is only that the clock was set back before, and is now right again."""
+    back_ns = g.back_from_ns - g.back_to_ns
+    if g.back_from_ns == 0 or ahead_ns <= c.forward_jump_ns or abs(ahead_ns - back_ns) >= c.backward_jump_ns:
+        return 0
+    g.back_from_ns = 0
+    return min(back_ns, ahead_ns - 1)
+
+
+@inner
+def _elapsed(c, ch, g, state, stamp_ns):
     """Time [s] since the last sample of the side; the clock of a side without any begins with the first side's."""
     if c.start_ns == 0 or stamp_ns < c.start_ns:
         c.start_ns = stamp_ns
@@ -114,6 +125,8 @@ def _elapsed(c, ch, state, stamp_ns):
             state.time = max(0.0, (stamp_ns - c.start_ns) * 1e-9)
         return 0.0
     ch.period_ns = stamp_ns - ch.last_ns
+    if g.back_from_ns != 0:
+        ch.period_ns -= _set_forth(c, g, ch.period_ns)
     return ch.period_ns * 1e-9
 
 
@@ -153,6 +166,8 @@ def _outside(c, state, motion, saturated, beyond):
     doubts = (TABLE if state.saturated > saturated else 0) | (LAW if beyond else 0)
     if abs(motion.theta) > c.seen_angle or abs(motion.omega) > c.seen_rate:
         doubts |= RANGE
+    if not c.seen_coldest < state.temperature < c.seen_warmest:
+        doubts |= HEAT
     return doubts
 
 
@@ -167,8 +182,8 @@ def advance(core, k, stamp_ns, value, rate, verdict, estimates, count):
     side = ch.index
     state, motion, output = row(core.state, side, STATE), core.motion[side], core.output[side]
     saturated, law_left = state.saturated, _law_left(core, side)
-    dt = _elapsed(c, ch, state, stamp_ns)
     g = core.guard[side]
+    dt = _elapsed(c, ch, g, state, stamp_ns)
     if g.set_back and ch.last_ns == 0:
         begin_again(core, side, stamp_ns, value)
     jumps, running = verdict != ACCEPTED, verdict == RUNNING

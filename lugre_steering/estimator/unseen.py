@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion that nobody saw: before the start, during a silence, a freeze or a jump. How the bristle came out of it is not known.
 
-At the start it is taken for relaxed, as on a track that was rolled straight, unless the first measured torque says otherwise.
+At the start it is taken for relaxed, as on a track that was rolled straight, unless the first measured torque says otherwise; so it is
+where the clock was set back.
 
 Of all the ways that the joint can have gone, dz = d theta - |d theta| z / length makes two lead to the ends of what the bristle can
 hold: first as far as possible to one side, then back to where the joint is now. Both are driven on beside the estimate. Every radian
@@ -91,8 +92,8 @@ def drive_bounds(core, side, dt):
 
 
 @inner
-def learn_start(core, stamp_ns, residual):
-    """The first measured torque is ``residual`` [N m] more than the estimate of that instant: how much bristles held at the start.
+def learn_start(core, e, residual):
+    """The first measured torque is ``residual`` [N m] more than the estimate ``e`` of that instant: how much bristles held at the start.
 
     Pressures tell only by their next samples whether the first ones were astray, so it is believed at the next residual. All sides hold
     the same share of what they can, as one torque does not tell them apart.
@@ -100,13 +101,14 @@ def learn_start(core, stamp_ns, residual):
     c, most = core.config[0], 0.0
     first, first_ns = c.start_residual, c.start_residual_ns
     if first_ns == 0:
-        c.start_residual, c.start_residual_ns = residual, stamp_ns
+        c.start_residual, c.start_residual_ns = residual, e.stamp_ns
         c.start_known = abs(residual) <= AGREED_SHARE * c.friction
         return
     c.start_known = True
     for side in range(core.motion.size):
         p = row(core.parameters, side, BASELINE)
-        most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, p.rubber_temperature)[0]
+        warm = e.temperature[side] if core.guard[side].set_back else p.rubber_temperature
+        most += most_friction(p) * ratios(core.rubber, p.table_low, p.table_step, warm)[0]
     if most > 0.0:
         c.start_share = max(-1.0, min(1.0, first / most))
         c.begin_ns = first_ns + BEGIN_NS
@@ -114,11 +116,17 @@ def learn_start(core, stamp_ns, residual):
 
 @inner
 def begin_held(core, side):
-    """The bristle of a side holds what is left of what it held at the start; what was deflected since has been taken from it."""
+    """The bristle of a side holds what is left of what it held at the start; what was deflected since has been taken from it. After the
+    clock was set back, when it has been deflected before, the two ways tell how much is left: half of what is between them."""
     c, g, state, p = core.config[0], core.guard[side], row(core.state, side, STATE), row(core.parameters, side, BASELINE)
     g.begun = True
-    if g.unseen_ns == 0 and p.sigma_0 > 0.0:
-        state.z += c.start_share * max(0.0, most_friction(p) / p.sigma_0 - state.z_max)
+    left = 0.0
+    if g.set_back:
+        left = 0.5 * abs(row(core.bounds, 2 * side, STATE).z - row(core.bounds, 2 * side + 1, STATE).z)
+    elif g.unseen_ns == 0 and p.sigma_0 > 0.0:
+        left = max(0.0, most_friction(p) / p.sigma_0 - state.z_max)
+    if left > 0.0:
+        state.z += c.start_share * left
         state.z_max = max(state.z_max, abs(state.z))
 
 

@@ -373,6 +373,10 @@ class Problem:
         air = (initial.air_temperature_degC if recorded is None else recorded) + warmer
         return air + initial.rubber_temperature_degC - initial.air_temperature_degC + excess, air
 
+    def starts(self, x: Array) -> list[tuple[float, float]]:
+        """``temperatures`` of all bags; none of a vehicle without rubber."""
+        return [] if self.vehicle.rubber is None else [self.temperatures(bag, x) for bag in range(len(self.runs))]
+
     def fields(self, x: Array) -> dict[str, float]:
         """Baseline parameter-record values for the calibration part of x."""
         sheet, values = self._sheet, dict[str, float]()

@@ -18,15 +18,18 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
+from lugre_steering.counted import counted
 from lugre_steering.effects.registry import add_files
 from lugre_steering.errors import DataError, LugreSteeringError
-from lugre_steering.estimator.state_file import Ownership, read_state, write_state
+from lugre_steering.estimator.state_file import Ownership, read_learned, read_state, write_state
 from lugre_steering.live.console import Console
 from lugre_steering.live.later import Later, Work
 from lugre_steering.live.parameters import changed, check_files, declare, undeclared
 from lugre_steering.live.session import LEAVE_S, TICK_S, Session
 from lugre_steering.recording import NODE
 from lugre_steering.vehicle import Vehicle, load
+from lugre_steering.watch.detector import UNCALIBRATED
+from lugre_steering.watch.window import Part
 
 LATENCY_WINDOW = 4096
 REPORT_S = 1.0
@@ -95,6 +98,8 @@ class SteeringTorqueEstimator(LifecycleNode):
             self.fault(error)
             return TransitionCallbackReturn.ERROR
         self._restore(self.session)
+        if not self.session.watch.bound_Nm:
+            self.get_logger().info(f"the watch tells changes only: {UNCALIBRATED}")
         if unknown := undeclared(self):
             self.get_logger().warning(f"no such parameter, not used: {', '.join(unknown)}")
         self.get_logger().info(
@@ -278,16 +283,17 @@ class SteeringTorqueEstimator(LifecycleNode):
         if self.session is not None:
             self.session.change(self.settings)
 
-    def _write_window(self, session: Session, write: Callable[[], tuple[Path, float]]) -> None:
+    def _write_window(self, session: Session, write: Callable[[], tuple[Path, Part]]) -> None:
         """Write the window of an alarm; that a disk is full is no fault of the torques."""
         try:
-            file, _ = write()
+            file, part = write()
         except OSError as error:
             session.health.window_trouble = str(error)
             self.get_logger().warning(f"window not written: {error}")
         else:
             session.health.window_trouble = ""
-            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}")
+            missing = f" ({part.missing})" if part.missing else ""
+            self.get_logger().warning(f"the model no longer matches: lugre-steering diagnose --window {file}{missing}")
 
     def _mark(self) -> Work:
         """Tell the mark in the report; with a folder for windows, write the one up to now, for diagnose."""
@@ -298,10 +304,10 @@ class SteeringTorqueEstimator(LifecycleNode):
         if write is None:
             return True, f"marked at {session.health.mark}; no window, as parameter 'watch_folder' names no folder for them"
         try:
-            file, seconds = yield write
+            file, part = yield write
         except OSError as error:
             return False, str(error)
-        return True, f"{file}\n{seconds:.1f} s"
+        return True, "\n".join(filter(None, [str(file), f"{part.seconds:.1f} s", part.missing]))
 
     def _reload(self) -> Work:
         """Take over what ``vehicle_file`` says now, all of it or nothing."""
@@ -329,6 +335,7 @@ class SteeringTorqueEstimator(LifecycleNode):
     def _restore(self, session: Session) -> None:
         file = self.settings.state_file
         if file is None:
+            self.get_logger().info("temperatures, bristles and what the watch learns are lost at the end: name a 'state_file' to keep them")
             return
         # The node in whose place this one comes may still be leaving.
         session.health.state_trouble = self._ownership.take(file, LEAVE_S + 1.0)
@@ -337,10 +344,21 @@ class SteeringTorqueEstimator(LifecycleNode):
             return
         if not file.exists():
             return
+        self._remember_usual(session, file)
         if session.simulated:  # its clock comes as a topic, not before the first samples
             session.before_first = lambda stamp_ns: self._resume(session, file, stamp_ns)
         else:
             self._resume(session, file, time.time_ns())
+
+    def _remember_usual(self, session: Session, file: Path) -> None:
+        """What the watch has learned is as true after a year."""
+        try:
+            learned = read_learned(file, session.vehicle)
+            if learned is not None:
+                session.watch.resume(learned)
+                self.get_logger().info(f"{file}: the watch goes on from {counted(session.watch.learned, 'manoeuvre')}")
+        except DataError as error:
+            self.get_logger().warning(f"the watch learns anew: {error}")
 
     def _resume(self, session: Session, file: Path, now_ns: int) -> None:
         try:
@@ -365,19 +383,19 @@ class SteeringTorqueEstimator(LifecycleNode):
         """What writes the present state, if there is to be a file and anything to keep; a failure is told, not raised."""
         self._saved_ns = time.monotonic_ns()
         file, session = self.settings.state_file, self.session
-        memory, vehicle = None, None
+        memory, learned, vehicle = None, None, None
         if session is not None:
             trouble = self._ownership.take(file) if file is not None else ""
             if file is None or trouble:
                 session.health.state_trouble = trouble
             else:
-                memory, vehicle = session.estimator.memory, session.vehicle
+                memory, learned, vehicle = session.estimator.memory, session.watch.memory, session.vehicle
 
         def write() -> None:
             if file is None or session is None or vehicle is None or not memory or not memory["sides"]:
                 return
             try:
-                write_state(file, vehicle, memory)
+                write_state(file, vehicle, memory, learned)
                 session.health.state_trouble = ""
             except (OSError, ValueError) as error:
                 session.health.state_trouble = f"{file}: state cannot be written: {error}"

@@ -67,11 +67,14 @@ class Health:
         self.active = True
         self.leaving = False
         self.mismatch_s = math.nan  # since when the watch says that the model no longer matches
+        self.watching = ""  # what the watch can tell
+        self.bound_Nm = 0.0  # of residuals, by the calibration; 0: none
         self.simulated = False
         self.namesakes = 0  # other nodes of the same name
         self.state_trouble = ""  # why the state cannot be kept
         self.window_trouble = ""  # why the last window of an alarm was not written
         self.mark = ""  # time and reason of the last window, written or not
+        self.window = ""  # the last one that was written, and what is missing in it
         self.doubted: Counter[str] = Counter()  # torques whose feed-forward was held back, by reason
         self._then_doubted: Counter[str] = Counter()
         self._kinds = [channel.kind for channel in vehicle.channels]
@@ -81,6 +84,8 @@ class Health:
         self.arrivals = [0] * len(self._kinds)
         self.arrived_ns = [0] * len(self._kinds)  # ROS time of the last message
         self.behind_ns = [0] * len(self._kinds)  # ROS time minus stamp of the last message
+        self.late = [0] * len(self._kinds)  # messages whose stamps were older than the timeout of their kind when they arrived
+        self._then_late = list(self.late)
         self.arrival_to_publish = Latencies(window)
         self.stamp_to_publish = Latencies(window)
         self.callbacks = 0
@@ -121,6 +126,14 @@ class Health:
     def set_topics(self, topics: Sequence[str]) -> None:
         """Full names of the input topics, in the order of the channels."""
         self._topics = list(topics)
+
+    def arrive(self, channel: int, now_ns: int, stamp_ns: int) -> None:
+        """A message of a channel has come."""
+        behind_ns = now_ns - stamp_ns
+        self.arrivals[channel] += 1
+        self.arrived_ns[channel], self.behind_ns[channel] = now_ns, behind_ns
+        if behind_ns > self._timeouts_s[channel] * 1e9:
+            self.late[channel] += 1
 
     def fault(self, error: BaseException, monotonic_ns: int) -> None:
         """Remember an exception; outputs are withheld until a second has passed without another."""
@@ -236,6 +249,7 @@ class Health:
             values[f"{label} age [s]"] = age_s
             if self.arrivals[i]:
                 values[f"{label} stamp behind clock [s]"] = self.behind_ns[i] * 1e-9
+                values[f"{label} late"] = self.late[i]
             if self._kinds[i] is Kind.AIR_TEMPERATURE:  # optional and slow
                 if self.arrivals[i] and not age_s <= AIR_LOST_S:
                     having.setdefault(STALE, []).append(label)
@@ -248,6 +262,10 @@ class Health:
                 hint = "" if self.simulated or abs(self.behind_ns[i]) < FAR_NS else f" ({OTHER_CLOCK})"
                 having.setdefault(f"stamps are not close to the clock{hint}", []).append(label)
                 level = max(level, WARN)
+            elif self.late[i] > self._then_late[i]:
+                having.setdefault("came late", []).append(label)
+                level = max(level, WARN)
+        self._then_late = list(self.late)
         troubles = [f"{', '.join(inputs)} {what}" for what, inputs in having.items()]
         measuring = [label for i, label in enumerate(labels) if self._kinds[i] in (Kind.PRESSURE, Kind.TORQUE)]
         if measuring and set(measuring) <= {label for what in (STALE, "missing") for label in having.get(what, [])}:
@@ -300,10 +318,16 @@ class Health:
             "residuals": self.residuals,
             "steps outside rubber table": saturated_steps,
         }
+        if self.bound_Nm:
+            values["implausible from [N m]"] = self.bound_Nm
+        if self.watching:
+            values["the watch tells"] = self.watching
         if unlike:
             values["no longer matches since [s]"] = self.mismatch_s
         if self.mark:
             values["last mark"] = self.mark
+        if self.window:
+            values["last window"] = self.window
         return self._status("residual", WARN if saturated or large or withheld or words or unlike or not count else OK, message, values)
 
     def _wrong_sheet(self) -> str:

@@ -27,7 +27,7 @@ from lugre_steering.recording import COMMAND, Array, IntArray
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.watch import detector
 from lugre_steering.watch.detector import Watch
-from lugre_steering.watch.window import SampleRing, write_window
+from lugre_steering.watch.window import Part, SampleRing, part_since, write_window
 
 LEAVE_S = 2.0
 """No longer does the last ramp to zero take: who stops the node waits a few seconds before he kills it."""
@@ -140,21 +140,24 @@ class Session:
         self.simulated = bool(clock.ros_time_is_active)
         self._now_ns = (lambda: int(clock.now().nanoseconds)) if self.simulated else time.time_ns
 
-    def window(self, reason: str) -> Callable[[], tuple[Path, float]] | None:
+    def window(self, reason: str) -> Callable[[], tuple[Path, Part]] | None:
         """Mark this moment in the report. What writes the samples of the time since the mismatch began, and of some time before, and says
-        where and how much time [s] they hold; None without a folder for them."""
+        where and which they are; None without a folder for them."""
         self.health.mark, self.news = f"{self._torque_ns * 1e-9:.3f} s: {reason}", True
         folder = self.settings.watch_folder
         if folder is None or self.samples is None:
             return None
         options, sheet = {"watch_before_s": self.settings.watch_before_s}, self._sheet
-        since_ns = (self.watch.since_ns or self._torque_ns) - round(self.settings.watch_before_s * 1e9)
+        onset_ns = self.watch.since_ns
+        since_ns = (onset_ns or self._torque_ns) - round(self.settings.watch_before_s * 1e9)
         kept, vehicle, file = self.samples.copy(), self.vehicle, folder / f"window_{self._torque_ns // 1_000_000}.npz"
 
-        def write() -> tuple[Path, float]:
-            rows = kept[kept["stamp_ns"] >= since_ns]
-            write_window(file, vehicle, reason, rows, made("node", options, sheet))
-            return file, float(np.ptp(rows["stamp_ns"])) * 1e-9 if rows.size else 0.0
+        def write() -> tuple[Path, Part]:
+            part = part_since(kept, since_ns, onset_ns)
+            why = f"{reason}; no match since {onset_ns * 1e-9:.3f} s" if onset_ns else reason
+            write_window(file, vehicle, "; ".join(filter(None, [why, part.missing])), part.samples, made("node", options, sheet))
+            self.health.window = " ".join(filter(None, [str(file), part.missing and f"({part.missing})"]))
+            return file, part
 
         return write
 
@@ -168,6 +171,7 @@ class Session:
         estimator, now_ns = self.estimator, self._now_ns()
         self.health.simulated, self.health.active = self.simulated, self.active
         self.health.mismatch_s = (now_ns - self.watch.since_ns) * 1e-9 if self.watch.since_ns else math.nan
+        self.health.bound_Nm, self.health.watching = self.watch.bound_Nm, self.watch.words
         self.health.told(now_ns, estimator.rejections)
         counters, steps = estimator.counters, estimator.saturated_steps
         return self.health.statuses(now_ns, monotonic_ns, elapsed_s, counters, steps, estimator.line_troubles)
@@ -189,9 +193,7 @@ class Session:
         begin_ns = time.monotonic_ns()
         health = self.health
         now_ns = self._now_ns()
-        health.arrivals[channel] += 1
-        health.arrived_ns[channel] = now_ns
-        health.behind_ns[channel] = now_ns - stamp_ns
+        health.arrive(channel, now_ns, stamp_ns)
         if self.before_first is not None:
             self.before_first(stamp_ns)
             self.before_first = None
@@ -218,7 +220,7 @@ class Session:
         if stamp_ns <= self._torque_ns:  # the estimator began anew
             outputs.interrupt_commands()
         self._torque_ns = stamp_ns
-        self.watch.turned(float(row["theta"][0]))
+        self.watch.turned(row["theta"][: len(self.vehicle.sides)].tolist())
         if row["doubts"] != self._doubts:
             self._doubts, self.news = int(row["doubts"]), True
         if self._doubts:

@@ -9,17 +9,25 @@ the next) is learned from the machine itself: robustly, from the latest ``KEPT``
 may already have spoiled, and nothing while the model does not match. The squares of the innovations, cut at ``CUT`` standard
 deviations, go into a cumulative sum (Page 1954, Biometrika 41, 100-115), which forgets ``SLACK`` a manoeuvre.
 
+A machine that has never been as it should be is as usual to it. Where the vehicle file tells the error that its calibration left, one that
+is far beyond is told at once as an implausible residual (``estimator.doubt``), and days of sound machines differ too much for a closer look
+(``docs/online_watch.md``); where it does not, the watch says that it can tell changes only.
+
 How often it speaks although nothing has changed is measured, not computed: ``python -m lugre_steering.bench watch``.
 """
 
 from __future__ import annotations
 
+import base64
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numba import njit
 
 from lugre_steering.chain.step import Records
+from lugre_steering.errors import DataError
+from lugre_steering.estimator.known import residual_bound
 from lugre_steering.vehicle import Vehicle
 from lugre_steering.vehicle.model import baseline_parameters, most_friction_of_all
 
@@ -39,6 +47,10 @@ THRESHOLD = 40.0
 MOST = 2.0
 """Times the threshold that the sum reaches at most, so that some dozens of manoeuvres as usual end an alarm."""
 
+Memory = Mapping[str, str]
+"""The record ``STATE`` as texts, and what it looked like."""
+
+UNCALIBRATED = "the vehicle file has no calibration (lugre-steering calibrate), so that a model which is wrong from the start is usual"
 RING = KEPT + LAG
 STATE = np.dtype(
     [
@@ -48,11 +60,12 @@ STATE = np.dtype(
         ("scatter", np.float64, (SCORES,)),
         ("memory", np.float64, (SCORES,)),
         ("sum", np.float64),
-        ("raised", np.int64),  # manoeuvres since the sum left zero
-        ("held", np.bool_),  # the model does not match: what comes is not what is usual
         ("last", np.float64, (SCORES,)),
+        ("sound_ns", np.int64),  # stamp at which the sum was last zero
+        ("since_ns", np.int64),  # stamp from which the model does not match, so that what comes is not what is usual; 0: it does
     ]
 )
+_FORM = str(STATE)  # made once: it takes longer than all that is in it
 
 
 @njit(cache=True)
@@ -75,7 +88,7 @@ def _learn(s):
 @njit(cache=True)
 def weigh(s, scores):
     """The cumulative sum after the scores of one more manoeuvre; 0 while the usual is not known."""
-    if not s.held:
+    if s.since_ns == 0:
         for k in range(SCORES):
             s.scores[s.count % RING, k] = scores[k]
         s.count += 1
@@ -90,7 +103,6 @@ def weigh(s, scores):
     if not known:
         return 0.0
     s.sum = max(0.0, s.sum + squares / SCORES - SLACK)
-    s.raised = s.raised + 1 if s.sum > 0.0 else 0
     return s.sum
 
 
@@ -107,16 +119,49 @@ class Watch:
         self._travel = MANOEUVRE * self._friction / len(vehicle.sides) / baseline_parameters(vehicle)["sigma_0"]
         self._threshold = threshold
         self._state: Records = np.zeros(1, STATE)
+        self.bound_Nm = residual_bound(vehicle)
+        """Residuals beyond it are implausible by the calibration; 0 without one."""
         self._angle, self._gone, self._fresh = math.nan, 0.0, False
         self._squares, self._directed, self._largest, self._count, self._direction = 0.0, 0.0, 0.0, 0, 0.0
-        self._begins: list[int] = []
-        self.since_ns = 0
-        """Stamp from which the model seems not to match, as long as it does not; 0 while it does."""
         self.scores: list[tuple[float, ...]] = []
         """Scores of the manoeuvres that have come since somebody took them."""
 
-    def turned(self, angle: float) -> None:
-        """The mean steering angle [rad] is there now."""
+    @property
+    def since_ns(self) -> int:
+        """Stamp from which the model seems not to match, as long as it does not; 0 while it does."""
+        return int(self._state[0]["since_ns"])
+
+    @property
+    def learned(self) -> int:
+        """Manoeuvres that have told what is usual."""
+        return int(self._state[0]["count"])
+
+    @property
+    def words(self) -> str:
+        """What it can tell now."""
+        usual = f"once {LEARN} manoeuvres have told what is usual ({self.learned} so far)" if self.learned < LEARN else ""
+        return " ".join(filter(None, ["changes", usual])) + ("" if self.bound_Nm else f"; {UNCALIBRATED}")
+
+    @property
+    def memory(self) -> Memory:
+        """What it has learned and found, for ``resume``; of a manoeuvre that is under way nothing."""
+        return {"form": _FORM, "record": base64.b64encode(self._state.tobytes()).decode("ascii")}
+
+    def resume(self, memory: Memory) -> None:
+        """Go on with what one of this vehicle has learned; ``DataError``, and nothing changed, if it is of another version."""
+        if memory.get("form") != _FORM:
+            raise DataError("what the watch had learned is of another version")
+        try:
+            record = np.frombuffer(base64.b64decode(memory["record"], validate=True), STATE)
+        except (KeyError, TypeError, ValueError) as error:
+            raise DataError(f"what the watch had learned cannot be read ({error})") from error
+        if record.shape != self._state.shape:
+            raise DataError(f"what the watch had learned is of {record.size} vehicles")
+        self._state[...] = record
+
+    def turned(self, angles: Sequence[float]) -> None:
+        """The sides [rad] are there now: the vehicle steers by their mean, whichever of them it has."""
+        angle = sum(angles) / len(angles)
         if math.isnan(self._angle):
             self._angle = angle
         way = angle - self._angle
@@ -127,6 +172,8 @@ class Watch:
 
     def add(self, stamp_ns: int, residual: float) -> bool:
         """One more residual [N m]; whether an alarm begins with it."""
+        if not self._state[0]["sound_ns"]:
+            self._state[0]["sound_ns"] = stamp_ns
         if self._fresh or self._count:
             self._squares += residual * residual
             self._directed += self._direction * residual
@@ -150,13 +197,9 @@ class Watch:
         state = self._state[0]
         level = float(weigh(state, scores))
         state["sum"] = min(level, MOST * self._threshold)
-        self._begins = [*self._begins[-RING:], stamp_ns]
         if level == 0.0:
-            self.since_ns = 0
-        elif level > self._threshold and not self.since_ns:
-            raised = min(int(state["raised"]), len(self._begins) - 1)
-            self.since_ns = self._begins[-1 - raised]
-            state["held"] = True
+            state["since_ns"], state["sound_ns"] = 0, stamp_ns
+        elif level > self._threshold and not state["since_ns"]:
+            state["since_ns"] = state["sound_ns"]
             return True
-        state["held"] = self.since_ns != 0
         return False

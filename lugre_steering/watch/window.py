@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,28 @@ class Window:
 
     reason: str
     recording: Recording
+
+
+class Part(NamedTuple):
+    """Samples of a window: how much time [s] they hold, and how much of what they are to show had gone from the ring before."""
+
+    samples: Records
+    seconds: float
+    missed_s: float
+
+    @property
+    def missing(self) -> str:
+        """What is missing, in words; "" if nothing is."""
+        return f"its samples begin {self.missed_s:.1f} s after that did: no more are kept" if self.missed_s else ""
+
+
+def part_since(samples: Records, since_ns: int, onset_ns: int) -> Part:
+    """The samples of a ring from a stamp on; at ``onset_ns`` (0: at no instant) began what they are to show."""
+    kept = samples[(samples["stamp_ns"] >= since_ns) & (samples["stamp_ns"] > 0)]
+    if not kept.size:
+        return Part(kept, 0.0, 0.0)
+    missed_ns = int(kept["stamp_ns"].min()) - onset_ns if onset_ns else 0
+    return Part(kept, float(np.ptp(kept["stamp_ns"])) * 1e-9, max(0, missed_ns) * 1e-9)
 
 
 def _label(channel: Channel) -> str:

@@ -372,6 +372,22 @@ def test_silence_of_all_pressures_is_told_as_what_it_means() -> None:
         assert ("no measured torque" in values.get("plausibility", "")) == (len(silent) == 4)
 
 
+def test_late_samples_are_counted_by_input_and_told_once() -> None:
+    """One of them between others that are in time: nothing but the count shows it."""
+    health, now_ns = Health(load(VEHICLE), 0.2, 0.5, 16), 1000 * SECOND
+    labels = {f"input {i}": {"accepted": 0} for i in range(7)}
+    for channel in range(7):
+        health.arrive(channel, now_ns, now_ns)
+        health.arrive(channel, now_ns, now_ns - (300_000_000 if channel in (0, 3) else 1_000_000))  # a pressure may be as late
+        health.arrive(channel, now_ns, now_ns + 100_000)
+    status = next(health.statuses(now_ns, 1, 1.0, labels, 0))
+    assert (status.level, status.message) == (WARN, "input 0 came late")
+    values = {pair.key: pair.value for pair in status.values}
+    assert [values[f"input {i} late"] for i in range(7)] == ["1", *["0"] * 6]
+    status = next(health.statuses(now_ns, 1, 1.0, labels, 0))
+    assert (status.level, status.message) == (OK, "all inputs arrive")
+
+
 @pytest.mark.parametrize(("silent_s", "told"), [(599, False), (601, True)])
 def test_an_air_temperature_that_has_come_and_comes_no_more_is_told(silent_s: int, told: bool) -> None:
     health, now_ns = Health(load(VEHICLE), 0.2, 0.5, 16), 1000 * SECOND

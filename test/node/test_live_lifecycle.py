@@ -39,6 +39,8 @@ from live_harness import (
     to_ns,
 )
 
+from lugre_steering.vehicle import load, save
+
 COMMANDS = ("-p", "publish_commands:=true", "-p", "recovery_ramp_s:=0.5")
 RATE_LIMIT_NM_S = math.degrees(5393.7)
 """What the sheet's stiffness makes of a radian a second."""
@@ -184,6 +186,25 @@ def kept_heat(file: Path) -> float:
     return float(json.loads(file.read_text())["memory"]["sides"]["left"]["state"]["temperature"])
 
 
+def test_what_does_not_survive_and_what_cannot_be_told_is_said_once() -> None:
+    with LiveNode() as node, World() as world:
+        Driver(world).steer(2.5)
+        assert node_output(node).count("name a 'state_file' to keep them") == 1
+        assert node_output(node).count("the watch tells changes only: the vehicle file has no calibration") == 1
+        told = world.status("residual", lambda s: "the watch tells" in s.values)
+        assert told.values["the watch tells"].endswith("so that a model which is wrong from the start is usual")
+        assert "implausible from [N m]" not in told.values
+
+
+def test_a_calibrated_node_with_a_state_file_says_neither(tmp_path: Path) -> None:
+    file = tmp_path / "calibrated.yaml"
+    save(load(VEHICLE).replace(provenance={"heldout_rmse_Nm": 80.0}), file)
+    with LiveNode("-p", f"state_file:={tmp_path / 'state.json'}", vehicle=file) as node, World() as world:
+        assert "state_file" not in node_output(node)
+        assert "changes only" not in node_output(node)
+        assert world.status("residual").values["implausible from [N m]"] == "400"
+
+
 def test_the_state_survives_a_kill_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "state.json"
     arguments = ("-p", f"state_file:={file}", "-p", "state_period_s:=0.5")
@@ -221,6 +242,13 @@ def test_the_state_survives_a_kill_and_a_damaged_one_is_refused(tmp_path: Path) 
         for before, after in itertools.pairwise(world.heard["feed_forward"]):
             passed_s = (to_ns(after.header.stamp) - to_ns(before.header.stamp)) * 1e-9
             assert abs(after.effort[0] - before.effort[0]) <= RATE_LIMIT_NM_S * passed_s + 1e-6
+        assert "the watch goes on from" in node_output(node)
+    kept_before = json.loads(file.read_text())
+    kept_before["learned"]["record"] = "AAAA"
+    file.write_text(json.dumps(kept_before))
+    with LiveNode(*arguments) as node:
+        assert f"the watch learns anew: {file}: is damaged" in node_output(node)
+        assert "temperatures and bristles taken over" in node_output(node)
     damaged = file.read_text()
     file.write_text(damaged[: len(damaged) // 2])
     with LiveNode(*arguments) as node, World() as world:

@@ -47,11 +47,12 @@ def augmented_vehicle(done: Finished, whole: Fit, effects: Sequence[NamedEffect]
             entries.append(EffectEntry(candidate.effect.id, keep, source, sha256))
     provenance = {
         "made_by": "lugre-steering diagnose", "bags": [run.name for run in problem.runs],
-        "heldout_rmse_Nm": round(heldout_rmse, 3), "seen": seen_range(problem.vehicle, problem.runs),
+        "heldout_rmse_Nm": round(heldout_rmse, 3),
         "recalibrated": {
             field: {"sheet": float(problem.model.parameters[0][0][field]), "now": round(value, 6)}
             for field, value in problem.fields(whole.x).items()
         },
     }  # fmt: skip
     changed = apply_calibration(problem.vehicle, problem, whole.x)
-    return replace(changed, effects=each_once(entries), provenance=provenance, initial=initial_of(problem, whole))
+    written = replace(changed, effects=each_once(entries), initial=initial_of(problem, whole))
+    return written.replace(provenance={**provenance, "seen": seen_range(written, problem.runs, problem.starts(whole.x))})
