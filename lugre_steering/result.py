@@ -81,14 +81,17 @@ def folder_for(out: str | Path) -> Path:
     return folder
 
 
-def html(title: str, text: str, rows: Sequence[Row]) -> str:
-    """A heading, a paragraph and a table, for notebooks; every text is escaped."""
-    head = f"<h4>{escape(title)}</h4><p>{escape(text)}</p>"
+def html(title: str, text: str, *tables: Sequence[Row]) -> str:
+    """A heading, a paragraph and tables, for notebooks; every text is escaped."""
+    return f"<h4>{escape(title)}</h4><p>{escape(text)}</p>" + "".join(map(_table, tables))
+
+
+def _table(rows: Sequence[Row]) -> str:
     if not rows:
-        return head
+        return ""
     names = "".join(f"<th>{escape(str(name))}</th>" for name in rows[0])
     body = "".join(f"<tr>{''.join(f'<td>{_cell(value)}</td>' for value in row.values())}</tr>" for row in rows)
-    return f"{head}<table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table>"
+    return f"<table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _cell(value: Any) -> str:

@@ -35,7 +35,7 @@ def draw_all(diagnosis: Diagnosis, folder: Path) -> list[Path]:
     ]
     if diagnosis.evidence:
         wanted.append(("evidence", partial(_evidence, diagnosis)))
-    wanted += [(f"law_{law['id']}", partial(draw_law, diagnosis, law)) for law in diagnosis.json["laws"]]
+    wanted += [(f"law_{law.id}", partial(draw_law, diagnosis, law)) for law in diagnosis.laws]
     if plots.styles(diagnosis) and plots.heldout_rows(diagnosis):
         wanted.append(("heldout", partial(_heldout, diagnosis)))
     found = []
