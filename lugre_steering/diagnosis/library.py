@@ -14,7 +14,7 @@ from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import leaving_out, made
 from lugre_steering.given_number import check_number
 from lugre_steering.pool import one_blas_thread
-from lugre_steering.result import folder_for
+from lugre_steering.result import writing_into
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
@@ -50,6 +50,6 @@ def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:
     """Write report.html and its pictures into a folder (which ``Diagnosis.save`` may have filled); the page."""
     from lugre_steering.diagnosis.report import page
 
-    folder = folder_for(out)
-    page.write_report(diagnosis, folder)
+    with writing_into(out) as folder:
+        page.write_report(diagnosis, folder)
     return folder / "report.html"

@@ -19,7 +19,7 @@ from lugre_steering.files import earlier_result, is_ours, write_record
 from lugre_steering.gate import Facts, Gate, quality_facts
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, BagFinding, unused_name
-from lugre_steering.result import Result, folder_for, frame, html, of_bag
+from lugre_steering.result import Result, frame, html, of_bag, writing_into
 from lugre_steering.serialise import ADDED, IN_MEMORY, finite, mapped
 from lugre_steering.vehicle import Vehicle, save
 
@@ -258,9 +258,9 @@ class Diagnosis(Result):
     def save(self, out: str | Path) -> None:
         """Write diagnosis.json, augmented.yaml and, if there is a form of the friction, formed.yaml into a folder; replaces only an
         earlier diagnosis there."""
-        folder = folder_for(out)
-        earlier_result(folder, "diagnosis.json", SCHEMA, (AUGMENTED, FORMED))
-        self.write(folder)
+        with writing_into(out) as folder:
+            earlier_result(folder, "diagnosis.json", SCHEMA, (AUGMENTED, FORMED))
+            self.write(folder)
 
     def write(self, folder: Path) -> None:
         """The files into a folder where they may stand; that of an earlier diagnosis without a successor goes."""
