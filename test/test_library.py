@@ -340,6 +340,12 @@ TIME = np.arange(5) * 0.1
         ({"torque": (TIME,)}, "measured_torque: got 1 arrays"),
         ({"pressure": {"a": (TIME * 0.0, TIME)}}, "time of pressure/a: got 5 times"),
         ({"air": np.full(5, 293.0)}, "air_temperature: got 293, expected values in degC"),
+        ({"time": 100.0 * TIME}, "time: got a sample every 10 s, expected times in seconds"),
+        ({"angle": {}}, "angle: got no side, expected {side: samples}"),
+        ({"angle": [TIME, TIME]}, "angle/left: got an array of shape (2, 5), expected (n,); of several sides or lines a mapping"),
+        ({"angle": None}, "angle/left: got an array of shape ()"),
+        ({"name": 5}, "name: got 5, expected a text"),
+        ({"unit": ["rad"]}, "unit: got ['rad'], expected rad or m"),
         ({"angle": np.full(5, 0.1j)}, "angle/left: got complex128, expected real numbers"),
         ({"pressure": np.zeros(5)}, "pressure: got ndarray, expected a mapping"),
         ({"rate": np.full(5, np.timedelta64(1))}, "rate/left: got timedelta64, expected real numbers"),
@@ -365,6 +371,21 @@ def test_samples_that_are_no_number_are_left_out_and_counted() -> None:
     np.testing.assert_allclose(made.angle["left"].time_s, [0.0, 0.2, 0.4])
 
 
+def test_masked_samples_are_left_out_and_times_with_a_zone_are_those_of_utc() -> None:
+    made = ls.Recording.from_arrays(TIME, angle=np.ma.masked_array([0, 1, 0, 1, 0], [False, True, False, False, False]))
+    assert made.rejected == {"angle/left": {"not_finite": 1}}
+    pd = pytest.importorskip("pandas")
+    dates = pd.Series(pd.date_range("2024-01-01T02:00", periods=5, freq="100ms", tz="Europe/Berlin"))
+    zoned = ls.Recording.from_arrays(dates, angle=pd.Series(np.zeros(5)))
+    assert zoned.start_ns == np.datetime64("2024-01-01T01:00", "ns").astype(int)
+
+
+def test_a_block_may_be_lists() -> None:
+    given = [0, 1, 0, 1], [10**9, 10**9, 11 * 10**8, 11 * 10**8], [0.0, 0.0, 0.1, 0.1], [np.nan] * 4
+    estimates, _ = ls.Estimator(VEHICLE).push_block(*given)
+    assert estimates["stamp_ns"].tolist() == given[1][::2]
+
+
 def test_positions_of_a_linear_axis_are_metres_where_that_is_said() -> None:
     made = ls.Recording.from_arrays(TIME, angle=np.full(5, 12.0), unit="m")
     assert made.angle["left"].value.tolist() == [12.0] * 5
@@ -373,6 +394,7 @@ def test_positions_of_a_linear_axis_are_metres_where_that_is_said() -> None:
 LAWFUL = ls.load_vehicle(VEHICLE).replace(
     laws=(held.LawEntry("viscous_loss", "angle", "linear", (-0.5, 0.5), {"value": 0.0, "slope": 2e4}, title="a loss"),)
 )
+FOREIGN = ls.Recording.from_arrays(TIME, angle={"left": np.zeros(5), "right": np.zeros(5)}, pressure={"A": TIME, "B": TIME})
 UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
 
 
@@ -394,6 +416,25 @@ UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
         (lambda: ls.simulate("double-cycle", seed=1.5), "seed: got 1.5, expected a whole number from 0"),
         (lambda: ls.simulate("double-cycle", angle_rate_Hz="x"), "angle_rate_Hz: got 'x', expected a number from 1 to 1000"),
         (lambda: ls.simulate("double-cycle", effects=[5]), "effects: got 5, expected texts"),
+        (lambda: ls.replay(FOREIGN, VEHICLE), "recording: pressure: got the lines A, B, expected main_a, main_b, aux_a, aux_b"),
+        (lambda: ls.replay(VEHICLE, UPWARD), "vehicle: got Recording('rec"),
+        (lambda: ls.replay(UPWARD, VEHICLE, options={"max_gap_s": 1.0}), "options: got {'max_gap_s': 1.0}, expected Options(...)"),
+        (lambda: ls.Estimator(VEHICLE).push_block([0.5], [1], [0.0], [0.0]), "channel: got float64, expected whole numbers"),
+        (lambda: ls.Estimator(VEHICLE).push_block([0], [1], ["a"], [0.0]), "value: got list, expected numbers"),
+        (lambda: ls.Estimator(VEHICLE).set_plan([1, 2], [0.0, 0.1]), "2 times and angles of shape (2,)"),
+        (lambda: ls.Estimator(VEHICLE).restore(None), "it is not the snapshot of this model"),
+        (lambda: ls.Estimator(VEHICLE).begin_at("20"), "initial temperature [degC]: got '20', expected a number from -80 to 150"),
+        (lambda: ls.calibrate(STOP, VEHICLE, fix=5), "fix: got 5, expected a text or several"),
+        (lambda: ls.calibrate(STOP, VEHICLE, free="kingpin"), "--free kingpin: this vehicle has no such parameter"),
+        (lambda: ls.calibrate(STOP, VEHICLE, prior="friction_level"), "prior: got 'friction_level', expected a mapping"),
+        (lambda: ls.calibrate(STOP, VEHICLE, prior={"friction_level": "a"}), "prior of friction_level: got 'a', expected a number"),
+        (lambda: ls.diagnose(STOP, VEHICLE, without=5), "without: got 5, expected a text or several"),
+        (lambda: ls.simulate("double-cycle", angle_rate_Hz=5.0).save("out", "x"), "storage: got 'x', expected mcap or sqlite3"),
+        (lambda: ls.add_effects(5), "effects: got 5, expected the path of a file, or several"),
+        (lambda: ls.save_vehicle("own.yaml", LAWFUL), "vehicle: got 'own.yaml', expected a vehicle, as load_vehicle gives it"),
+        (lambda: ls.save_vehicle(LAWFUL, 5), "path: got 5, expected that of a file"),
+        (lambda: ls.write_report({}, "out"), "diagnosis: got {}, expected what diagnose gives"),
+        (lambda: ls.keep_law(LAWFUL, "mine", 5), "file: got 5, expected its path"),
         (lambda: ls.Options(max_gap_s="x"), "max_gap_s: got 'x', expected a number from 0.001 to 60"),
         (lambda: ls.keep_law(VEHICLE, "mine", "own.yaml"), "laws: got the number 1, expected a vehicle file with the key 'laws'"),
         (lambda: ls.keep_law(LAWFUL, "mine", "own.yaml", law=2), "laws: got the number 2, expected 1 to 1"),

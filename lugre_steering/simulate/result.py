@@ -18,7 +18,7 @@ from lugre_steering.recording import Kind, Recording, Signal
 from lugre_steering.result import Result, angle_column, frame, html, torque_column, writing_into
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.simulate.run import Simulated
-from lugre_steering.simulate.write import START_NS, write_bag
+from lugre_steering.simulate.write import START_NS, check_storage, write_bag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,6 +90,7 @@ class Simulation(Result):
 
     def save(self, out: str | Path, storage: str = "mcap") -> Simulation:
         """Write the bag ``synthetic_<name>`` into a folder, never over another; the result names it."""
+        check_storage(storage)
         with writing_into(out) as parent:
             folder = parent / f"synthetic_{self.name}"
             if folder.exists():

@@ -23,12 +23,14 @@ def keep_law(vehicle: Vehicle | str | Path, name: str, file: str | Path = OWN_FI
     file of effects for ``add_effects``, made if there is none (what stands there stays); ``law``: which of the vehicle's laws, from 1;
     ``title``: of the effect, by default what the law says of itself. ``EffectError`` if the law or the name cannot be kept.
     """
+    if not isinstance(file, (str, Path)):
+        raise EffectError(f"file: got {file!r}, expected its path")
     holder = vehicle_of(vehicle)
     where = holder.name if isinstance(vehicle, Vehicle) else str(vehicle)
     if law not in range(1, len(holder.laws) + 1):
         have = f"1 to {len(holder.laws)}" if holder.laws else "a vehicle file with the key 'laws', as diagnose writes it"
         raise EffectError(f"{where}: laws: got the number {law!r}, expected {have}")
-    if name in CATALOGUE:
+    if name in tuple(CATALOGUE):
         raise EffectError(f"{where}: effect '{name}': there is one of this name in the catalogue; expected another id")
     bags = holder.provenance.get("bags")
     source = f"found in {', '.join(map(str, bags))}" if isinstance(bags, list) and bags else f"found in {Path(where).name}"
