@@ -417,7 +417,7 @@ UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
         (lambda: ls.simulate("double-cycle", angle_rate_Hz="x"), "angle_rate_Hz: got 'x', expected a number from 1 to 1000"),
         (lambda: ls.simulate("double-cycle", effects=[5]), "effects: got 5, expected texts"),
         (lambda: ls.replay(FOREIGN, VEHICLE), "recording: pressure: got the lines A, B, expected main_a, main_b, aux_a, aux_b"),
-        (lambda: ls.replay(VEHICLE, UPWARD), "vehicle: got Recording('rec"),
+        (lambda: ls.replay(VEHICLE, UPWARD), "vehicle: got Recording('"),
         (lambda: ls.replay(UPWARD, VEHICLE, options={"max_gap_s": 1.0}), "options: got {'max_gap_s': 1.0}, expected Options(...)"),
         (lambda: ls.Estimator(VEHICLE).push_block([0.5], [1], [0.0], [0.0]), "channel: got float64, expected whole numbers"),
         (lambda: ls.Estimator(VEHICLE).push_block([0], [1], ["a"], [0.0]), "value: got list, expected numbers"),

@@ -36,12 +36,14 @@ CHANNEL_WORDS = {
     "inertia": "a torque in proportion to the acceleration", "lag": "a lag of the torque",
     "linked_inertia": "an inertia that changes as the linkage turns",
 }  # fmt: skip
+"""What a law of each channel is, in words."""
 COORDINATE_WORDS = {
     "angle": "angle", "abs_angle": "absolute angle", "rate": "steering rate", "abs_rate": "absolute steering rate",
     "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "absolute torque",
     "power": "power", "time": "time", "slip": "accumulated slip", "work": "accumulated work", "dwell": "dwell",
     "rubber_temperature": "rubber temperature", "air_temperature": "air temperature", "opposing_torque": "torque against the motion",
 }  # fmt: skip
+"""What each coordinate is called, in words."""
 
 
 def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
@@ -186,10 +188,12 @@ _SIGNALS = {
     "load_friction": "|M| sgn(omega)", "viscous_loss": "omega", "turbulent_loss": "omega |omega|", "gain": "M", "inertia": "alpha",
     "lag": "dM/dt", "linked_inertia": "alpha + f' omega^2 / 2",
 }  # fmt: skip
+"""What f is multiplied by, in symbols."""
 _PLACES = {
     "angle": "theta", "abs_angle": "|theta|", "rate": "omega", "abs_rate": "|omega|", "direction": "sgn(omega)", "torque": "M",
     "abs_torque": "|M|", "time": "t", "rubber_temperature": "T", "air_temperature": "T_air", "opposing_torque": "M sgn(omega)",
 }  # fmt: skip
+"""What f is a function of, in symbols."""
 
 
 def formula(described: Sequence[FoundLaw], vehicle: Vehicle) -> str:

@@ -20,7 +20,9 @@ from lugre_steering.report import words
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, figure
 
 EVIDENCE_ROWS = 14
+"""As many as a picture shows legibly."""
 POINTS = 6000
+"""Of a curve: more than a picture has pixels."""
 
 
 def draw_all(diagnosis: Diagnosis, folder: Path) -> list[Path]:
