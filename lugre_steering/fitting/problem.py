@@ -80,7 +80,7 @@ STRIBECK = SheetValue("stribeck_speed", ("stribeck_speed",), 0.15, -0.7, 0.7)
 CAPACITY = SheetValue("heat_capacity", ("heat_capacity",), 0.15, -0.6, 0.6)
 COOLING = SheetValue("cooling", ("cooling",), 0.15, -0.6, 0.6)
 KINGPIN = SheetValue("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
-"""What may be recalibrated: fields of the chain, and how far from the sheet, as a logarithm unless additive: standard deviation and range."""
+"""What may be recalibrated: fields of the chain, and how far from the sheet (a logarithm unless additive): deviation and range."""
 GAIN = SheetValue("pressure_gain", (), 0.03, -0.3, 0.3)
 """Scales the torque that the pressures show, no field of the chain."""
 EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 100.0
