@@ -423,7 +423,7 @@ UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
         (lambda: ls.Estimator(VEHICLE).push_block([0], [1], ["a"], [0.0]), "value: got list, expected numbers"),
         (lambda: ls.Estimator(VEHICLE).set_plan([1, 2], [0.0, 0.1]), "2 times and angles of shape (2,)"),
         (lambda: ls.Estimator(VEHICLE).restore(None), "it is not the snapshot of this model"),
-        (lambda: ls.Estimator(VEHICLE).begin_at("20"), "initial temperature [degC]: got '20', expected a number from -80 to 150"),
+        (lambda: ls.Estimator(VEHICLE).begin_at("20"), "initial temperature: got '20', expected -80 to 150 degC"),
         (lambda: ls.calibrate(STOP, VEHICLE, fix=5), "fix: got 5, expected a text or several"),
         (lambda: ls.calibrate(STOP, VEHICLE, free="kingpin"), "--free kingpin: this vehicle has no such parameter"),
         (lambda: ls.calibrate(STOP, VEHICLE, prior="friction_level"), "prior: got 'friction_level', expected a mapping"),

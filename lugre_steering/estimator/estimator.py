@@ -196,7 +196,9 @@ class Estimator:
         """
         if self.vehicle.rubber is None:
             raise DataError("initial temperature: this vehicle has no rubber, so nothing of it depends on temperature")
-        check_number("initial temperature [degC]", rubber_degC, *RUBBER_DEGC)
+        low, high = RUBBER_DEGC
+        if not isinstance(rubber_degC, (int, float, np.number)) or not low <= rubber_degC <= high:
+            raise DataError(f"initial temperature: got {rubber_degC!r}, expected {low:g} to {high:g} degC")
         self._parameters["rubber_temperature"] = rubber_degC
 
     def set_plan(self, stamp_ns: ArrayLike, theta: ArrayLike) -> None:
