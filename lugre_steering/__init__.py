@@ -10,8 +10,9 @@
     ls.simulate("double-cycle", vehicle).recording
     ls.Recording.from_arrays(time, angle={"left": left, "right": right}, pressure={"main_a": pressure})
 
-What ``__all__`` names is public, with the public attributes of what it names, and follows semantic versioning. Everything is loaded
-when it is first used.
+What ``__all__`` names is public, with the public attributes of what it names, and follows semantic versioning; so are the classes of these
+attributes (``lugre_steering.typing``) and what own physics is written with (``lugre_steering.effects``). Everything is loaded when it is
+first used.
 """
 
 from __future__ import annotations
@@ -27,7 +28,15 @@ if TYPE_CHECKING:
     from lugre_steering.diagnosis.library import diagnose, write_report
     from lugre_steering.diagnosis.result import Diagnosis
     from lugre_steering.effects.registry import add_files as add_effects
-    from lugre_steering.errors import BagError, DataError, LugreSteeringError, VehicleFileError
+    from lugre_steering.errors import (
+        BagError,
+        DataError,
+        EffectError,
+        ImplausibleWarning,
+        LugreSteeringError,
+        MapFileError,
+        VehicleFileError,
+    )
     from lugre_steering.estimator import Estimator, Options
     from lugre_steering.recording import Recording
     from lugre_steering.replay.library import replay
@@ -37,18 +46,20 @@ if TYPE_CHECKING:
     from lugre_steering.vehicle import Vehicle
     from lugre_steering.vehicle import load as load_vehicle
     from lugre_steering.vehicle import save as save_vehicle
+    from lugre_steering.vehicle.keep import keep_law
 
 __all__ = [
-    "BagError", "Calibration", "DataError", "Diagnosis", "Estimator", "LugreSteeringError", "Options", "Recording", "Replay",
-    "Simulation", "Vehicle", "VehicleFileError", "add_effects", "calibrate", "diagnose", "load_vehicle", "replay", "save_vehicle",
-    "simulate", "write_report",
+    "BagError", "Calibration", "DataError", "Diagnosis", "EffectError", "Estimator", "ImplausibleWarning", "LugreSteeringError",
+    "MapFileError", "Options", "Recording", "Replay", "Simulation", "Vehicle", "VehicleFileError", "add_effects", "calibrate", "diagnose",
+    "keep_law", "load_vehicle", "replay", "save_vehicle", "simulate", "write_report",
 ]  # fmt: skip
 
 _PLACES = {
     "BagError": "errors", "Calibration": "calibration.result", "DataError": "errors", "Diagnosis": "diagnosis.result",
-    "Estimator": "estimator", "LugreSteeringError": "errors", "Options": "estimator", "Recording": "recording",
-    "Replay": "replay.result", "Simulation": "simulate.result", "Vehicle": "vehicle", "VehicleFileError": "errors",
-    "calibrate": "calibration.library", "diagnose": "diagnosis.library", "write_report": "diagnosis.library",
+    "EffectError": "errors", "Estimator": "estimator", "ImplausibleWarning": "errors", "LugreSteeringError": "errors",
+    "MapFileError": "errors", "Options": "estimator", "Recording": "recording", "Replay": "replay.result", "Simulation": "simulate.result",
+    "Vehicle": "vehicle", "VehicleFileError": "errors", "calibrate": "calibration.library", "diagnose": "diagnosis.library",
+    "keep_law": "vehicle.keep", "write_report": "diagnosis.library",
 }  # fmt: skip
 _RENAMED = {
     "load_vehicle": ("vehicle", "load"), "save_vehicle": ("vehicle", "save"), "add_effects": ("effects.registry", "add_files"),

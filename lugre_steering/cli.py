@@ -463,7 +463,7 @@ def effects(
 
         if not name:
             raise DataError("effects --add: needs a name for the law: --id NAME")
-        keep_law(add, law, name, title, to)
+        keep_law(add, name, to, law=law, title=title)
         print_json({"id": name, "file": str(to)}) if as_json else print(f"{name} is kept in {to}; use it with --effects {to}")
         return
     if not effect_id:

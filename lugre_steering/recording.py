@@ -42,6 +42,8 @@ AIR_LIMIT_DEGC = 100.0  # no air is warmer or colder: kelvin, or no temperature 
 
 FARTHEST = {"rad": np.pi, "m": 100.0}
 """Largest magnitude of an angle, or of the position of a linear axis, by its unit: beyond, it comes in another one."""
+SLOWEST_S = 5.0
+"""Sampling interval of no steering angle: beyond, times come in another unit."""
 Samples = ArrayLike | tuple[ArrayLike, ArrayLike]
 """One channel as arrays: values on the clock of the recording, or a pair of its own times [s] and values."""
 BySide = ArrayLike | Mapping[str, Samples]
@@ -171,12 +173,16 @@ class Recording:
         forces [N]; ``farthest``: largest magnitude that an angle or position can have, where that is more than half a turn or 100 m.
         ``DataError`` for anything that cannot be meant.
         """
-        if unit not in FARTHEST:
+        if not isinstance(name, str):
+            raise DataError(f"name: got {name!r}, expected a text")
+        if unit not in tuple(FARTHEST):
             raise DataError(f"unit: got {unit!r}, expected {' or '.join(FARTHEST)}")
         if farthest is not None:
             check_number("farthest", farthest, 0.0)
         angles = FARTHEST[unit] if farthest is None else farthest, unit
         given = {f"angle/{side}": samples for side, samples in _by_side(angle).items()}
+        if not given:
+            raise DataError("angle: got no side, expected {side: samples}, or the samples of a single joint")
         given |= {f"rate/{side}": samples for side, samples in _by_side({} if rate is None else rate).items()}
         lines = {} if pressure is None else pressure
         if not isinstance(lines, Mapping):
@@ -184,6 +190,8 @@ class Recording:
         given |= {f"pressure/{line}": samples for line, samples in lines.items()}
         given |= {label: samples for label, samples in (("measured_torque", torque), ("air_temperature", air)) if samples is not None}
         clock = _clock(time, "time")
+        if (step := float(np.median(np.diff(clock)))) > SLOWEST_S:
+            raise DataError(f"time: got a sample every {step:g} s, expected times in seconds, at most {SLOWEST_S:g} s apart")
         signals, rejected = {}, {}
         for label, samples in given.items():
             signals[label], lost = _signal(label, samples, clock, angles)
@@ -219,8 +227,8 @@ def _clock(time: ArrayLike, label: str) -> Array:
 def _seconds(time: ArrayLike) -> ArrayLike:
     """Dates and durations of NumPy or pandas as seconds, dates since 1970."""
     kind = getattr(getattr(time, "dtype", None), "kind", "")
-    if kind == "M":
-        return _seconds(np.asarray(time) - np.datetime64(0, "s"))
+    if kind == "M":  # those of pandas with a time zone are counted in UTC
+        return _seconds(np.asarray(time, "datetime64[ns]") - np.datetime64(0, "s"))
     return np.asarray(time) / np.timedelta64(1, "s") if kind == "m" else time
 
 
@@ -244,16 +252,26 @@ def _signal(label: str, samples: Samples, clock: Array, angles: tuple[float, str
     return Signal(clock[finite], value[finite]), int((~finite).sum())
 
 
+def _unmasked(values: Any) -> NDArray[Any]:
+    """An array with nan for each masked sample, whose mask NumPy would forget."""
+    if isinstance(values, np.ma.MaskedArray):
+        return np.where(np.ma.getmaskarray(values), np.nan, values.data)
+    return np.asarray(values)
+
+
 def _numbers(values: ArrayLike, label: str) -> Array:
     try:
-        given = np.asarray(values)
+        given = _unmasked(values)
         if given.dtype.kind in "cmM":  # NumPy would drop the imaginary part, or the unit of time
             raise DataError(f"{label}: got {given.dtype}, expected real numbers")
         array = np.asarray(given, np.float64)
     except (TypeError, ValueError):
         raise DataError(f"{label}: got {type(values).__name__}, expected an array of numbers") from None
     if array.ndim != 1:
-        raise DataError(f"{label}: got an array of shape {array.shape}, expected (n,)")
+        raise DataError(
+            f"{label}: got an array of shape {array.shape}, expected (n,); of several sides or lines a mapping {{name: samples}}, "
+            "with a clock of its own a tuple (time, samples)"
+        )
     return array
 
 

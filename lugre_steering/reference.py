@@ -18,7 +18,8 @@ from typing import Any
 
 import typer.main
 
-from lugre_steering.chain.compose import HOOKS
+from lugre_steering.chain.compose import HOOKS, QUANTITIES
+from lugre_steering.chain.layout import BASELINE_FIELDS
 from lugre_steering.cli import app
 from lugre_steering.effects.laws import CHANNELS, COORDINATES, FORMS, MEMORIES
 from lugre_steering.effects.laws import TABLE as FORM_TABLE
@@ -137,6 +138,13 @@ def hooks() -> str:
     return table(("hook", "a law there gives", "and may read, beside what the hooks above it know"), rows)
 
 
+def quantities() -> str:
+    """What the laws of an effect may read."""
+    rows = [(f"`{name}`", meaning) for name, meaning in QUANTITIES.items()]
+    rows += [(f"`{name}`", f"parameter of the baseline: {meaning}") for name, meaning in BASELINE_FIELDS.items()]
+    return table(("name", "what it is [unit]"), rows)
+
+
 def law_parts() -> str:
     """What a law of the vehicle file may change, and what it may depend on."""
     channels, coordinates, memories = (
@@ -167,7 +175,8 @@ def _option(parameter: Any) -> tuple[str, str]:
 
 
 TABLES: Mapping[str, Callable[[], str]] = {
-    "vehicle": vehicle_keys, "laws": law_parts, "parameters": node_parameters, "effects": effects, "hooks": hooks, "commands": commands,
+    "vehicle": vehicle_keys, "laws": law_parts, "parameters": node_parameters, "effects": effects, "hooks": hooks,
+    "quantities": quantities, "commands": commands,
 }  # fmt: skip
 
 

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from lugre_steering.errors import DataError, LugreSteeringError
+from lugre_steering.errors import DataError, LugreSteeringError, reason
 from lugre_steering.serialise import as_json, plain
 
 if TYPE_CHECKING:
@@ -71,24 +72,30 @@ def torque_column(name: str, unit: str) -> str:
     return f"{name}_Nm" if unit == "N m" else f"{name.replace('torque', 'force')}_{unit.replace(' ', '')}"
 
 
-def folder_for(out: str | Path) -> Path:
-    """A folder to write results into, made if it is not there."""
+@contextmanager
+def writing_into(out: str | Path) -> Iterator[Path]:
+    """A folder to write results into, made if it is not there; what cannot be written is an error of ours."""
+    if not isinstance(out, (str, Path)):
+        raise DataError(f"folder: got {out!r}, expected its path")
     folder = Path(out)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        yield folder
     except OSError as error:
-        raise LugreSteeringError(f"{folder}: cannot be made: {error.strerror or error}; expected a writable folder") from error
-    return folder
+        raise LugreSteeringError(f"{error.filename or folder}: cannot be written: {reason(error)}; expected a writable folder") from error
 
 
-def html(title: str, text: str, rows: Sequence[Row]) -> str:
-    """A heading, a paragraph and a table, for notebooks; every text is escaped."""
-    head = f"<h4>{escape(title)}</h4><p>{escape(text)}</p>"
+def html(title: str, text: str, *tables: Sequence[Row]) -> str:
+    """A heading, a paragraph and tables, for notebooks; every text is escaped."""
+    return f"<h4>{escape(title)}</h4><p>{escape(text)}</p>" + "".join(map(_table, tables))
+
+
+def _table(rows: Sequence[Row]) -> str:
     if not rows:
-        return head
+        return ""
     names = "".join(f"<th>{escape(str(name))}</th>" for name in rows[0])
     body = "".join(f"<tr>{''.join(f'<td>{_cell(value)}</td>' for value in row.values())}</tr>" for row in rows)
-    return f"{head}<table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table>"
+    return f"<table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _cell(value: Any) -> str:

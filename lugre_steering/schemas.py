@@ -10,7 +10,6 @@ import sys
 import types
 import typing
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal, Union
 
 from lugre_steering.calibration.result import Calibration
@@ -19,7 +18,7 @@ from lugre_steering.errors import LugreSteeringError
 from lugre_steering.fleet.result import Fleet
 from lugre_steering.proof.result import Scoreboard
 from lugre_steering.replay.result import Replay
-from lugre_steering.result import folder_for
+from lugre_steering.result import writing_into
 from lugre_steering.serialise import as_json, key_of, written
 from lugre_steering.simulate.paper.result import PublishedExperiment, PublishedExperiments
 from lugre_steering.simulate.result import Simulation
@@ -83,13 +82,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="write the JSON schemas of the result files")
     parser.add_argument("folder", help="where NAME.schema.json is written for each of: " + ", ".join(FILES))
     try:
-        folder = folder_for(parser.parse_args().folder)
-        for name, result in FILES.items():
-            (folder / f"{name}.schema.json").write_text(as_json(schema_of(result)) + "\n", encoding="utf-8")
-    except (LugreSteeringError, OSError) as error:
+        with writing_into(parser.parse_args().folder) as folder:
+            for name, result in FILES.items():
+                (folder / f"{name}.schema.json").write_text(as_json(schema_of(result)) + "\n", encoding="utf-8")
+    except LugreSteeringError as error:
         print(f"schemas: {error}", file=sys.stderr)
         return 2
-    print(f"schemas in {Path(folder)}")
+    print(f"schemas in {folder}")
     return 0
 
 

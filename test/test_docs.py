@@ -30,6 +30,7 @@ from typer.testing import CliRunner
 import lugre_steering as ls
 from lugre_steering import reference
 from lugre_steering.calibration import result as calibration
+from lugre_steering.chain.compose import HOOKS, QUANTITIES, quantities_of
 from lugre_steering.cli import app
 from lugre_steering.diagnosis import result as diagnosis
 from lugre_steering.effects.registry import CATALOGUE
@@ -290,6 +291,14 @@ def test_node_parameters_and_effects_are_all_told() -> None:
     assert {name for name in defaults if f"| `{name}` |" not in told} == set()
     told = reference.filled((DOCS / "effects.md").read_text(encoding="utf-8"))
     assert {name for name in CATALOGUE if f"| `{name}` |" not in told} == set()
+
+
+def test_what_laws_may_read_is_told() -> None:
+    """Of every hook, and nothing that no law can read."""
+    assert {name for hook in HOOKS.values() for name in hook.given} == set(QUANTITIES)
+    told = reference.filled((DOCS / "adding_physics.md").read_text(encoding="utf-8"))
+    readable = {name for hook in HOOKS for name in quantities_of(hook)}
+    assert {name for name in readable if f"\n| `{name}` | " not in told} == set()
 
 
 def test_the_tables_are_printed_by_name() -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import importlib.util
 import inspect
 import json
@@ -12,21 +13,27 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
+import typing
+from collections.abc import Iterator
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
+from a_law import a_law
 from bag_making import thinned_bag
 from outside import outside
 from test_packaging import SLOWLY, environment
 from typer.testing import CliRunner
 
 import lugre_steering as ls
+from lugre_steering import errors
+from lugre_steering import typing as held
 from lugre_steering.bag import read_recording
 from lugre_steering.cli import app
+from lugre_steering.diagnosis.found_law import FoundLaw
 from lugre_steering.diagnosis.result import FrictionForm
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.schemas import FILES, schema_of
@@ -84,6 +91,56 @@ def test_dir_lists_what_is_public_and_nothing_else_exists() -> None:
     assert [name for name in dir(ls) if not name.startswith("__")] == sorted(ls.__all__)
     with pytest.raises(AttributeError, match="no attribute 'replays'"):
         ls.replays  # noqa: B018
+
+
+def hints_of(what: Any) -> list[Any]:
+    """Types of the fields of a class, or of the parameters and the result of a function."""
+    lazily = dict.fromkeys(("DataFrame", "Figure", "Axes"), object)  # of packages that nobody must have
+    return [hint for name, hint in typing.get_type_hints(what, localns=lazily).items() if not name.startswith("_")]
+
+
+def functions_of(cls: type) -> Iterator[Any]:
+    """Public methods and properties."""
+    for name, item in vars(cls).items():
+        function = getattr(item, "fget", getattr(item, "__func__", getattr(item, "func", item)))
+        if not name.startswith("_") and inspect.isfunction(function):
+            yield function
+
+
+def own_classes(hint: Any) -> Iterator[type]:
+    """The classes of this package in a type, such as what a tuple holds."""
+    for part in typing.get_args(hint):
+        yield from own_classes(part)
+    if isinstance(hint, type) and hint.__module__.startswith("lugre_steering"):
+        yield hint
+
+
+def met_by_users() -> set[type]:
+    """Every class that a program meets that calls public functions and looks at what it is given."""
+    public = [getattr(ls, name) for name in ls.__all__]
+    rooms = [importlib.import_module(f"lugre_steering.{name}.library") for name in ("replay", "simulate")]
+    hints = [hint for f in [*filter(inspect.isfunction, public), rooms[0].replay, rooms[1].simulate] for hint in hints_of(f)]
+    todo, found = [*filter(inspect.isclass, public), *(cls for hint in hints for cls in own_classes(hint))], set[type]()
+    while todo:
+        if (cls := todo.pop()) in found:
+            continue
+        found.add(cls)
+        hints = hints_of(cls) if is_dataclass(cls) or issubclass(cls, tuple) else []
+        hints += [hint for function in functions_of(cls) for hint in hints_of(function)]
+        todo += [other for hint in hints for other in own_classes(hint)]
+    return found
+
+
+def test_every_class_that_a_program_meets_can_be_imported() -> None:
+    met, offered = met_by_users(), {getattr(held, name) for name in held.__all__}
+    assert {FoundLaw, *(type(ls.load_vehicle(VEHICLE).channels[0]),)} <= met  # in tuples, and behind properties
+    assert sorted(cls.__name__ for cls in met - offered) == sorted(name for name in ls.__all__ if inspect.isclass(getattr(ls, name)))
+    assert offered <= met
+
+
+def test_every_error_that_a_program_meets_is_public() -> None:
+    of_ours = {name for name, item in vars(errors).items() if inspect.isclass(item) and item.__module__ == errors.__name__}
+    assert of_ours <= set(ls.__all__)
 
 
 def test_rooms_show_what_they_are_called_with() -> None:
@@ -283,6 +340,12 @@ TIME = np.arange(5) * 0.1
         ({"torque": (TIME,)}, "measured_torque: got 1 arrays"),
         ({"pressure": {"a": (TIME * 0.0, TIME)}}, "time of pressure/a: got 5 times"),
         ({"air": np.full(5, 293.0)}, "air_temperature: got 293, expected values in degC"),
+        ({"time": 100.0 * TIME}, "time: got a sample every 10 s, expected times in seconds"),
+        ({"angle": {}}, "angle: got no side, expected {side: samples}"),
+        ({"angle": [TIME, TIME]}, "angle/left: got an array of shape (2, 5), expected (n,); of several sides or lines a mapping"),
+        ({"angle": None}, "angle/left: got an array of shape ()"),
+        ({"name": 5}, "name: got 5, expected a text"),
+        ({"unit": ["rad"]}, "unit: got ['rad'], expected rad or m"),
         ({"angle": np.full(5, 0.1j)}, "angle/left: got complex128, expected real numbers"),
         ({"pressure": np.zeros(5)}, "pressure: got ndarray, expected a mapping"),
         ({"rate": np.full(5, np.timedelta64(1))}, "rate/left: got timedelta64, expected real numbers"),
@@ -308,11 +371,30 @@ def test_samples_that_are_no_number_are_left_out_and_counted() -> None:
     np.testing.assert_allclose(made.angle["left"].time_s, [0.0, 0.2, 0.4])
 
 
+def test_masked_samples_are_left_out_and_times_with_a_zone_are_those_of_utc() -> None:
+    made = ls.Recording.from_arrays(TIME, angle=np.ma.masked_array([0, 1, 0, 1, 0], [False, True, False, False, False]))
+    assert made.rejected == {"angle/left": {"not_finite": 1}}
+    pd = pytest.importorskip("pandas")
+    dates = pd.Series(pd.date_range("2024-01-01T02:00", periods=5, freq="100ms", tz="Europe/Berlin"))
+    zoned = ls.Recording.from_arrays(dates, angle=pd.Series(np.zeros(5)))
+    assert zoned.start_ns == np.datetime64("2024-01-01T01:00", "ns").astype(int)
+
+
+def test_a_block_may_be_lists() -> None:
+    given = [0, 1, 0, 1], [10**9, 10**9, 11 * 10**8, 11 * 10**8], [0.0, 0.0, 0.1, 0.1], [np.nan] * 4
+    estimates, _ = ls.Estimator(VEHICLE).push_block(*given)
+    assert estimates["stamp_ns"].tolist() == given[1][::2]
+
+
 def test_positions_of_a_linear_axis_are_metres_where_that_is_said() -> None:
     made = ls.Recording.from_arrays(TIME, angle=np.full(5, 12.0), unit="m")
     assert made.angle["left"].value.tolist() == [12.0] * 5
 
 
+LAWFUL = ls.load_vehicle(VEHICLE).replace(
+    laws=(held.LawEntry("viscous_loss", "angle", "linear", (-0.5, 0.5), {"value": 0.0, "slope": 2e4}, title="a loss"),)
+)
+FOREIGN = ls.Recording.from_arrays(TIME, angle={"left": np.zeros(5), "right": np.zeros(5)}, pressure={"A": TIME, "B": TIME})
 UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
 
 
@@ -334,7 +416,31 @@ UPWARD = ls.Recording.from_arrays(TIME, angle={"up": np.zeros(5)})
         (lambda: ls.simulate("double-cycle", seed=1.5), "seed: got 1.5, expected a whole number from 0"),
         (lambda: ls.simulate("double-cycle", angle_rate_Hz="x"), "angle_rate_Hz: got 'x', expected a number from 1 to 1000"),
         (lambda: ls.simulate("double-cycle", effects=[5]), "effects: got 5, expected texts"),
+        (lambda: ls.replay(FOREIGN, VEHICLE), "recording: pressure: got the lines A, B, expected main_a, main_b, aux_a, aux_b"),
+        (lambda: ls.replay(VEHICLE, UPWARD), "vehicle: got Recording('"),
+        (lambda: ls.replay(UPWARD, VEHICLE, options={"max_gap_s": 1.0}), "options: got {'max_gap_s': 1.0}, expected Options(...)"),
+        (lambda: ls.Estimator(VEHICLE).push_block([0.5], [1], [0.0], [0.0]), "channel: got float64, expected whole numbers"),
+        (lambda: ls.Estimator(VEHICLE).push_block([0], [1], ["a"], [0.0]), "value: got list, expected numbers"),
+        (lambda: ls.Estimator(VEHICLE).set_plan([1, 2], [0.0, 0.1]), "2 times and angles of shape (2,)"),
+        (lambda: ls.Estimator(VEHICLE).restore(None), "it is not the snapshot of this model"),
+        (lambda: ls.Estimator(VEHICLE).begin_at("20"), "initial temperature: got '20', expected -80 to 150 degC"),
+        (lambda: ls.calibrate(STOP, VEHICLE, fix=5), "fix: got 5, expected a text or several"),
+        (lambda: ls.calibrate(STOP, VEHICLE, free="kingpin"), "--free kingpin: this vehicle has no such parameter"),
+        (lambda: ls.calibrate(STOP, VEHICLE, prior="friction_level"), "prior: got 'friction_level', expected a mapping"),
+        (lambda: ls.calibrate(STOP, VEHICLE, prior={"friction_level": "a"}), "prior of friction_level: got 'a', expected a number"),
+        (lambda: ls.diagnose(STOP, VEHICLE, without=5), "without: got 5, expected a text or several"),
+        (lambda: ls.simulate("double-cycle", angle_rate_Hz=5.0).save("out", "x"), "storage: got 'x', expected mcap or sqlite3"),
+        (lambda: ls.add_effects(5), "effects: got 5, expected the path of a file, or several"),
+        (lambda: ls.save_vehicle("own.yaml", LAWFUL), "vehicle: got 'own.yaml', expected a vehicle, as load_vehicle gives it"),
+        (lambda: ls.save_vehicle(LAWFUL, 5), "path: got 5, expected that of a file"),
+        (lambda: ls.write_report({}, "out"), "diagnosis: got {}, expected what diagnose gives"),
+        (lambda: ls.keep_law(LAWFUL, "mine", 5), "file: got 5, expected its path"),
         (lambda: ls.Options(max_gap_s="x"), "max_gap_s: got 'x', expected a number from 0.001 to 60"),
+        (lambda: ls.keep_law(VEHICLE, "mine", "own.yaml"), "laws: got the number 1, expected a vehicle file with the key 'laws'"),
+        (lambda: ls.keep_law(LAWFUL, "mine", "own.yaml", law=2), "laws: got the number 2, expected 1 to 1"),
+        (lambda: ls.keep_law(LAWFUL, "end_stop", "own.yaml"), "'end_stop': there is one of this name in the catalogue"),
+        (lambda: ls.keep_law(LAWFUL, "My law", "own.yaml"), "key 'id': got 'My law', expected a name of small letters"),
+        (lambda: ls.keep_law(LAWFUL, "mine", "/nowhere/own.yaml"), "/nowhere/own.yaml: cannot be written: No such file"),
     ],
 )
 def test_what_a_program_gives_wrongly_is_an_error_of_ours(call, said: str) -> None:
@@ -384,6 +490,39 @@ def test_results_are_shown_and_drawn(diagnosis: ls.Diagnosis, calibration: ls.Ca
             result.plot("other")
 
 
+@pytest.fixture(scope="module")
+def lawful(diagnosis: ls.Diagnosis) -> ls.Diagnosis:
+    """The same with a law beside its effect."""
+    law = a_law(title="a <torque>")
+    traces = [replace(trace, contributions={**trace.contributions, law.id: 0.1 * trace.measured}) for trace in diagnosis.traces]
+    return replace(diagnosis, laws=(law,), traces=tuple(traces))
+
+
+def test_laws_are_shown_and_drawn(lawful: ls.Diagnosis) -> None:
+    plt = pytest.importorskip("matplotlib.pyplot")
+    assert "<td>conservative_torque</td>" in lawful._repr_html_()
+    assert "a &lt;torque&gt;" in lawful._repr_html_()
+    *_, added, drawn = lawful.plot().axes
+    (law,) = lawful.laws
+    assert {line.get_label() for line in added.lines} == {"end_stop", law.id}
+    data, f = drawn.lines
+    np.testing.assert_allclose(data.get_ydata(), law.f.points)
+    np.testing.assert_allclose(f.get_xdata(), np.degrees(law.f.at))
+    band = drawn.collections[0].get_paths()[0].vertices
+    assert band[:, 1].min() == law.f.f[0] - law.f.band[0]
+    assert (drawn.get_xlabel(), drawn.get_ylabel(), drawn.get_title(loc="left")) == ("angle (deg)", "f (N m)", "law_1: a <torque>")
+    plt.close("all")
+
+
+def test_laws_have_a_table(lawful: ls.Diagnosis) -> None:
+    pytest.importorskip("pandas")
+    table = lawful.to_frame("laws").set_index("law")
+    assert (table.loc["law_1", "coordinate"], table.loc["law_1", "largest_Nm"], table.loc["law_1", "high"]) == ("angle", 900.0, 0.6)
+    assert len(lawful.to_frame()) == len(lawful.effects[0].parameters)
+    with pytest.raises(ls.DataError, match="of: got 'law', expected 'effects' or 'laws'"):
+        lawful.to_frame("law")  # type: ignore[arg-type]
+
+
 def test_tables_need_pandas_and_say_so(diagnosis: ls.Diagnosis, replay: ls.Replay, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     for result in (diagnosis, replay):
@@ -407,6 +546,23 @@ def test_a_result_never_replaces_files_of_others(diagnosis: ls.Diagnosis, calibr
         with pytest.raises(ls.DataError, match=name):
             result.save(tmp_path)
         assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+
+
+def test_what_cannot_be_written_is_an_error_of_ours(diagnosis: ls.Diagnosis, calibration: ls.Calibration, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for save in (diagnosis.save, calibration.save, lambda out: ls.write_report(diagnosis, out)):
+        with pytest.raises(ls.LugreSteeringError, match="file/below: cannot be written: Not a directory; expected a writable folder"):
+            save(tmp_path / "file" / "below")
+        with pytest.raises(ls.DataError, match="folder: got 5, expected its path"):
+            save(5)
+
+
+def test_a_law_is_kept_by_the_library_as_by_the_command(tmp_path: Path) -> None:
+    assert ls.keep_law(LAWFUL, "rising_loss", str(tmp_path / "library.yaml")) == tmp_path / "library.yaml"
+    ls.save_vehicle(LAWFUL, tmp_path / "vehicle.yaml")
+    run("effects", "--add", tmp_path / "vehicle.yaml", "--id", "rising_loss", "--to", tmp_path / "command.yaml")
+    library, command = ((tmp_path / f"{name}.yaml").read_text() for name in ("library", "command"))
+    assert command == library.replace(f"found in {LAWFUL.name}", "found in vehicle.yaml")
 
 
 def test_the_form_of_the_friction_has_a_file_where_nothing_is_named(diagnosis: ls.Diagnosis, tmp_path: Path) -> None:
@@ -494,6 +650,33 @@ def test_the_contract_s_own_schema_accepts_what_ours_does(diagnosis: ls.Diagnosi
 def test_real_results_keep_to_their_schemas(diagnosis: ls.Diagnosis, calibration: ls.Calibration, replay: ls.Replay) -> None:
     for result in (diagnosis, calibration, replay, ls.diagnose(short(), VEHICLE)):
         assert refusals(schema_of(type(result)), json.loads(result.to_json())) == []
+
+
+LAW = {
+    "id": "law_1", "title": "a torque", "channel": "conservative_torque", "coordinate": "angle", "memory": "none", "memory_size": 0.0,
+    "form": "linear", "values": {"value": 0.0, "slope": 1500.0}, "intervals": {"slope": [1400.0, 1600.0]}, "range": [-0.6, 0.6],
+    "largest_Nm": 900.0, "largest_share": 0.1, "heldout_gain": 0.5, "gain": 2000.0, "bar": 30.0, "share_of_ceiling": 0.9,
+    "ties": [
+        {"title": title, "channel": "gain", "coordinate": "none", "memory": "none", "memory_size": 0.0}
+        for title in ("a gain", "a loss", "more")
+    ],
+    "nearest_listed": [],
+    "f": {
+        "at": [-0.6, 0.0, 0.6], "f": [-900.0, 0.0, 900.0], "band": [60.0, 10.0, 60.0], "points_at": [-0.3, 0.3], "points": [-430.0, 470.0],
+    },
+}  # fmt: skip
+"""A law in diagnosis.json, key by key; programs read it."""
+
+
+def test_a_law_keeps_its_keys_and_their_order(lawful: ls.Diagnosis) -> None:
+    schema = schema_of(ls.Diagnosis)
+    (told,) = replace(lawful, laws=(a_law(),)).in_words().json["laws"]
+    assert json.dumps(told) == json.dumps(LAW)
+    assert refusals(schema, CONTRACT | {"laws": [LAW]}) == []
+    for key in LAW:
+        assert refusals(schema, CONTRACT | {"laws": [{name: value for name, value in LAW.items() if name != key}]})
+    for key, value in (("id", "worn_arms"), ("range", [0.0]), ("values", {"slope": "steep"}), ("ties", [{}]), ("f", {}), ("gain", None)):
+        assert refusals(schema, CONTRACT | {"laws": [LAW | {key: value}]})
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from a_law import a_law
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -216,11 +217,7 @@ def test_text_from_outside_is_shown_as_it_is_and_never_becomes_markup(written: W
 
 def test_charts_hold_names_as_they_are_and_no_end_of_their_script(vehicle: Vehicle) -> None:
     full = missing(vehicle)
-    law = {
-        "id": "law_1", "title": HOSTILE, "largest_Nm": 1.0, "largest_share": 0.1, "coordinate": "none", "memory": "none",
-        "form": "constant", "range": [0.0, 1.0], "values": {}, "intervals": {}, "ties": [], "channel": "gain", "heldout_gain": 0.5,
-        "share_of_ceiling": 0.5, "nearest_listed": [],
-    }  # fmt: skip
+    law = a_law(title=HOSTILE, channel="gain", coordinate="none", form="constant", values={}, intervals={})
     traces = tuple(dataclasses.replace(t, contributions={"law_1": t.measured}, intervals={}) for t in full.traces)
     page = page_of(dataclasses.replace(full, verdict="unlisted_physics", effects=(), laws=(law,), traces=traces))
     assert len(page.scripts) == 2  # the charts and what draws them

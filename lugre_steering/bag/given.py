@@ -49,7 +49,11 @@ def given_recordings(
 
 
 def with_both_tracks(recording: Recording, channels: Sequence[Channel]) -> Recording:
-    """With the angle of a track without a sensor of its own, which follows from the other by the steering geometry."""
+    """With the angle of a track without a sensor of its own, which follows from the other by the steering geometry; ``DataError`` where
+    pressures are given and none by the name of a line."""
+    lines = [channel.name for channel in channels if channel.kind is Kind.PRESSURE]
+    if recording.pressure and lines and not recording.pressure.keys() & set(lines):
+        raise DataError(f"{recording.name}: pressure: got the lines {', '.join(recording.pressure)}, expected {', '.join(lines)}")
     angle = dict(recording.angle)
     for channel in channels:
         if channel.kind is Kind.ANGLE and channel.ackermann != 0.0 and channel.name not in angle:

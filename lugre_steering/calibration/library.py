@@ -12,6 +12,9 @@ from lugre_steering.bag.given import Given, each, files, given_recordings
 from lugre_steering.calibration.calibrate import calibrate_recordings, chosen
 from lugre_steering.calibration.result import Calibration
 from lugre_steering.effects.registry import made
+from lugre_steering.errors import DataError
+from lugre_steering.given_number import check_number
+from lugre_steering.given_several import texts
 from lugre_steering.pool import one_blas_thread
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
@@ -20,8 +23,8 @@ def calibrate(
     data: Given | Sequence[Given],
     vehicle: Vehicle | str | Path,
     *,
-    free: Sequence[str] = (),
-    fix: Sequence[str] = (),
+    free: str | Sequence[str] = (),
+    fix: str | Sequence[str] = (),
     prior: Mapping[str, float] | None = None,
     priors: bool = True,
     progress: Callable[[str], None] = lambda _: None,
@@ -35,10 +38,15 @@ def calibrate(
     model = vehicle_of(vehicle)
     items = each(data)
     recordings = given_recordings(items, model.channels, progress)
-    wanted = chosen(model, free, fix, prior)
+    freed, fixed = texts("free", free), texts("fix", fix)
+    if prior is not None and not isinstance(prior, Mapping):
+        raise DataError(f"prior: got {prior!r}, expected a mapping {{name: share}}")
+    for name, share in (prior or {}).items():
+        check_number(f"prior of {name}", share, 0.0)
+    wanted = chosen(model, freed, fixed, prior)
     with one_blas_thread():
         found = calibrate_recordings(recordings, model, wanted, priors=priors, progress=progress).calibration
     sheet = None if isinstance(vehicle, Vehicle) else Path(vehicle)
-    options = {"free": free, "fix": fix, "prior": prior or {}, "priors": priors}
+    options = {"free": freed, "fix": fixed, "prior": prior or {}, "priors": priors}
     file = None if sheet is None else str(vehicle)
     return replace(found, provenance=made("calibrate", options, sheet, files(items)), vehicle_file=file)

@@ -14,7 +14,7 @@ from lugre_steering.files import earlier_result, write_record
 from lugre_steering.gate import Facts, Gate, quality_facts
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import BagFinding
-from lugre_steering.result import Result, folder_for, frame, html
+from lugre_steering.result import Result, frame, html, writing_into
 from lugre_steering.serialise import ADDED, IN_MEMORY, in_order
 from lugre_steering.vehicle import Vehicle, save
 
@@ -155,10 +155,10 @@ class Calibration(Result):
 
     def save(self, out: str | Path) -> None:
         """Write calibration.json and calibrated.yaml into a folder; replaces only an earlier calibration there."""
-        folder = folder_for(out)
-        earlier_result(folder, RECORD, SCHEMA, (VEHICLE,))
-        write_record(self.json, folder / RECORD)
-        self.write_vehicle(folder)
+        with writing_into(out) as folder:
+            earlier_result(folder, RECORD, SCHEMA, (VEHICLE,))
+            write_record(self.json, folder / RECORD)
+            self.write_vehicle(folder)
 
     def write_vehicle(self, folder: Path) -> None:
         """The vehicle file into a folder where it may stand."""

@@ -74,8 +74,6 @@ _ALWAYS = {
     "theta": "theta", "omega": "omega", "alpha": "alpha", "dt": "dt", "time": "s.time", "temperature": "s.temperature",
     "z": "s.z", "z_max": "s.z_max", "direction": "s.direction", "last_torque": "s.torque", "last_load": "s.load",
 }  # fmt: skip
-"""Angle [rad], rate [rad/s], acceleration [rad/s2], sampling interval [s], time [s], tread rubber [degC], bristle deflection
-and its largest so far [rad], sign of the last contact motion, torque and load of the last step [N m]."""
 
 HOOKS = {
     "angle": Hook("theta = {part}", "true angle [rad] for the measured one, ``theta``", {"theta": "theta"}),
@@ -104,6 +102,24 @@ HOOKS = {
     "lag": Hook("", "time constant of the pressure sensors [s]", {}),
 }  # fmt: skip
 """Every place where an effect may act, in the order of the step; the last five belong to the sensors."""
+
+QUANTITIES = {
+    "theta": "steering angle, the true one where laws of `angle` have acted [rad]", "omega": "its rate [rad/s]",
+    "alpha": "its acceleration [rad/s2]", "dt": "time since the last sample [s]", "time": "time since the start of the recording [s]",
+    "temperature": "tread rubber [degC]", "z": "bristle deflection; from the hook `torque` on that of this sample [rad]",
+    "z_max": "largest magnitude of it so far [rad]", "direction": "sign of the last motion of the contact",
+    "last_torque": "total torque of the last sample [N m]", "last_load": "the same without losses in cylinders and lines [N m]",
+    "torque": "of `wind_up`: what winds up; of `limit`: the total so far [N m]", "d_theta": "angle by which the contact turns now [rad]",
+    "turned": "angle turned since the last sample [rad]", "sign": "that of `d_theta`, 0 where it is zero",
+    "resting": "whether the machine stands still", "dwell": "how long it has [s]", "stiffness": "presliding stiffness now [N m/rad]",
+    "length": "presliding length, sliding friction over stiffness [rad]",
+    "friction_ratio": "friction of the rubber at its temperature over that at the reference temperature",
+    "g": "friction torque that the contact would slide at [N m]", "drawn": "angle by which the bristle is drawn now [rad]",
+    "elastic": "torque of the bristle [N m]", "damping": "presliding damping torque [N m]",
+    "viscous": "torque that laws of `viscous` add [N m]", "energy": "friction heat of this sample [J]", "air": "air temperature now [degC]",
+    "load": "total torque without losses in cylinders and lines [N m]", "elapsed": "time since the start of the recording [s]",
+}  # fmt: skip
+"""What laws may read of the step, see ``Hook.given``."""
 
 _BITS = {name: 1 << i for i, name in enumerate(HOOKS)}
 _STEPWISE = tuple(name for name in HOOKS if name not in ("angle", "wind_up", "arm", "line", "delay", "lag"))

@@ -10,28 +10,29 @@ from __future__ import annotations
 
 import numpy as np
 
-BASELINE_FIELDS = (
-    "static_torque",  # Ms at the reference temperature [N m]
-    "coulomb_torque",  # Mc at the reference temperature [N m]
-    "sigma_0",  # presliding stiffness at the reference temperature [N m/rad]
-    "damping_factor",  # sigma_1 / sqrt(sigma_0) = 2 xi sqrt(J) [sqrt(N m) s]
-    "stribeck_speed",  # omega_St [rad/s]
-    "stribeck_exponent",  # delta
-    "heat_capacity",  # rho c A h [J/K]; inf without rubber
-    "cooling",  # lambda A [W/K]
-    "air_temperature",  # at the start of the recording [degC]
-    "rubber_temperature",  # at the start of the recording [degC]
-    "aligning_torque",  # F_z e sin(theta_k), or gravity.sin_Nm [N m]
-    "gravity_cos",  # gravity.cos_Nm [N m]
-    "initial_bristle",  # z at the start of the recording [rad]
-    "torque_unit",  # size of this machine's torques, 1 for a rubber-tracked vehicle; laws write their constants in it
-    "angle_unit",  # size of its travel, likewise
-    "acceleration_unit",  # size of its accelerations, likewise
-    "sides",  # number of tracks that share vehicle-level torques
-    "table_low",  # first temperature of the rubber table [degC]
-    "table_step",  # its step [K]
-    "angle_noise",  # standard deviation of one angle sample, quantisation included [rad]
-)
+BASELINE_FIELDS = {
+    "static_torque": "static friction torque Ms at the reference temperature [N m]",
+    "coulomb_torque": "sliding friction torque Mc at the reference temperature [N m]",
+    "sigma_0": "presliding stiffness at the reference temperature [N m/rad]",
+    "damping_factor": "sigma_1 / sqrt(sigma_0) = 2 xi sqrt(J) [sqrt(N m) s]",
+    "stribeck_speed": "Stribeck speed omega_St [rad/s]",
+    "stribeck_exponent": "Stribeck exponent delta",
+    "heat_capacity": "heat capacity rho c A h of the tread [J/K]; inf without rubber",
+    "cooling": "lambda A of the tread [W/K]",
+    "air_temperature": "air at the start of the recording [degC]",
+    "rubber_temperature": "tread rubber at the start of the recording [degC]",
+    "aligning_torque": "F_z e sin(theta_k), or gravity.sin_Nm [N m]",
+    "gravity_cos": "gravity.cos_Nm [N m]",
+    "initial_bristle": "z at the start of the recording [rad]",
+    "torque_unit": "size of this machine's torques, 1 for a rubber-tracked vehicle; laws write their constants in it",
+    "angle_unit": "size of its travel, likewise",
+    "acceleration_unit": "size of its accelerations, likewise",
+    "sides": "number of tracks that share vehicle-level torques",
+    "table_low": "first temperature of the rubber table [degC]",
+    "table_step": "its step [K]",
+    "angle_noise": "standard deviation of one angle sample, quantisation included [rad]",
+}
+"""Parameters of the baseline, with what they are."""
 
 STATE_FIELDS = (
     "time",  # since the start of the recording [s]

@@ -30,6 +30,7 @@ STEPS = (
 
 
 PICTURES = ("before_after_*.png", "residual_*.png", "law_*.png", "evidence.png", "heldout.png")
+"""What an earlier report may have left in the folder."""
 
 
 def run(

@@ -29,14 +29,13 @@ from lugre_steering.report import words
 from lugre_steering.resources import config_folder
 from lugre_steering.serialise import plain
 from lugre_steering.simulate import plant
-from lugre_steering.simulate.manoeuvres import BUILT_IN, Manoeuvre, motion_of
+from lugre_steering.simulate.manoeuvres import BUILT_IN, SAMPLE_S, Manoeuvre, motion_of
 from lugre_steering.vehicle import Vehicle
 
 REFERENCE = "double-cycle"
 """Manoeuvre that sizes the example: it reaches the limits, slides and warms."""
 MACHINES = ("test_vehicle.yaml", "single_joint_example.yaml", "linear_axis_example.yaml")
 """Shipped vehicle files; the first that can have an effect shows it."""
-SAMPLE_S = 0.02
 NUDGE = 0.02
 """Finite-difference step of the calibration values."""
 ROUNDING_NM = 1e-6

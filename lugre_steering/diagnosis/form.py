@@ -37,6 +37,7 @@ RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
 """Share of the torque that follows so many seconds late: the loss factor of treads."""
 RELAXATION = "its relaxation"
 LATE = "the clocks of its sensors"
+"""What these freedoms are called in reports."""
 SMALL = 0.2
 """Share of a freedom by which its effect on the torque is found: small enough to be linear."""
 

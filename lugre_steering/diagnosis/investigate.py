@@ -22,6 +22,7 @@ from lugre_steering.fitting.trial import TRIAL_TOLERANCE
 from lugre_steering.recording import Array
 
 NULL_DRAWS = 16
+"""Errors that hide nothing, by which chance is judged."""
 MUCH_LESS = 2.0 / 3.0
 """Share of what is left, at most, with which another friction law takes the place of that of the vehicle file."""
 RISE = 1.0

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array, Finding
 from lugre_steering.report import words
@@ -20,8 +21,6 @@ LEAST_SIDE = 0.1
 EXPLAINED, FURTHER = 0.5, 0.1
 """Share of what is left beyond noise that a jump must explain, and share of what it takes that a second one may take: of a change all along
 the recording the second takes a quarter of the first."""
-SURE = 5.0
-"""Standard deviations that a jump must be, as errors last."""
 
 
 class Jump(NamedTuple):
@@ -91,7 +90,7 @@ def jumped(time: Array, friction: Array, error: Array, weight: Array) -> Jump | 
     left = float(e @ e) - fe[-1] ** 2 / ff[-1] - gain
     count = max(LASTS_S / max(float(np.median(np.diff(t))), 1e-9), 1.0)  # samples that err alike
     doubt = max(left / t.size, 1.0) * count
-    if gain < SURE**2 * doubt or gain < EXPLAINED * (gain + left - t.size):
+    if gain < SURE * doubt or gain < EXPLAINED * (gain + left - t.size):
         return None
     slope = f * (t - t.mean())
     columns = np.linalg.qr(np.column_stack([f, slope]))[0]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,11 @@ from lugre_steering.bag.given import Given, each, files, given_recordings
 from lugre_steering.diagnosis.engine import MATERIAL_SHARE, diagnose_recordings
 from lugre_steering.diagnosis.result import Diagnosis
 from lugre_steering.effects.registry import leaving_out, made
+from lugre_steering.errors import DataError
 from lugre_steering.given_number import check_number
+from lugre_steering.given_several import texts
 from lugre_steering.pool import one_blas_thread
-from lugre_steering.result import folder_for
+from lugre_steering.result import writing_into
 from lugre_steering.vehicle import Vehicle, vehicle_of
 
 
@@ -37,7 +40,7 @@ def diagnose(
     check_number("seed", seed, 0, whole=True)
     check_number("material", material, 0.0, 1.0)
     model = vehicle_of(vehicle)
-    unsought = [without] if isinstance(without, str) else list(without)
+    unsought = texts("without", without)
     with leaving_out(unsought), one_blas_thread():
         items = each(data)
         recordings = given_recordings(items, model.channels, progress)
@@ -50,6 +53,8 @@ def write_report(diagnosis: Diagnosis, out: str | Path) -> Path:
     """Write report.html and its pictures into a folder (which ``Diagnosis.save`` may have filled); the page."""
     from lugre_steering.diagnosis.report import page
 
-    folder = folder_for(out)
-    page.write_report(diagnosis, folder)
+    if not isinstance(diagnosis, Diagnosis):
+        raise DataError(f"diagnosis: got {reprlib.repr(diagnosis)}, expected what diagnose gives")
+    with writing_into(out) as folder:
+        page.write_report(diagnosis, folder)
     return folder / "report.html"

@@ -7,20 +7,24 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from lugre_steering import units
+from lugre_steering.diagnosis import law_picture
+from lugre_steering.diagnosis.found_law import FoundLaw, Interval
 from lugre_steering.errors import DataError
 from lugre_steering.files import earlier_result, is_ours, write_record
 from lugre_steering.gate import Facts, Gate, quality_facts
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, BagFinding, unused_name
-from lugre_steering.result import Result, folder_for, frame, html, of_bag
+from lugre_steering.result import Result, frame, html, of_bag, writing_into
 from lugre_steering.serialise import ADDED, IN_MEMORY, finite, mapped
 from lugre_steering.vehicle import Vehicle, save
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
@@ -30,7 +34,6 @@ AUGMENTED, FORMED = "augmented.yaml", "formed.yaml"
 
 Verdict = Literal["consistent", "missing_physics", "unlisted_physics", "insufficient_data"]
 Stage = Literal["motion", "contact", "thermal", "parallel_torque", "measurement"]
-Interval = tuple[float | None, float | None]
 Share = Annotated[float, {"minimum": 0, "maximum": 1}]
 
 
@@ -221,7 +224,7 @@ class Diagnosis(Result):
     detection_limits: Mapping[str, Limit]
     data_quality: tuple[BagFinding, ...]
     next_experiment: Experiment | None
-    laws: tuple[Mapping[str, Any], ...] = field(default=(), metadata=ADDED)
+    laws: tuple[FoundLaw, ...] = field(default=(), metadata=ADDED)
     """Found where no entry of the catalogue explains what is left; ``augmented.yaml`` runs them."""
     friction_form: FrictionForm | None = field(default=None, metadata=ADDED)
     """Laws that augmented.yaml has beside the effects, or formed.yaml where nothing is named; None where friction has the form of the
@@ -241,6 +244,11 @@ class Diagnosis(Result):
         """The augmented vehicle."""
         return self.augmented.vehicle
 
+    @property
+    def found(self) -> tuple[NamedEffect | FoundLaw, ...]:
+        """Named effects, then laws."""
+        return *self.effects, *self.laws
+
     def in_words(self) -> Diagnosis:
         """The same in the words of the vehicle's coordinate, with None for every number that does not exist."""
         finished: Diagnosis = mapped(self, lambda value, _: finite(value))
@@ -250,9 +258,9 @@ class Diagnosis(Result):
     def save(self, out: str | Path) -> None:
         """Write diagnosis.json, augmented.yaml and, if there is a form of the friction, formed.yaml into a folder; replaces only an
         earlier diagnosis there."""
-        folder = folder_for(out)
-        earlier_result(folder, "diagnosis.json", SCHEMA, (AUGMENTED, FORMED))
-        self.write(folder)
+        with writing_into(out) as folder:
+            earlier_result(folder, "diagnosis.json", SCHEMA, (AUGMENTED, FORMED))
+            self.write(folder)
 
     def write(self, folder: Path) -> None:
         """The files into a folder where they may stand; that of an earlier diagnosis without a successor goes."""
@@ -264,33 +272,41 @@ class Diagnosis(Result):
         elif is_ours(folder / FORMED):
             (folder / FORMED).unlink()
 
-    def to_frame(self) -> DataFrame:
-        """One row per fitted parameter of every named effect, as a pandas table."""
-        return frame(self._rows())
+    def to_frame(self, of: Literal["effects", "laws"] = "effects") -> DataFrame:
+        """A pandas table: one row per fitted parameter of every named effect, or one row per law."""
+        rows = {"effects": self._effect_rows, "laws": self._law_rows}
+        if of not in rows:
+            raise DataError(f"of: got {of!r}, expected 'effects' or 'laws'")
+        return frame(rows[of]())
 
     def plot(self, bag: int | str = 0) -> Figure:
-        """Torque and residual of one bag, by number or name, before and after; shaded: where the effects act."""
+        """Torque and residual of one bag, by number or name, before and after, what each finding adds, and f of each law with its 95 % band
+        over what the data say; shaded: where the effects act."""
         from lugre_steering.report.panels import Curve, Panel, panels
 
         if not self.traces:
             raise DataError(f"plot: there is nothing to draw, as the verdict is {self.verdict}: {self.statement}")
         trace = of_bag(self.traces, bag)
-        unit, time = self.vehicle.coordinate.force_unit, trace.time
+        unit, time, said = self.vehicle.coordinate.force_unit, trace.time, partial(units.words, self.vehicle)
         shaded = [span for effect in self.effects for span in trace.intervals.get(effect.id, ())]
         before, after = trace.measured - trace.baseline, trace.measured - trace.augmented
         rows = [
-            Panel(f"torque, bag {trace.name}", unit, [
+            Panel(f"{said('torque')}, bag {trace.name}", unit, [
                 Curve(time, trace.measured, "measured", "measured"),
                 Curve(time, trace.baseline, "recalibrated baseline", "original"),
-                Curve(time, trace.augmented, "with the effects found", "improved"),
+                Curve(time, trace.augmented, "with what was found", "improved"),
             ]),
             Panel("residual", unit, [Curve(time, before, "before"), Curve(time, after, "after")], shaded),
         ]  # fmt: skip
-        if self.effects:
-            rows.append(Panel("what each effect adds", unit, [Curve(time, trace.contributions[e.id], e.id) for e in self.effects]))
-        return panels(rows)
+        if self.found:
+            rows.append(Panel("what each finding adds", unit, [Curve(time, trace.contributions[one.id], one.id) for one in self.found]))
+        return panels(rows, [partial(self._draw_law, law) for law in self.laws])
 
-    def _rows(self) -> list[dict[str, object]]:
+    def _draw_law(self, law: FoundLaw, ax: Axes) -> None:
+        law_picture.draw(ax, self.vehicle, law)
+        ax.set_title(f"{law.id}: {law.title}")
+
+    def _effect_rows(self) -> list[dict[str, object]]:
         return [
             {"effect": effect.id, "stage": effect.stage, "parameter": name, "value": found.value, "low": found.ci95[0],
              "high": found.ci95[1], "unit": found.unit, "energy_share": effect.energy_share, "masked_share": effect.masked_share,
@@ -299,5 +315,14 @@ class Diagnosis(Result):
             for name, found in effect.parameters.items()
         ]  # fmt: skip
 
+    def _law_rows(self) -> list[dict[str, object]]:
+        return [
+            {"law": law.id, "title": law.title, "channel": law.channel, "coordinate": law.coordinate, "memory": law.memory,
+             "memory_size": law.memory_size, "form": law.form, "values": dict(law.values), "low": law.range[0], "high": law.range[1],
+             "largest_Nm": law.largest_Nm, "largest_share": law.largest_share, "heldout_gain": law.heldout_gain,
+             "share_of_ceiling": law.share_of_ceiling}
+            for law in self.laws
+        ]  # fmt: skip
+
     def _repr_html_(self) -> str:
-        return html(f"{self.vehicle.name}: {self.verdict}", self.statement, self._rows())
+        return html(f"{self.vehicle.name}: {self.verdict}", self.statement, self._effect_rows(), self._law_rows())

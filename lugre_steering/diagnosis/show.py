@@ -77,7 +77,7 @@ def _found(diagnosis: Diagnosis) -> Table:
 
 def _errors(diagnosis: Diagnosis) -> Table:
     result, vehicle = diagnosis.json, diagnosis.vehicle
-    better = bool(result["effects"] or result["laws"])
+    better = bool(diagnosis.found)
     table = Table(units.words(vehicle, "torque error"), box=None, padding=(0, 2, 0, 0), header_style="bold")
     for column in ("baseline", *(["with what was found"] if better else []), "noise alone"):
         table.add_column(column, justify="right")

@@ -16,6 +16,7 @@ from lugre_steering.fitting.split import CYCLE, Split, split
 from lugre_steering.recording import Array, IntArray, Mask
 
 RESAMPLES = 2000
+"""Bootstraps of an interval: its ends are sure to a few hundredths of its width."""
 ENOUGH = 5
 """Stretches of CLUSTER_S that must be left to judge by."""
 

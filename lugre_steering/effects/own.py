@@ -200,7 +200,10 @@ def add_law(catalogue: Path, identity: str, title: str, source: str, law: Mappin
         except EffectError:
             continue
         if whole == {"effects": [*known, new]}:
-            write_text(text, catalogue)
+            try:
+                write_text(text, catalogue)
+            except OSError as error:
+                raise EffectError(f"{catalogue}: cannot be written: {reason(error)}; expected a file in a writable folder") from error
             return
     raise EffectError(f"{catalogue}: expected a file of one list 'effects', each entry behind a dash, to add '{identity}' to")
 

@@ -30,6 +30,7 @@ from lugre_steering.effects.declared import check_declared
 from lugre_steering.effects.entry import STAGES, Effect
 from lugre_steering.effects.laws import slot
 from lugre_steering.errors import EffectError
+from lugre_steering.given_several import paths
 from lugre_steering.provenance import Provenance, Source, provenance
 from lugre_steering.recording import Array
 
@@ -110,13 +111,13 @@ def composed(ids: Iterable[str] | None = None, laws: int = 0) -> Composition:
 
 def add_files(files: str | Path | Sequence[str | Path]) -> None:
     """Add users' physics (one file or several) to the catalogue, here and in processes that are started from here."""
-    paths = [Path(file) for file in ([files] if isinstance(files, (str, Path)) else files)]
-    for file in paths:
+    added = paths("effects", files)
+    for file in added:
         effects, sha256 = own.read_effects(file)
         _add([(new, Origin(file.name, new.sha256, sha256)) for new in effects], str(file))
-    if paths:
+    if added:
         known = os.environ.get(VARIABLE, "").split(os.pathsep)
-        os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(path.resolve()) for path in paths)]))
+        os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*filter(None, known), *(str(path.resolve()) for path in added)]))
 
 
 def _add(effects: Sequence[tuple[Effect, Origin]], where: str) -> None:

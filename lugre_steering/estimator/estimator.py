@@ -8,10 +8,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import NoneType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
 from lugre_steering.chain.compose import Composition
 from lugre_steering.chain.doors import doors, row
@@ -140,6 +142,8 @@ class Estimator:
 
     def __init__(self, vehicle: Vehicle | str | Path, options: Options | None = None) -> None:
         """``vehicle``: one, or the path of its file. The step is compiled for the effects of this file alone, once per set of them."""
+        if not isinstance(options, (Options, NoneType)):
+            raise DataError(f"options: got {options!r}, expected Options(...)")
         self.vehicle = vehicle_of(vehicle)
         self.options = options or Options()
         self.channels = self.vehicle.channels
@@ -165,8 +169,10 @@ class Estimator:
         e, r = _process_one(self._held, self._first_line, channel, stamp_ns, value, rate)
         return self._estimates[:e], self._residuals[:r]
 
-    def push_block(self, channel: IntArray, stamp_ns: IntArray, value: Array, rate: Array) -> tuple[Records, Records]:
+    def push_block(self, channel: ArrayLike, stamp_ns: ArrayLike, value: ArrayLike, rate: ArrayLike) -> tuple[Records, Records]:
         """Many messages in recorded order, (n,) each -> all their estimates and residuals. ``DataError`` as in ``push``."""
+        channel, stamp_ns = _whole_numbers("channel", channel), _whole_numbers("stamp_ns", stamp_ns)
+        value, rate = _numbers("value", value), _numbers("rate", rate)
         if not channel.shape == stamp_ns.shape == value.shape == rate.shape == (channel.size,):
             sizes = ", ".join(str(column.shape) for column in (channel, stamp_ns, value, rate))
             raise DataError(f"channel, stamp_ns, value, rate: got arrays of shapes {sizes}, expected (n,) of all")
@@ -174,7 +180,7 @@ class Estimator:
             raise self._no_channel(channel[(channel < 0) | (channel >= len(self.channels))][0])
         estimates, residuals = np.zeros(channel.size, ESTIMATE), np.zeros(channel.size + PENDING_RING, RESIDUAL)
         e, r = _process(
-            self._core, self._first_line, channel.astype(np.int64), stamp_ns, value, rate, estimates, residuals
+            self._core, self._first_line, channel, stamp_ns, value, rate, estimates, residuals
         )
         return estimates[:e], residuals[:r]
 
@@ -189,16 +195,17 @@ class Estimator:
         if self.vehicle.rubber is None:
             raise DataError("initial temperature: this vehicle has no rubber, so nothing of it depends on temperature")
         low, high = RUBBER_DEGC
-        if not low <= rubber_degC <= high:
-            raise DataError(f"initial temperature: got {rubber_degC:g}, expected {low:g} to {high:g} degC")
+        if not isinstance(rubber_degC, (int, float, np.number)) or not low <= rubber_degC <= high:
+            raise DataError(f"initial temperature: got {rubber_degC!r}, expected {low:g} to {high:g} degC")
         self._parameters["rubber_temperature"] = rubber_degC
 
-    def set_plan(self, stamp_ns: IntArray, theta: Array) -> None:
+    def set_plan(self, stamp_ns: ArrayLike, theta: ArrayLike) -> None:
         """Planned angles ahead: absolute times (n,) [ns] and angles (sides, n) [rad]; replaces the former plan.
 
         ``DataError`` if it is none, is faster than an angle may be, or begins too far from the present one: see ``refuse_plan``.
         Without points there is no plan any more.
         """
+        stamp_ns, theta = _whole_numbers("stamp_ns", stamp_ns), _numbers("theta", theta)
         if theta.shape != (len(self.vehicle.sides), stamp_ns.size):
             raise DataError(f"{stamp_ns.size} times and angles of shape {theta.shape}; expected an angle of each side at each time")
         if stamp_ns.size > PLAN_POINTS:
@@ -339,8 +346,8 @@ class Estimator:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of an estimator of the same vehicle; ``DataError``, and nothing changed, if it is of another."""
-        shapes = [array.shape for array in self._core]
-        if snapshot.model != self._composition.name or shapes != [array.shape for array in snapshot.arrays]:
+        of_this = isinstance(snapshot, Snapshot) and snapshot.model == self._composition.name
+        if not of_this or [array.shape for array in self._core] != [array.shape for array in snapshot.arrays]:
             raise DataError("it is not the snapshot of this model")
         for array, saved in zip(self._core, snapshot.arrays, strict=True):
             array[...] = saved
@@ -352,6 +359,20 @@ class Estimator:
     @property
     def _state(self) -> Records:
         return records_of(self._core.state, self._composition.state)
+
+
+def _whole_numbers(name: str, values: ArrayLike) -> IntArray:
+    given = np.asarray(values)
+    if given.size and given.dtype.kind not in "iu":
+        raise DataError(f"{name}: got {given.dtype}, expected whole numbers")
+    return np.asarray(given, np.int64)
+
+
+def _numbers(name: str, values: ArrayLike) -> Array:
+    try:
+        return np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise DataError(f"{name}: got {type(values).__name__}, expected numbers") from None
 
 
 def doubts(row: Records) -> list[str]:

@@ -27,7 +27,7 @@ from lugre_steering.vehicle import Vehicle
 LONGEST_S = 0.045
 """Devices are up to 30 ms apart, and stamps on receipt 10 ms late and more with jitter; beyond, it is told by name (time_delay) or as
 wiring (clock_skew)."""
-SHORTEST_S, SURE = 2e-4, 4.0
+SHORTEST_S, BELIEVED = 2e-4, 4.0
 """Smallest offset worth taking out, and standard deviations from which it is believed."""
 ALIKE_S = 1e-3
 """How alike offsets of several recordings are that are one delay of the machine; clocks start anew each time."""
@@ -36,10 +36,12 @@ ON_RECEIPT_S = 5e-4
 ODDS = 3.0
 """Of one delay against clocks that happen to agree, from which it is one."""
 WORTH_SAYING_S = 2e-3
+"""Offset from which a finding is told: a fifth of a sample at 100 Hz."""
 APART_S = 0.015
 """How far torque and angles may still be apart once their clocks are set, as that is done beside a friction law of another form; nothing
 where the law is the recording's own."""
 ROUNDS = 6
+"""Most rounds of setting the clocks and fitting."""
 NO_CLOCK = 0.6
 """Share of the cost with an offset below which a slow sensor, or what else makes torque late, explains it better."""
 LIKE_LATENESS = {"lag", "wind_up"}
@@ -55,7 +57,7 @@ class Offset:
 
     @property
     def believed(self) -> bool:
-        return abs(self.late_s) > max(SHORTEST_S, SURE * self.deviation_s)
+        return abs(self.late_s) > max(SHORTEST_S, BELIEVED * self.deviation_s)
 
 
 @dataclass(frozen=True)

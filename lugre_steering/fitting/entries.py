@@ -31,6 +31,7 @@ STIFF = replace(STIFFNESS, prior=WIDE, low=-FARTHEST_UNIT, high=FARTHEST_UNIT)
 STICKING = replace(STATIC, prior=WIDE, low=-0.7, high=FARTHEST)
 SLOWING = replace(STRIBECK, prior=WIDE, low=-FARTHEST_UNIT, high=FARTHEST_UNIT)
 CONSERVATIVE = SheetValue("conservative", ("aligning_torque",), WIDE, -FARTHEST_TERM, FARTHEST_TERM, additive=True)
+"""What an entry of the sheet that is wrong changes, as far as it may."""
 Cylinders = Mapping[str, Cylinder]
 Resized = Callable[[float], Cylinders]
 """Cylinders by name with a size of theirs times a factor."""

@@ -26,13 +26,19 @@ from lugre_steering.fitting.problem import Candidate, Problem, Values, in_thread
 from lugre_steering.recording import Array
 
 AR_ORDER_S = 0.6
+"""How far back the autoregression of the noise looks."""
 CHUNK_S = 3.0
+"""Pieces of standstill that are averaged."""
 MEMORIES_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""Exponential memories of the noise of which the spectrum may consist."""
 MIN_QUIET_S = 3.0
+"""Standstill from which the noise is known; below, the sheet's counts."""
 MOTION_PROFILE_S = 0.5
+"""Over which the noise that motion makes is smoothed."""
 SPLIT_HZ = 2.5
 """Between slow noise, known from standstill only, and fast noise, known from the residual wherever nothing sudden happens."""
 WINDOW_S = 0.25
+"""In which fast noise is taken: short against what happens, long against a sample."""
 AT_LEAST = 0.5
 """Share of the noise that the sheet gives its sensors, below which none is believed to be."""
 SLOW_MEMORY_S, SURENESS, LEAST_REST_S = 0.4, 3.0, 2.0

@@ -19,6 +19,7 @@ from lugre_steering.recording import Array, Mask
 INSTANTS = 16
 """Instants tried in each recording before the best is refined."""
 RESOLUTION_S = 1.0
+"""To which an instant is told."""
 Start = tuple[float, ...]
 ALIKE = 10.0
 """Energy, in noise variances, within which two instants fit alike."""

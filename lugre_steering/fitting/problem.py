@@ -80,6 +80,7 @@ STRIBECK = SheetValue("stribeck_speed", ("stribeck_speed",), 0.15, -0.7, 0.7)
 CAPACITY = SheetValue("heat_capacity", ("heat_capacity",), 0.15, -0.6, 0.6)
 COOLING = SheetValue("cooling", ("cooling",), 0.15, -0.6, 0.6)
 KINGPIN = SheetValue("kingpin_arm", ("aligning_torque",), 0.15, -0.6, 0.6)
+"""What may be recalibrated: fields of the chain, and how far from the sheet (a logarithm unless additive): deviation and range."""
 GAIN = SheetValue("pressure_gain", (), 0.03, -0.3, 0.3)
 """Scales the torque that the pressures show, no field of the chain."""
 EXCESS_K, EXCESS_LOW_K, EXCESS_HIGH_K = 12.0, -10.0, 100.0
@@ -92,6 +93,7 @@ LEAST_STATIC = 0.05
 TYPICAL = 1.0 / 3.0
 """Standard deviation of the size of a bend, in what it is at most, of real rubber."""
 STANDARD = (FRICTION, STATIC, STIFFNESS, STRIBECK, CAPACITY, COOLING)
+"""What is recalibrated unless more is asked for, with the doubts of a sheet and the most that it may be off."""
 
 
 RIG = (

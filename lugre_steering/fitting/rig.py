@@ -20,7 +20,7 @@ from lugre_steering.fitting.problem import Candidate, Effects, Problem, Values
 from lugre_steering.fitting.trial import TRIAL_TOLERANCE, Trial, cost, refine, without_part
 from lugre_steering.recording import Array
 
-LEAST, SHARE, SURE = 0.05, 0.02, 0.3
+LEAST, SHARE, PLENTY = 0.05, 0.02, 0.3
 """Energy by which what is left must rise without a term: in noise variances per sample, and a share of what all leave, unless it is
 so large against the noise."""
 MUCH = 2.0
@@ -107,7 +107,7 @@ def _terms(problem: Problem, current: Fit) -> list[Candidate]:
 
 def _least(problem: Problem, current: Fit, weight: Array) -> float:
     samples = float(np.count_nonzero(weight))
-    return max(LEAST * samples, min(SHARE * (cost(problem, current, weight) - samples), SURE * samples))
+    return max(LEAST * samples, min(SHARE * (cost(problem, current, weight) - samples), PLENTY * samples))
 
 
 def fitted(problem: Problem, weight: Array, effects: Sequence[tuple[Candidate, Values]], near: Fit) -> Fit:

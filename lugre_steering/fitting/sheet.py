@@ -40,6 +40,7 @@ SURPRISE = 10.0
 RELIEVED = 0.5
 """Share of the surprise that a hypothesis must leave at most, unless a value stands at its bound."""
 EDGE = 0.01
+"""Share of its range within which a value stands at its bound."""
 ERROR_S = 1.0
 """How long an error of the friction law's form lasts."""
 SAMPLES, RATE_HZ = 6000, 25.0
@@ -74,6 +75,7 @@ SHOWN, TOLD = 5, 3
 SAME_SIZE = 0.1
 """Share by which torques differ that are told to be of one size."""
 LEVELS = ("friction_level", "stiffness")
+"""Values that stop at a bound where a wrong entry makes all torques too large or too small."""
 
 
 @dataclass(frozen=True)

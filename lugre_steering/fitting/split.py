@@ -13,10 +13,13 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Array, Mask
 
 BLOCK_S = 8.0
+"""Long against the memory of errors, short against a recording."""
 SPARED_S = 1.0
+"""Between blocks, so that errors that last are in one of them only."""
 CYCLE = 3
 """One block in so many is held out."""
 CLEARLY = 1.5
+"""Times as much that another cut must hold out to be taken."""
 CLUSTER_S = 2.0
 """Errors closer than this count as one for intervals and tests."""
 

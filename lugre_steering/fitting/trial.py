@@ -22,6 +22,7 @@ PARTIAL = 0.1
 VARIANT, VARIANTS = 0.5, 2
 """Share of the best shape's screened energy, and number, of further shapes from which a promising effect is fitted."""
 TRIAL_TOLERANCE = 1e-4
+"""Relative fall of the cost that ends a trial: enough to rank it."""
 START, GO_ON, NEAR = 3, 5, 0.3
 """Linearisations of a trial from each start and beyond, and the share of the best trial's gain within which it must be able to come:
 what ties or follows a name is far nearer."""

@@ -11,7 +11,7 @@ from lugre_steering.fitting.problem import Problem
 from lugre_steering.recording import Finding
 from lugre_steering.vehicle.sections import Initial
 
-MATTERS_K, SURE = 4.0, 2.0
+MATTERS_K, APART = 4.0, 2.0
 """Difference to the vehicle file from which a temperature is told, and standard deviations that it must be."""
 
 
@@ -27,7 +27,7 @@ def weather_findings(problem: Problem, result: Fit) -> dict[str, Finding]:
         at = [first + bag, first + count + bag]
         spread = float(np.sqrt(max(problem.doubt * result.covariance[np.ix_(at, at)].sum(), 0.0)))
         off = rubber - initial.rubber_temperature_degC
-        if abs(off) > max(MATTERS_K, SURE * spread):
+        if abs(off) > max(MATTERS_K, APART * spread):
             source = f"air {air:.0f} degC" + (" as recorded" if run.first_air is not None else ", by the fit")
             found[run.name] = Finding(
                 "rubber_temperature", "",

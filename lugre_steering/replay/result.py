@@ -19,7 +19,7 @@ from lugre_steering.gate import Facts, Gate
 from lugre_steering.online import Agreement
 from lugre_steering.provenance import Provenance
 from lugre_steering.recording import Array, Finding
-from lugre_steering.result import Result, angle_column, folder_for, frame, html, of_bag, torque_column
+from lugre_steering.result import Result, angle_column, frame, html, of_bag, torque_column, writing_into
 from lugre_steering.serialise import ADDED, IN_MEMORY
 from lugre_steering.vehicle import Vehicle
 
@@ -153,9 +153,9 @@ class Replay(Result):
 
     def save(self, out: str | Path) -> None:
         """Write summary.json into a folder; replaces only an earlier one there."""
-        folder = folder_for(out)
-        earlier_result(folder, RECORD, SCHEMA, ())
-        write_record(self.json, folder / RECORD)
+        with writing_into(out) as folder:
+            earlier_result(folder, RECORD, SCHEMA, ())
+            write_record(self.json, folder / RECORD)
 
     def to_frame(self) -> DataFrame:
         """One row per estimate of all bags, as a pandas table; the column ``bag`` tells them apart."""

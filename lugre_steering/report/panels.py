@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from lugre_steering.recording import Array
 from lugre_steering.report import style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 STYLES: dict[str, dict[str, Any]] = {"measured": style.MEASURED, "improved": style.IMPROVED, "original": style.ORIGINAL}
@@ -38,10 +39,13 @@ class Panel:
     shaded: Sequence[tuple[float, float]] = ()
 
 
-def panels(rows: Sequence[Panel]) -> Figure:
-    """Panels one below the other, over time [s]; the figure."""
-    with _figure(len(rows), 2.1 * len(rows)) as (fig, axes):
-        for ax, panel in zip(axes, rows, strict=True):
+def panels(rows: Sequence[Panel], below: Sequence[Callable[[Axes], None]] = ()) -> Figure:
+    """Panels one below the other, over time [s], and ``below`` them what draws itself; the figure."""
+    count = len(rows) + len(below)
+    with _figure(count, 2.1 * count) as (fig, axes):
+        for draw, ax in zip(below, axes[len(rows) :], strict=True):
+            draw(ax)
+        for ax, panel in zip(axes, rows, strict=False):
             for curve in panel.curves:
                 ax.plot(curve.x, curve.y, label=curve.label, **STYLES.get(curve.style, {}))
             for start, end in panel.shaded:
@@ -50,7 +54,7 @@ def panels(rows: Sequence[Panel]) -> Figure:
             ax.set_ylabel(panel.unit)
             ax.margins(x=0.0)
             ax.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
-        axes[-1].set_xlabel("time (s)")
+        axes[len(rows) - 1].set_xlabel("time (s)")
     return fig
 
 

@@ -35,7 +35,7 @@ from lugre_steering.simulate.paper.result import PublishedExperiments
 from lugre_steering.simulate.result import Simulation
 from lugre_steering.simulate.run import sensing_of, simulate
 from lugre_steering.simulate.sensors import Sensing
-from lugre_steering.simulate.write import STORAGES, write_bag
+from lugre_steering.simulate.write import check_storage, write_bag
 from lugre_steering.terminal import Prose, point
 from lugre_steering.vehicle import Vehicle
 
@@ -106,8 +106,7 @@ def run_manoeuvre(
 ) -> dict[str, Any]:
     """Simulate one manoeuvre; write the bag ``out/synthetic_<name>`` and its picture. ``sensing`` overrides fields of
     ``Sensing``; None means the vehicle's own. ``made``: how both come about."""
-    if storage not in STORAGES:
-        raise DataError(f"storage: got '{storage}', expected {' or '.join(STORAGES)}")
+    check_storage(storage)
     folder = out / f"synthetic_{bag_name(Path(what)).replace('-', '_')}"
     if folder.exists():  # said before the work, not after it
         raise DataError(f"{folder}: exists already; recordings are never overwritten, choose another --out")

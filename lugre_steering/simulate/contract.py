@@ -1,6 +1,6 @@
 # Copyright 2026 The lugre_steering contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What every effect owes the chain, checked on the test vehicle: ``broken`` says what an effect fails to keep."""
+"""What every effect owes the chain and the estimator, checked on the test vehicle: ``broken`` says what an effect fails to keep."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from lugre_steering.chain.step import Records, new_state, run_side, torque_side
 from lugre_steering.effects.entry import Effect, Parameter
 from lugre_steering.recording import Array
 from lugre_steering.resources import config_folder
+from lugre_steering.simulate.contract_live import broken_live
 from lugre_steering.vehicle import load
 from lugre_steering.vehicle.model import build_model
 
@@ -21,6 +22,8 @@ NEUTRAL = {"arm": 1.0, "line": 0.0, "delay": 0.0, "lag": 0.0}
 """Laws of sensors that are no part of the step, and what they give where every amplitude is zero."""
 NOTICED = 1e-6
 """Change of the torque, as a share of its amplitude, from which a parameter acts."""
+SLOWER = 10
+"""Samples of the chain for one of the estimator's: a law holds at any sample time, and this is the longest that suits the estimator."""
 
 Driven = tuple[Array, Array, Array, Array]
 
@@ -31,11 +34,13 @@ def broken(effect: Effect) -> list[str]:
     model = build_model(vehicle)
     found = [f"unit: {p.name} has '{p.unit}', expected SI units" for p in effect.parameters if not UNIT.fullmatch(p.unit)]
     found += _sensed(effect)
-    if effect.hooks.keys() <= NEUTRAL.keys():
-        return found
-    bench = _Bench(effect, model.parameters[0], model.rubber)
-    for check in (_neutral, _acting, _finite, _in_pieces, _causal, _mirrored, _passive):
-        found += check(bench)
+    if not effect.hooks.keys() <= NEUTRAL.keys():
+        bench = _Bench(effect, model.parameters[0], model.rubber)
+        for check in (_neutral, _acting, _finite, _in_pieces, _causal, _mirrored, _passive):
+            found += check(bench)
+    if effect.hooks and not found:  # what the chain shows would be told once more
+        time, theta, *_ = _cycles()
+        found += broken_live(effect, vehicle, time[::SLOWER], theta[::SLOWER])
     return found
 
 

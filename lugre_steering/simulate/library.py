@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lugre_steering.errors import DataError
+from lugre_steering.given_several import texts
 from lugre_steering.simulate.command import load_vehicle, simulation
 from lugre_steering.simulate.plant import with_effects
 from lugre_steering.simulate.result import Simulation
@@ -27,8 +28,5 @@ def simulate(
     model = load_vehicle(None) if vehicle is None else vehicle_of(vehicle)
     if not isinstance(what, (str, Path)):
         raise DataError(f"what: got {type(what).__name__}, expected the name of a manoeuvre or the path of a file")
-    texts = [effects] if isinstance(effects, str) else list(effects)
-    for text in texts:
-        if not isinstance(text, str):
-            raise DataError(f"effects: got {text!r}, expected texts 'id:parameter=value,...'")
-    return simulation(str(what), with_effects(model, texts), sensing)
+    added = texts("effects", effects, "texts 'id:parameter=value,...'")
+    return simulation(str(what), with_effects(model, added), sensing)

@@ -28,6 +28,8 @@ from lugre_steering.vehicle import Axle, Vehicle
 STEP_S = 0.002
 """Grid of the simulation; the bristle step is exact at constant rate, so this only has to resolve the corners of the
 motion."""
+SAMPLE_S = 0.02
+"""Sampling interval of a manoeuvre that is only looked at, by a card or to choose the next experiment."""
 SMOOTHING_S = 0.2
 """Width of each of the two running means that round the corners: rates rise over 0.4 s, accelerations are
 continuous."""

@@ -15,10 +15,10 @@ import numpy as np
 from lugre_steering import units
 from lugre_steering.errors import DataError
 from lugre_steering.recording import Kind, Recording, Signal
-from lugre_steering.result import Result, angle_column, folder_for, frame, html, torque_column
+from lugre_steering.result import Result, angle_column, frame, html, torque_column, writing_into
 from lugre_steering.serialise import IN_MEMORY
 from lugre_steering.simulate.run import Simulated
-from lugre_steering.simulate.write import START_NS, write_bag
+from lugre_steering.simulate.write import START_NS, check_storage, write_bag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,10 +90,12 @@ class Simulation(Result):
 
     def save(self, out: str | Path, storage: str = "mcap") -> Simulation:
         """Write the bag ``synthetic_<name>`` into a folder, never over another; the result names it."""
-        folder = folder_for(out) / f"synthetic_{self.name}"
-        if folder.exists():
-            raise DataError(f"{folder}: exists already; recordings are never overwritten, choose another folder")
-        write_bag(folder, self.run, f"{self.name}, vehicle '{self.run.vehicle.name}'", storage)
+        check_storage(storage)
+        with writing_into(out) as parent:
+            folder = parent / f"synthetic_{self.name}"
+            if folder.exists():
+                raise DataError(f"{folder}: exists already; recordings are never overwritten, choose another folder")
+            write_bag(folder, self.run, f"{self.name}, vehicle '{self.run.vehicle.name}'", storage)
         return replace(self, bag=str(folder))
 
     def to_frame(self) -> DataFrame:

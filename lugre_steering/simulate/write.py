@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lugre_steering.bag import cdr
 from lugre_steering.bag.messages import Bytes
-from lugre_steering.errors import BagError, reason
+from lugre_steering.errors import BagError, DataError, reason
 from lugre_steering.files import new_folder
 from lugre_steering.provenance import MADE, Provenance
 from lugre_steering.recording import TRUTH, Array, IntArray, Kind
@@ -28,6 +28,12 @@ FRAME = "synthetic"
 STRING = "std_msgs/msg/String"
 
 STORAGES = ("mcap", "sqlite3")
+
+
+def check_storage(storage: str) -> None:
+    """Refuse what bags are not written in."""
+    if storage not in STORAGES:
+        raise DataError(f"storage: got {storage!r}, expected {' or '.join(STORAGES)}")
 
 
 def write_bag(

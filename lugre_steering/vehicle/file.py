@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import reprlib
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -34,7 +35,7 @@ def load(path: str | Path) -> Vehicle:
     What is possible and unlike any real vehicle is warned of (``ImplausibleWarning``).
     """
     if not isinstance(path, (str, Path)):
-        raise VehicleFileError(f"vehicle: got {path!r}, expected a vehicle or the path of its file")
+        raise VehicleFileError(f"vehicle: got {reprlib.repr(path)}, expected a vehicle or the path of its file")
     file = Path(path)
     reader = Reader(file, VehicleFileError)
     text = reader.text()
@@ -77,6 +78,10 @@ def save(vehicle: Vehicle, path: str | Path, notes: Sequence[str] = ()) -> None:
 
     Its first and last lines tell who wrote it and that nothing is missing: most of its beginnings would be valid vehicles.
     """
+    if not isinstance(vehicle, Vehicle):
+        raise VehicleFileError(f"vehicle: got {reprlib.repr(vehicle)}, expected a vehicle, as load_vehicle gives it")
+    if not isinstance(path, (str, Path)):
+        raise VehicleFileError(f"path: got {reprlib.repr(path)}, expected that of a file")
     content = yaml.safe_dump(to_mapping(vehicle), sort_keys=False, allow_unicode=True, width=120)
     first = f"{COMMENT_MARK}; not whole without the three dots of its last line\n"
     try:

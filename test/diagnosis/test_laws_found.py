@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from a_law import a_law
 from remembering import remembered
 from scipy.signal import lfilter
 from small_problem import SIGMA, effect, small_problem, weight, with_torque
@@ -354,7 +355,7 @@ def test_what_no_law_of_one_coordinate_can_be_shows_in_its_share_of_the_ceiling(
     _, found = searched(by_run(lambda run: np.sum(1500.0 * np.cos(9.0 * run.theta + 25.0 * run.omega), axis=0)))
     assert found is not None
     assert 0.3 < found.foretold / found.ceiling < 0.9
-    assert described(found)[0]["share_of_ceiling"] == found.foretold / found.ceiling
+    assert described(found)[0].share_of_ceiling == found.foretold / found.ceiling
 
 
 def wandering_for_seconds(size: int, seed: int) -> Array:
@@ -368,7 +369,8 @@ def test_the_band_of_a_law_holds_it_where_errors_last() -> None:
     hidden = by_run(lambda run: np.sum(900.0 * np.sin(2.0 * np.pi * run.theta / 0.3), axis=0))
     _, found = searched(hidden + 4.0 * SIGMA * wandering_for_seconds(hidden.size, 2))
     assert found is not None
-    at, f, band = (np.array(described(found)[0]["f"][key]) for key in ("at", "f", "band"))
+    curve = described(found)[0].f
+    at, f, band = map(np.array, (curve.at, curve.f, curve.band))
     assert np.mean(np.abs(f - 900.0 * np.sin(2.0 * np.pi * at / 0.3)) < band) > 0.9
     assert np.median(band) < 450.0  # and says more than that nothing is known
 
@@ -456,7 +458,7 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     assert beside.names == 1
     (entry,) = entries(beside)
     assert (entry.channel, entry.coordinate, entry.memory) == ("conservative_torque", "rate", "lag")
-    assert [law["title"] for law in described(beside)] == [entry.title]
+    assert [law.title for law in described(beside)] == [entry.title]
     assert not in_place(named(problem, viscous), alone, beside)  # far truer than the law alone
     assert leaves_names(named(problem, viscous), beside)
     assert keeps_names(named(problem, viscous), beside, alone)  # though it is two parts, and the law alone is one
@@ -473,7 +475,7 @@ def test_a_law_is_found_beside_a_name_which_keeps_its_place() -> None:
     swapped = in_place_of_one(named(problem, viscous), replace(beside, problem=room, fitted=laws, fit=laws, gains=(1.0, 1.0)), 1)
     assert swapped is not None
     assert swapped.names == 1
-    assert [law["title"] for law in described(swapped)] == [entry.title]
+    assert [law.title for law in described(swapped)] == [entry.title]
     assert in_place_of_one(named(problem, viscous), alone, 1) is None
 
 
@@ -588,10 +590,6 @@ def test_a_bad_law_in_a_catalogue_is_refused_by_key(tmp_path: Path) -> None:
     ],
 )
 def test_a_formula_has_its_numbers_and_a_sentence_what_fits_as_well(form: str, values: dict[str, float], said: str) -> None:
-    law = {
-        "channel": "conservative_torque", "coordinate": "angle", "memory": "none", "form": form, "values": values, "range": [-0.6, 0.6],
-        "title": "a torque", "largest_Nm": 900.0, "largest_share": 0.1,
-        "ties": [{"title": title} for title in ("a gain", "a loss", "more")],
-    }  # fmt: skip
+    law = a_law(form=form, values=values)
     assert formula([law], load_vehicle(None)) == f"torque [N m] = {said}"
     assert sentence([law], lambda torque: f"{torque:g} N m").endswith("of the torque; not to be told from a gain or a loss)")

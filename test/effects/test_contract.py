@@ -51,6 +51,14 @@ def blind(size, edge):  # type: ignore[no-untyped-def]
     return 1.0 + size + 0.0 * edge
 
 
+def quick(theta, dt, size):  # type: ignore[no-untyped-def]
+    return size * math.sin(theta) if dt < 0.05 else 0.0
+
+
+def growing(theta, size, grown):  # type: ignore[no-untyped-def]
+    return size * math.sin(theta), 1e4 * grown + 1.0
+
+
 def driving(omega, size):  # type: ignore[no-untyped-def]
     return -400.0 * size * omega
 
@@ -66,6 +74,8 @@ BREAKING = {
         (made(not_neutral, Parameter("size", "N m", "", 5.0), acts_by=("size",), one_sided=False), "mirror"),
         (made(blind, SIZE, Parameter("edge", "rad", "read, but to no end", 0.1, grid=(0.1,)), hook="arm"), "acting: .* edge"),
         (made(not_neutral, SIZE, hook="delay"), "neutral: the law 'delay'"),
+        (made(quick, SIZE), "live: neither torque nor residual"),
+        (made(growing, SIZE, memory={"grown": 0.0}), "live: its memory cannot be kept over a restart: .*grown"),
     ])
 }  # fmt: skip
 

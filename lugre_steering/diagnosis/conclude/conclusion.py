@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lugre_steering.diagnosis import verify
 from lugre_steering.diagnosis.conclude import limits
@@ -20,6 +20,7 @@ from lugre_steering.diagnosis.conclude.left_over import LeftOver, beside_laws, o
 from lugre_steering.diagnosis.conclude.stands import CONTRADICTED, Stands, standing, without_laws
 from lugre_steering.diagnosis.conclude.statement import statement
 from lugre_steering.diagnosis.finished import Finished
+from lugre_steering.diagnosis.found_law import FoundLaw
 from lugre_steering.diagnosis.laws.write import described, entries, formula, sentence
 from lugre_steering.diagnosis.result import (
     AUGMENTED,
@@ -71,7 +72,7 @@ class _Modelled:
     final: Fit
     whole: Fit
     bent: Fit
-    laws: list[dict[str, Any]]
+    laws: tuple[FoundLaw, ...]
     law: str
     left: LeftOver
 
@@ -99,11 +100,11 @@ def _modelled(done: Finished, stands: Stands, seed: int) -> _Modelled:
     if any(candidate.since for candidate, _ in final.effects):
         final = whole  # timed by all data
     if (lawful := stands.lawful) is None and stands.named and (form := stands.form) is not None:
-        return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, [], "", stands.left)
+        return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, (), "", stands.left)
     if lawful is None:
         if stands.named and (joint := in_parallel(done, final, seed)) is not None:
             done, whole, bent = joint.done, joint.whole, joint.bent
-        return _Modelled(done, final, whole, bent, [], "", stands.left)
+        return _Modelled(done, final, whole, bent, (), "", stands.left)
     beside, whole, laws = replace(done, problem=lawful.problem), lawful.fit, described(lawful, stands.nearest)
     law = sentence(laws, done.torque)
     left = beside_laws(beside, stands.left, lawful.fitted, lawful.names, law, formula(laws, done.problem.vehicle))
@@ -168,7 +169,7 @@ def _told(
         detection_limits=_limits(done, [effect.id for effect in effects]),
         data_quality=tuple(findings),
         next_experiment=advice,
-        laws=tuple(model.laws),
+        laws=model.laws,
         friction_form=form,
         traces=_shown(done, stands, model),
         evidence=evidence(done.compared, effects),

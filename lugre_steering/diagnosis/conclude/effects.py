@@ -28,6 +28,7 @@ from lugre_steering.report import words
 BOTH_SIDES = 0.5
 """Share of its largest angle below which an effect that acts to both sides must be silent to be called one of |angle|."""
 IN_PLACE = "small changes of the form of the friction law, all of them together, would explain as much"
+"""Said of a name beside the freedoms of the friction law."""
 
 
 def named_effects(done: Finished, whole: Fit, bent: Fit, material: float, nearest: bool) -> list[NamedEffect]:

@@ -22,10 +22,19 @@ from lugre_steering.errors import DataError
 from lugre_steering.fitting.fit import Fit
 from lugre_steering.fitting.problem import Candidate, Problem, is_rig
 from lugre_steering.recording import Array
-from lugre_steering.simulate.manoeuvres import BUILT_IN, HEATING, LIMIT_DEG, Chirp, Manoeuvre, Segment, Sweep, motion_of
+from lugre_steering.simulate.manoeuvres import (
+    BUILT_IN,
+    HEATING,
+    LIMIT_DEG,
+    SAMPLE_S,
+    Chirp,
+    Manoeuvre,
+    Segment,
+    Sweep,
+    motion_of,
+)
 from lugre_steering.vehicle import Vehicle
 
-SAMPLE_S = 0.02
 SHORTEST_TRAVEL = 20.0
 """Travel asked of a linear axis that hardly moved, in presliding lengths."""
 Named = tuple[Candidate, Mapping[str, float]]

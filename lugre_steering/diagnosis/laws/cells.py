@@ -24,6 +24,7 @@ CYCLES = np.arange(2.0, 40.5, 0.5)
 TOOTHED = ("friction_level", "conservative_torque", "coulomb_friction", "gain")
 """Channels whose f over the angle may be fine."""
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Time constants that are tried: finer ones follow by NEARER."""
 PLAYS = (0.05, 0.15)
 """Half widths of play and relay that are tried, as shares of the travel."""
 RINGS_HZ, RINGS_TRIED, RING_STEPS = (0.3, 8.0), 32, 10.0
@@ -33,8 +34,9 @@ NEARER = (0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.6, 1.8, 2.1)
 NEARER_RING = (0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.01, 1.02, 1.03, 1.04, 1.05, 1.06)
 """The same of what rings, which does so at its own period only."""
 SMALL = {"conservative_torque": 1.0, "coulomb_friction": 1.0, "load_friction": 1e-3, "lag": 1e-3}
+"""Sizes of the unit laws by which channels are traced."""
 SMALLEST = 1e-4
-"""Sizes of the unit laws by which channels are traced, and share of the torque amplitude for the others."""
+"""The same for the other channels, as a share of the torque amplitude."""
 RARE, SEEN = 0.005, 0.1
 """Share of the time at either end of a coordinate that is too little to know f there, and share of its whole range that is left then."""
 TRACER, WIDE = 1e-6, 1e9

@@ -24,6 +24,7 @@ from lugre_steering.recording import Array
 from lugre_steering.vehicle.laws import MOST_IN_FILE
 
 MOST_LAWS = 2
+"""One, and a second that earns its place."""
 SHORTLIST, CLOSE, SIMPLIFIED, TRIED = 8, 0.75, 3, 16
 """Cells refitted in the chain, share of the best gain that brings them there, how many of them are put into closed forms, and the most
 that are refitted if some do not settle."""

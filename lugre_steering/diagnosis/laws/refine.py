@@ -25,6 +25,7 @@ NUMBER_COSTS = 0.01
 PULL = 0.03
 """How strongly fits pull the free pieces to zero, for those that the data do not show."""
 TRIED_FORMS = 3
+"""Closed forms that are fitted in the chain, of those that promise most."""
 SHARE, MOST = 0.03, 1e4
 """Size of a law worth seeing, as a share of the torque amplitude, and how many times that it may have."""
 FITTED = ("lag", "ring")

@@ -24,6 +24,7 @@ from lugre_steering.fitting.split import Split
 from lugre_steering.recording import Array, IntArray
 
 RATE_HZ, MOST_ROWS = 20.0, 8000
+"""To which the screen thins a recording, and rows that it has at most: enough to rank cells in seconds."""
 FOLD_CLUSTERS = 2
 """Clusters (``fitting.split``) of a stretch that is left out as a whole."""
 SMOOTHING = (1e-4, 1e-2, 1.0)
@@ -33,6 +34,7 @@ FREE = 30.0
 ALIKE = 0.01
 """Share of what a constant law does that names leave of it at most, if they do the same."""
 PERMUTED = 16
+"""Permutations of the errors: the largest gain in them is part of the bar."""
 STATE = ("angle", "rate", "torque")
 """Coordinates in which a black box sees fine waves, that it cannot among many."""
 FEATURES, REACHES, SIZES, TOLD = 300, (0.5, 1.0, 2.0), (0.3, 3.0), 0.01

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from lugre_steering import units
 from lugre_steering.diagnosis.finished import amplitude_of
+from lugre_steering.diagnosis.found_law import FoundLaw, LawCurve, LawTie
 from lugre_steering.diagnosis.laws.cells import Axis, Traces, trace
 from lugre_steering.diagnosis.laws.find import FoundLaws, Tried, cell_of
 from lugre_steering.diagnosis.laws.refine import Law, law_of
@@ -36,6 +36,7 @@ CHANNEL_WORDS = {
     "inertia": "a torque in proportion to the acceleration", "lag": "a lag of the torque",
     "linked_inertia": "an inertia that changes as the linkage turns",
 }  # fmt: skip
+"""What a law of each channel is, in words."""
 COORDINATE_WORDS = {
     "angle": "angle", "abs_angle": "absolute angle", "rate": "steering rate", "abs_rate": "absolute steering rate",
     "direction": "direction", "since_reversal": "angle since reversal", "torque": "torque", "abs_torque": "absolute torque",
@@ -43,6 +44,7 @@ COORDINATE_WORDS = {
     "rubber_temperature": "rubber temperature", "air_temperature": "air temperature", "opposing_torque": "torque against the motion",
     "passes": "passages of the same place",
 }  # fmt: skip
+"""What each coordinate is called, in words."""
 
 
 def entries(found: FoundLaws) -> tuple[LawEntry, ...]:
@@ -126,8 +128,8 @@ def _shape_words(law: Law, values: Mapping[str, float], along: str, vehicle: Veh
     return f"in proportion to the {along}" if law.form == "linear" and known["value"] == 0.0 else f"a function of the {along}"
 
 
-def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """The entry of each law in ``diagnosis.json``: the vehicle file's, its size in N m and percent, its share of the ceiling, ties;
+def described(found: FoundLaws, nearest: Sequence[str] = ()) -> tuple[FoundLaw, ...]:
+    """Each law as the diagnosis tells it: the vehicle file's entry, its size in N m and percent, its share of the ceiling, ties;
     ``nearest``: entries of the catalogue in whose place they stand."""
     torque = amplitude_of(found.problem.measured)
     made = []
@@ -139,31 +141,34 @@ def described(found: FoundLaws, nearest: Sequence[str] = ()) -> list[dict[str, A
         alone = tuple(effect for i, effect in enumerate(found.fit.effects) if i != place or cells[index].axis.memory != "ring")
         traces = trace(found.problem, replace(found.fit, effects=alone), found.problem.last_place, [cells[index].axis])
         largest = float(np.percentile(np.abs(contribution(found.problem, found.fit, place)), 99.0))
-        made.append({
-            "id": law.id, "title": entry.title, "channel": entry.channel, "coordinate": entry.coordinate, "memory": entry.memory,
-            "memory_size": entry.memory_size, "form": entry.form, "values": entry.values, "intervals": {
-                name: list(span) for name, span in entry.intervals.items()},
-            "range": list(entry.range), "largest_Nm": largest, "largest_share": largest / torque,
-            "heldout_gain": entry.heldout_gain, "gain": found.gains[index], "bar": found.bar,
-            "share_of_ceiling": found.foretold / found.ceiling,
-            "ties": [_tie(tie, found.problem.vehicle) for tie in found.ties] if not index else [], "nearest_listed": list(nearest),
-            "f": {
-                **_picture(found, place, law, values), **_points(found, place, traces, law, values),
-            },
-        })  # fmt: skip
-    return made
+        made.append(FoundLaw(
+            law.id, entry.title or "", entry.channel, entry.coordinate, entry.memory, entry.memory_size, entry.form,
+            values=entry.values,
+            intervals={name: (low, high) for name, (low, high) in entry.intervals.items()},
+            range=(cells[index].low, cells[index].high),
+            largest_Nm=largest,
+            largest_share=largest / torque,
+            heldout_gain=entry.heldout_gain,
+            gain=found.gains[index],
+            bar=found.bar,
+            share_of_ceiling=found.foretold / found.ceiling,
+            ties=tuple(_tie(tie, found.problem.vehicle) for tie in found.ties) if not index else (),
+            nearest_listed=tuple(nearest),
+            f=LawCurve(*_picture(found, place, law, values), *_points(found, place, traces, law, values)),
+        ))  # fmt: skip
+    return tuple(made)
 
 
-def _tie(tie: Tried, vehicle: Vehicle) -> dict[str, Any]:
+def _tie(tie: Tried, vehicle: Vehicle) -> LawTie:
     cell, title = cell_of(tie), law_words(tie.law, tie.fit.effects[-1][1], vehicle)
-    return {
-        "title": title, "channel": cell.channel, "coordinate": cell.axis.coordinate, "memory": cell.axis.memory,
-        "memory_size": cell.axis.memory_size,
-    }  # fmt: skip
+    return LawTie(title, cell.channel, cell.axis.coordinate, cell.axis.memory, cell.axis.memory_size)
 
 
-def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
-    """f over its range with its 95 % band, from the spread of the fit."""
+Numbers = tuple[float, ...]
+
+
+def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]) -> tuple[Numbers, Numbers, Numbers]:
+    """Places over its range, f there, and half the width of its 95 % band, from the spread of the fit."""
     first = found.problem.nuisances + sum(len(known.free) for known, _ in found.fit.effects[:index])
     names = [name for name in found.fit.effects[index][0].free if name != "memory_size"]
     part = slice(first, first + len(names))
@@ -176,7 +181,7 @@ def _picture(found: FoundLaws, index: int, law: Law, values: Mapping[str, float]
     slope: Array = np.array(slopes)
     band = NORMAL * np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", slope, covariance, slope), 0.0))
     keep = slice(None, None, 8)
-    return {"at": at[keep].tolist(), "f": f[keep].tolist(), "band": band[keep].tolist()}
+    return tuple(at[keep].tolist()), tuple(f[keep].tolist()), tuple(band[keep].tolist())
 
 
 _SIGNALS = {
@@ -184,27 +189,29 @@ _SIGNALS = {
     "load_friction": "|M| sgn(omega)", "viscous_loss": "omega", "turbulent_loss": "omega |omega|", "gain": "M", "inertia": "alpha",
     "lag": "dM/dt", "linked_inertia": "alpha + f' omega^2 / 2",
 }  # fmt: skip
+"""What f is multiplied by, in symbols."""
 _PLACES = {
     "angle": "theta", "abs_angle": "|theta|", "rate": "omega", "abs_rate": "|omega|", "direction": "sgn(omega)", "torque": "M",
     "abs_torque": "|M|", "time": "t", "rubber_temperature": "T", "air_temperature": "T_air", "opposing_torque": "M sgn(omega)",
 }  # fmt: skip
+"""What f is a function of, in symbols."""
 
 
-def formula(described: Sequence[Mapping[str, Any]], vehicle: Vehicle) -> str:
+def formula(described: Sequence[FoundLaw], vehicle: Vehicle) -> str:
     """The laws in symbols: what each channel's signal is multiplied by, over its coordinate."""
-    parts = [f"{_f_in_symbols(law)} {_SIGNALS[law['channel']]}".strip() for law in described]
+    parts = [f"{_f_in_symbols(law)} {_SIGNALS[law.channel]}".strip() for law in described]
     return units.law(vehicle, "torque [N m] = " + " + ".join(parts))
 
 
-def _f_in_symbols(law: Mapping[str, Any]) -> str:
+def _f_in_symbols(law: FoundLaw) -> str:
     """f with its numbers where few of them make it, else by name; in SI."""
-    place = _PLACES.get(law["coordinate"], law["coordinate"].replace("_", " "))
-    v, form = law["values"], law["form"]
+    place = _PLACES.get(law.coordinate, law.coordinate.replace("_", " "))
+    v, form = law.values, law.form
     if form == "constant":
         return f"{v['value']:.4g}"
-    if law["memory"] != "none":
-        size = f"{law['memory_size']:.3g} {laws.MEMORIES[law['memory']] or laws.COORDINATES[law['coordinate']]}"
-        return f"f({place}; {law['memory']} of {size})"
+    if law.memory != "none":
+        size = f"{law.memory_size:.3g} {laws.MEMORIES[law.memory] or laws.COORDINATES[law.coordinate]}"
+        return f"f({place}; {law.memory} of {size})"
     begin = {"step": "before", "exponential": "end"}.get(form, "value")
     level = f"{v[begin]:+.4g} " if v.get(begin) else ""
     if form == "linear":
@@ -212,7 +219,7 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
     if form == "power":
         return f"{v['value']:.4g} |{place} / {v['scale']:.4g}|^{v['exponent']:.3g}"
     if form == "sinusoid":
-        phase = f"2 pi {place} / {v['period']:.4g} {laws.COORDINATES[law['coordinate']]}"
+        phase = f"2 pi {place} / {v['period']:.4g} {laws.COORDINATES[law.coordinate]}"
         return f"({level}{v['sine']:+.4g} sin({phase}) {v['cosine']:+.4g} cos({phase}))"
     if form == "hinge":
         away = f"{place} - {v['at']:.4g}"
@@ -225,24 +232,24 @@ def _f_in_symbols(law: Mapping[str, Any]) -> str:
     if form == "bump":
         return f"({level}{v['height']:+.4g} exp(-(({place} - {v['at']:.4g}) / {v['width']:.4g})^2 / 2))"
     if form == "exponential":
-        return f"({level}{v['start'] - v['end']:+.4g} exp(-({place} - {law['range'][0]:.4g}) / {v['length']:.4g}))"
+        return f"({level}{v['start'] - v['end']:+.4g} exp(-({place} - {law.range[0]:.4g}) / {v['length']:.4g}))"
     return f"f({place})"
 
 
-def sentence(described: Sequence[Mapping[str, Any]], torque: Callable[[float], str]) -> str:
+def sentence(described: Sequence[FoundLaw], torque: Callable[[float], str]) -> str:
     """Laws with their sizes, and what fits as well; ``torque`` writes a torque with its unit."""
 
-    def told(law: Mapping[str, Any]) -> str:
-        size = f"up to {torque(law['largest_Nm'])}, {words.percent(law['largest_share'])} of the torque"
-        others = " or ".join(tie["title"] for tie in law["ties"][:SHOWN_TIES])
+    def told(law: FoundLaw) -> str:
+        size = f"up to {torque(law.largest_Nm)}, {words.percent(law.largest_share)} of the torque"
+        others = " or ".join(tie.title for tie in law.ties[:SHOWN_TIES])
         as_well = f"; not to be told from {others}" if others else ""
-        return f"{law['title']} ({size}{as_well})"
+        return f"{law.title} ({size}{as_well})"
 
     return " and ".join(map(told, described))
 
 
-def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapping[str, float]) -> dict[str, list[float]]:
-    """What the data say of f within steps of its coordinate: fitted to the residual of the rest of the model."""
+def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapping[str, float]) -> tuple[Numbers, Numbers]:
+    """Steps of its coordinate, and what the data say of f within them: fitted to the residual of the rest of the model."""
     problem, cell = found.problem, law.at(values)
     residual = problem.measured - found.fit.prediction + contribution(problem, found.fit, index)
     edges = np.linspace(cell.low, cell.high, POINTS + 1)
@@ -259,4 +266,4 @@ def _points(found: FoundLaws, index: int, traces: Traces, law: Law, values: Mapp
     seen = size > 1e-4 * size.max()
     kept = gram[np.ix_(seen, seen)]
     f = np.linalg.solve(kept + 1e-9 * np.trace(kept) * np.eye(len(kept)), weighted[:, seen].T @ residual[problem.valid])
-    return {"points_at": (0.5 * (edges[1:] + edges[:-1]))[seen].tolist(), "points": f.tolist()}
+    return tuple((0.5 * (edges[1:] + edges[:-1]))[seen].tolist()), tuple(f.tolist())

@@ -20,7 +20,9 @@ from lugre_steering.report import words
 from lugre_steering.report.style import IMPROVED, MEASURED, ORIGINAL, figure
 
 EVIDENCE_ROWS = 14
+"""As many as a picture shows legibly."""
 POINTS = 6000
+"""Of a curve: more than a picture has pixels."""
 
 
 def draw_all(diagnosis: Diagnosis, folder: Path) -> list[Path]:
@@ -35,7 +37,7 @@ def draw_all(diagnosis: Diagnosis, folder: Path) -> list[Path]:
     ]
     if diagnosis.evidence:
         wanted.append(("evidence", partial(_evidence, diagnosis)))
-    wanted += [(f"law_{law['id']}", partial(draw_law, diagnosis, law)) for law in diagnosis.json["laws"]]
+    wanted += [(f"law_{law.id}", partial(draw_law, diagnosis, law)) for law in diagnosis.laws]
     if plots.styles(diagnosis) and plots.heldout_rows(diagnosis):
         wanted.append(("heldout", partial(_heldout, diagnosis)))
     found = []

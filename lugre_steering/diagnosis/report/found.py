@@ -51,10 +51,10 @@ def found_laws(diagnosis: Diagnosis, charts: Charts) -> str:
     """A card per law."""
     vehicle, style = diagnosis.vehicle, plots.styles(diagnosis)
     return "".join(
-        f'<div class="card"><h3>{text(law["title"])}</h3>\n{pairs([(name, text(value)) for name, value in laws.facts(vehicle, law)])}'
-        + charts.place(laws.chart(vehicle, law, style[law["id"]]), f"f of {law['title']} with its band and the data", half=True)
+        f'<div class="card"><h3>{text(law.title)}</h3>\n{pairs([(name, text(value)) for name, value in laws.facts(vehicle, law)])}'
+        + charts.place(laws.chart(vehicle, law, style[law.id]), f"f of {law.title} with its band and the data", half=True)
         + "</div>\n"
-        for law in diagnosis.json["laws"]
+        for law in diagnosis.laws
     )
 
 

@@ -41,17 +41,17 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     before, after = result["baseline"]["heldout_rmse_Nm"], result["augmented"]["heldout_rmse_Nm"]
     rows = [
         (
-            title[found["id"]],
-            f"up to {words.torque(vehicle, found['largest_Nm'])}",
-            f"{words.percent(found['largest_share'])} of the torque",
+            title[found.id],
+            f"up to {words.torque(vehicle, found.largest_Nm)}",
+            f"{words.percent(found.largest_share)} of the torque",
         )
-        for found in (*result["effects"], *result["laws"])
-        if found["largest_Nm"] is not None
+        for found in diagnosis.found
+        if found.largest_Nm is not None
     ]
     if before is None:
         return rows
     noise = f"noise alone: {words.torque(vehicle, result['noise_floor_Nm'])}"
-    if result["effects"] or result["laws"]:
+    if diagnosis.found:
         rows.append(("error on held-out data", f"{words.torque(vehicle, before)} → {words.torque(vehicle, after)}", noise))
         ends = result["augmented"]["improvement_ci95"]
         between = f"95 % interval {words.percents(*ends)}" if ends else ""
@@ -90,7 +90,7 @@ def next_steps(diagnosis: Diagnosis) -> str:
             f"<code>lugre-steering replay BAG --vehicle augmented.yaml --out DIR</code> shows the smaller residual. {live}"
         )
         steps.append("Check it on the machine: the stretches and ranges below say where and when it acts.")
-    if result["laws"]:
+    if diagnosis.laws:
         steps.append(
             "Use the law that was found: <code>augmented.yaml</code> has it under <code>laws</code>, and replay, the live node and the "
             "next diagnosis run it. Replay tells where its coordinate leaves the range seen (finding <code>law_left</code>)."

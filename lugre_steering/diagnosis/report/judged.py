@@ -13,6 +13,7 @@ from lugre_steering.report import words
 from lugre_steering.report.markup import Row, bar, code, pairs, table, text
 
 EVIDENCE_SHOWN = 12
+"""More rows are folded away."""
 
 
 def heldout(diagnosis: Diagnosis) -> str:

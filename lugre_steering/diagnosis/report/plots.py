@@ -28,14 +28,13 @@ CLOUD_POINTS = 3_000
 
 def styles(diagnosis: Diagnosis) -> dict[str, str]:
     """Style of each named effect and each law found: the number of its colour."""
-    ids = [found["id"] for key in ("effects", "laws") for found in diagnosis.json.get(key, ())]
-    return {name: str(i % len(shown.EFFECT_COLOURS)) for i, name in enumerate(ids)}
+    return {found.id: str(i % len(shown.EFFECT_COLOURS)) for i, found in enumerate(diagnosis.found)}
 
 
 def titles(diagnosis: Diagnosis) -> dict[str, str]:
     """What people call each named effect and each law found."""
-    named = {effect["id"]: units.title(diagnosis.vehicle, CATALOGUE[effect["id"]]) for effect in diagnosis.json["effects"]}
-    return named | {law["id"]: str(law["title"]) for law in diagnosis.json.get("laws", ())}
+    named = {effect.id: units.title(diagnosis.vehicle, CATALOGUE[effect.id]) for effect in diagnosis.effects}
+    return named | {law.id: law.title for law in diagnosis.laws}
 
 
 def torque_chart(diagnosis: Diagnosis, trace: BagTrace) -> Chart:

@@ -50,7 +50,7 @@ PER_VALUE = 4.0
 HALF = 0.5
 """Share of the best one's energy that a rival must take."""
 END = 0.01
-"""Share of its range within which a value stands at the end of it."""
+"""Share of a bound within which a value stands at it."""
 MARGIN = 0.1
 """Share of what names take that laws must take more: a name wins a draw."""
 

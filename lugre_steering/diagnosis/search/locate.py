@@ -16,7 +16,9 @@ from lugre_steering.recording import Array
 ACTIVE_SHARE = 0.05
 """An effect is active where its torque exceeds this share of its largest torque."""
 BRIDGE_S = 0.5
+"""Shorter pauses are bridged: one stretch for an engineer."""
 BINS = 24
+"""Of a coordinate, equally filled, in which structure is looked for."""
 
 
 def contribution(problem: Problem, result: Fit, index: int) -> Array:

@@ -34,6 +34,7 @@ SHORTLIST, SHORT = 7, 0.08
 PROMISING, CLOSE = (3, 5), 0.1
 """Of these how many are fitted with care at least and at most, and the share of the gain within which they deserve it."""
 FALSE_DISCOVERY_RATE = 0.01
+"""Of the fingerprints that are fitted: a screen, the comparison decides."""
 LEADING = 0.5
 """Share of the best one's energy from which a trial is looked at more closely."""
 
