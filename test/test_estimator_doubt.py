@@ -599,6 +599,20 @@ def test_a_residual_of_five_times_the_calibrations_is_implausible_for_as_long_as
     assert not any(told[1000:])
 
 
+@pytest.mark.parametrize(("swings_Hz", "implausible"), [(15.0, False), (0.5, True)])
+def test_a_machine_that_swings_on_its_oil_has_a_sound_model(swings_Hz: float, implausible: bool) -> None:
+    """Twice the bound, 15 times a second: what accelerates it is in the pressures; the same slowly is another friction."""
+    vehicle = VEHICLE.replace(hydraulics=None, torque_sensor=TorqueSensor(), provenance={"heldout_rmse_Nm": 800.0})
+    estimator, told = Estimator(vehicle), False
+    for i in range(1500):
+        for side in (0, 1):
+            for row in estimator.push(side, T0 + i * PERIOD_NS, 0.3 * math.sin(0.7 * 0.01 * i))[0]:
+                told |= "residual implausible" in doubts(row)
+                swing = 10.0 * 800.0 * math.sin(2.0 * math.pi * swings_Hz * 0.01 * i) if i > 500 else 0.0
+                estimator.push(2, T0 + i * PERIOD_NS, float(row["predicted"]) + swing)
+    assert told == implausible
+
+
 @pytest.mark.parametrize("calibrated", [True, False])
 def test_a_machine_that_never_was_as_its_calibration_is_told_at_once(calibrated: bool) -> None:
     """Its torque is 1.4 times the estimate from the first sample on; without a calibration that is how it may be."""

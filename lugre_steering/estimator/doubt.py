@@ -72,6 +72,8 @@ REFUSED_S = 0.5
 """A command that could not be used, with no plan in force, is forgotten after this."""
 BOUND_MEMORY_S, BOUND_CAP = 0.4, 4.0
 """A residual beyond its bound is forgotten again in less than a second, however large it was."""
+SWING_S = 0.05
+"""What swings faster is what accelerates a machine on its oil, which is no friction: a loop that swings a little has a sound model."""
 
 DOUBTS = (
     "angle jumped", "angle frozen", "angle noisy", "residual implausible", "rubber temperature outside the table",
@@ -454,8 +456,10 @@ def weigh_residual(c, stamp_ns, measured, residual):
     c.measured_now += (measured * measured - c.measured_now) * soon
     c.estimate_now += ((measured - residual) ** 2 - c.estimate_now) * soon
     if c.residual_bound > 0.0:
-        share = min(BOUND_CAP, (residual / c.residual_bound) ** 2)
-        c.beyond += (share - c.beyond) * (min(1.0, dt / BOUND_MEMORY_S) if known else 0.0)
+        most = math.sqrt(BOUND_CAP) * c.residual_bound
+        slowly = 1.0 - math.exp(-dt / SWING_S) if known else 0.0
+        c.residual_slow += (max(-most, min(most, residual)) - c.residual_slow) * slowly
+        c.beyond += ((c.residual_slow / c.residual_bound) ** 2 - c.beyond) * (min(1.0, dt / BOUND_MEMORY_S) if known else 0.0)
     if _sudden(c):  # told already, and to be forgotten soon after
         return
     weight = min(1.0, dt / RESIDUAL_MEMORY_S) if known else 0.0

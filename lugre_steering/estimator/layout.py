@@ -81,6 +81,7 @@ CONFIG = np.dtype(
         ("residual_now", np.float64),  # the same three of the very last time
         ("measured_now", np.float64),
         ("estimate_now", np.float64),
+        ("residual_slow", np.float64),  # latest residual without what swings fast, at most as far beyond the bound as counts [N m]
         ("beyond", np.float64),  # share of the bound that residuals have had of late, squared
         ("explained_ns", np.int64),  # stamp of the last measured torque that was compared with the estimate
         ("explained", np.float64),  # time for which the lines have explained the estimate [s]

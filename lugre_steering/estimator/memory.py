@@ -25,7 +25,7 @@ _HANDED_OVER = (
 _ONGOING = (
     "start_ns", "start_known", "start_residual", "start_residual_ns", "start_share", "begin_ns", "lagged", "lag_input",
     "lagged_ns", "pending_first", "pending_count", "plan_size", "plan_refused_ns", "swing_ns", "swing_from", "residual_ns", "agreed_ns",
-    "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now", "beyond",
+    "residual_square", "measured_square", "estimate_square", "residual_now", "measured_now", "estimate_now", "residual_slow", "beyond",
     "released_ns", "weight", "message",
 )  # fmt: skip
 
