@@ -129,12 +129,12 @@ def test_what_another_version_of_the_watch_has_learned_is_refused(spoil: str) ->
 
 def test_the_watch_says_what_it_can_tell() -> None:
     """Without a calibration nothing tells a model that was wrong from the start; with one that is the bound of the residual."""
-    watch, calibrated = Watch(VEHICLE), Watch(VEHICLE.replace(provenance={"heldout_rmse_Nm": 80.0}))
+    watch, calibrated = Watch(VEHICLE), Watch(VEHICLE.replace(provenance={"heldout_rmse_Nm": 3000.0}))
     assert watch.words == f"changes once 60 manoeuvres have told what is usual (0 so far); {UNCALIBRATED}"
     assert calibrated.words == "changes once 60 manoeuvres have told what is usual (0 so far)"
     watched(calibrated, 0, 3000, 900.0)
     assert calibrated.words == "changes"
-    assert (watch.bound_Nm, calibrated.bound_Nm) == (0.0, 400.0)
+    assert (watch.bound_Nm, calibrated.bound_Nm) == (0.0, 15000.0)
 
 
 def test_the_vehicle_steers_by_the_mean_of_its_sides() -> None:

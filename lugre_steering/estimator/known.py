@@ -12,6 +12,7 @@ import numpy as np
 
 from lugre_steering.recording import Array
 from lugre_steering.vehicle import Vehicle
+from lugre_steering.vehicle.model import most_friction_of_all
 
 SLACK = 1.1
 """The causal estimates of a motion swing a little farther than the smoothed ones that were kept."""
@@ -19,6 +20,8 @@ LIKE_SHARE = 0.1
 """Rubber may be so much colder or warmer than it was that its table changes the friction by this share."""
 BOUND_RMSE = 5.0
 """A residual this many times as large as the held-out one of the calibration is implausible."""
+LEAST_BOUND = 0.1
+"""Share of the friction below which none is: a controller that feeds nine tenths of it forward bears as much."""
 _DEG = math.pi / 180.0
 
 
@@ -50,7 +53,8 @@ def known_range(vehicle: Vehicle) -> KnownRange:
 
 def residual_bound(vehicle: Vehicle) -> float:
     """Size [N m] from which on a residual is implausible, by what the calibration left; 0 without one."""
-    return BOUND_RMSE * known_range(vehicle).rmse
+    rmse = known_range(vehicle).rmse
+    return max(BOUND_RMSE * rmse, LEAST_BOUND * most_friction_of_all(vehicle)) if rmse > 0.0 else 0.0
 
 
 def like_seen(seen: tuple[float, float], degC: Array, friction: Array) -> tuple[float, float]:
