@@ -198,11 +198,11 @@ def test_what_does_not_survive_and_what_cannot_be_told_is_said_once() -> None:
 
 def test_a_calibrated_node_with_a_state_file_says_neither(tmp_path: Path) -> None:
     file = tmp_path / "calibrated.yaml"
-    save(load(VEHICLE).replace(provenance={"heldout_rmse_Nm": 80.0}), file)
+    save(load(VEHICLE).replace(provenance={"heldout_rmse_Nm": 3000.0}), file)
     with LiveNode("-p", f"state_file:={tmp_path / 'state.json'}", vehicle=file) as node, World() as world:
         assert "state_file" not in node_output(node)
         assert "changes only" not in node_output(node)
-        assert world.status("residual").values["implausible from [N m]"] == "400"
+        assert world.status("residual").values["implausible from [N m]"] == "15000"
 
 
 def test_the_state_survives_a_kill_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
