@@ -503,6 +503,8 @@ DIGITS = 1 << 16
         ({"t": T, "cylinder_position_left_mm": 200.0 * ANGLE}, "angle/left", None),
         ({"angle": T, "x": T}, "time", ("x", "s")),
         ({"t": T, "air_temp_F": 70.0 + T}, "air_temperature", ("air_temp_F", "degF")),
+        ({"t": T, "air": 9.0 + 0.1 * T}, "air_temperature", ("air", "degC")),
+        ({"t": T, "air": 900.0 + T}, "air_temperature", None),
     ],
 )  # fmt: skip
 def test_which_column_and_unit_are_proposed(

@@ -608,18 +608,19 @@ def no_load(time: Array, _: Array) -> Array:
 
 def driven_axis(
     vehicle: Vehicle, mass: float, loss: float, friction: Callable[[Array], Array], step_s: float = 0.04,
-    load: Callable[[Array, Array], Array] = no_load,
+    load: Callable[[Array, Array], Array] = no_load, late_s: float = 0.0,
 ) -> Recording:
-    """Force = mass times acceleration, a loss times the rate, a friction of the rate and a load of time and position, of a motion that is
-    known exactly."""
+    """Force, stamped ``late_s`` late, = mass times acceleration, a loss times the rate, a friction of the rate and a load of time and
+    position, of a motion that is known exactly."""
     time = np.arange(0.0, 60.0, step_s)
-    turns = [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
-    position = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
-    rate = sum(size * w * np.cos(w * time + phase) for size, w, phase in turns)
-    acceleration = sum(-size * w**2 * np.sin(w * time + phase) for size, w, phase in turns)
+    then, turns = time - late_s, [(0.08, 0.9, 0.0), (0.05, 2.1, 1.0), (0.02, 5.0, 2.0)]
+    position = sum(size * np.sin(w * then + phase) for size, w, phase in turns)
+    rate = sum(size * w * np.cos(w * then + phase) for size, w, phase in turns)
+    acceleration = sum(-size * w**2 * np.sin(w * then + phase) for size, w, phase in turns)
     assert vehicle.torque_sensor is not None
     rng = np.random.default_rng(4)
-    noisy = position + vehicle.sensors.angle_sigma * rng.standard_normal(time.size)
+    stamped = sum(size * np.sin(w * time + phase) for size, w, phase in turns)
+    noisy = stamped + vehicle.sensors.angle_sigma * rng.standard_normal(time.size)
     force = mass * acceleration + loss * rate + friction(rate) + vehicle.torque_sensor.noise_Nm * rng.standard_normal(time.size)
     force += load(time, position)
     return Recording("axis", 0, {"left": Signal(time, noisy)}, {}, measured_torque=Signal(time, force))
@@ -634,6 +635,19 @@ def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_s
     assert found["viscous_friction"]["sigma_2"]["value"] == pytest.approx(loss, rel=0.02)
     assert found["yaw_inertia"]["inertia"]["value"] == pytest.approx(mass, rel=0.05)
     assert result.json["augmented"]["heldout_rmse_Nm"] < 1.5 * vehicle.torque_sensor.noise_Nm
+
+
+def test_a_force_stamped_late_within_a_sample_moves_no_value_of_an_axis() -> None:
+    """12 of 40 ms: they had passed for 7 % less mass and 2 % more loss."""
+    vehicle, mass, loss, late_s = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0, 0.012
+    result = diagnose_recordings([driven_axis(vehicle, mass, loss, np.zeros_like, late_s=late_s)], vehicle)
+    found = {effect.id: effect.parameters for effect in result.effects}
+    assert set(found) == {"yaw_inertia", "viscous_friction"}
+    assert found["yaw_inertia"]["inertia"].value == pytest.approx(mass, rel=0.025)
+    assert found["viscous_friction"]["sigma_2"].value == pytest.approx(loss, rel=0.01)
+    (told,) = (finding.statement for finding in result.data_quality if finding.finding == "clock_offset")
+    assert float(told.split("stamped ")[1].split(" ms")[0]) == pytest.approx(1e3 * late_s, rel=0.25)
+    assert "too late" in told
 
 
 def test_the_spring_of_an_axis_is_told_with_its_mass_and_losses() -> None:

@@ -229,7 +229,7 @@ def _wrong(recording: Recording, vehicle: Vehicle, run: Run) -> Faults:
 def _lacks_terms(vehicle: Vehicle, run: Run, expected: Array) -> bool:
     """Whether inertia, viscous friction, offset, gravity (of an axis, a spring) and loads that are picked up, which the sheet of a single
     joint or axis may lack and diagnosis finds, explain with its friction what that alone does not."""
-    if vehicle.hydraulics is not None or vehicle.rubber is not None:
+    if vehicle.contact is None or vehicle.rubber is not None or len(vehicle.sides) > 1:
         return False
     theta, omega, alpha = run.theta[0], run.omega[0], run.alpha[0]
     angle = [np.cos(theta), np.sin(theta)] if vehicle.coordinate.unit == "rad" else [theta]

@@ -220,6 +220,23 @@ def still_unknown(problem: Problem, torque: Array) -> Array:
     return np.asarray(_per_second(problem, torque) * np.array([run.clock_s / TYPICAL for run in problem.runs]))
 
 
+def beside_clocks(problem: Problem, torque: Array) -> Problem:
+    """The problem with the ``torque`` (n,) [N m] of each bag up to one sample late or early as bends: within a sample stamps do not tell
+    when a value was measured."""
+    return problem.bent([_per_second(problem, torque) * _steps(problem)])
+
+
+def offsets_beside(problem: Problem, sizes: Array, deviations: Array) -> tuple[Offset, ...]:
+    """What the ``sizes`` of these bends (bags,) say, with their standard deviations."""
+    steps = _steps(problem)
+    return tuple(Offset(-float(late), float(deviation)) for late, deviation in zip(sizes * steps, deviations * steps, strict=True))
+
+
+def _steps(problem: Problem) -> Array:
+    """Time between samples (bags,) [s]."""
+    return np.array([float(run.time[1] - run.time[0]) for run in problem.runs])
+
+
 def _per_second(problem: Problem, torque: Array) -> Array:
     """Columns (n, bags): slope of a torque (n,) by the time [N m/s] in one bag, zero in all others."""
     parts = zip(problem.runs, np.split(torque, problem.edges[1:-1]), strict=True)

@@ -34,6 +34,8 @@ _OF_PRESSURE, _PRESSURE_OF = re.compile(rf"^(?:{_PRESSURE})_(?=[a-z]{{2}})"), re
 _CONTAINERS = ("data", "fluid_pressure", "samples", "signals", "value", "values")
 """Parts of paths that name nothing."""
 _STROKE = "a length in {}: by 'pivots' or a 'polynomial' an angle, on a linear axis the angle itself"
+_AIR_DEGC = 60.0
+"""Hottest, and coldest below zero, that air is."""
 _FOLLOWS = 0.9
 """Correlation of the sum of a rate over time with an angle, from which it is the rate of this angle."""
 
@@ -188,12 +190,18 @@ def _kind(table: Table, name: str) -> str | None:
         if tells(name, kind):
             return kind
     dimension = READABLE_UNITS[unit][0] if (unit := stated(table, name, None)) else None
-    if dimension == "temperature" and tells(name, "air"):
+    if tells(name, "air") and (dimension == "temperature" or (dimension is None and _is_air(table, name))):
         return "air_temperature"
     if dimension == "angle" and _side(name) is None:  # headings and latitudes are in deg as well
         return None
     by_unit = {"angle": "angle", "angular speed": "rate", "pressure": "pressure", "torque": "torque", "force": "torque"}
     return by_unit.get(dimension or "")
+
+
+def _is_air(table: Table, name: str) -> bool:
+    """Whether a column that says nothing but air holds what the temperature of air can be."""
+    values = table.columns[name][np.isfinite(table.columns[name])]
+    return set(words_of(name)) <= WORDS["air"] and bool(values.size) and bool(np.all(np.abs(values) < _AIR_DEGC))
 
 
 def _line(name: str) -> str:
@@ -225,7 +233,8 @@ def _key(table: Table, name: str) -> tuple[str | None, str]:
     if kind == "torque":
         return "measured_torque", "the name or unit tells of torque or force"
     if kind == "air_temperature":
-        return kind, "the name tells of air temperature"
+        said = tells(name, "temperature") or stated(table, name, ("temperature",)) is not None
+        return kind, "the name tells of air temperature" if said else "the name tells of air: GUESSED to be its temperature in degC"
     if kind is None and (side := side_alone(name)) is not None:
         return f"angle/{side}", "named by its side alone: GUESSED to be the angle"
     if kind is None and is_named(name):

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,7 +36,7 @@ from lugre_steering.diagnosis.result import (
 )
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.causal import causal_rmse, filtered
-from lugre_steering.fitting.clocks import clock_finding
+from lugre_steering.fitting.clocks import WORTH_SAYING_S, Offset, clock_finding
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
@@ -59,6 +59,7 @@ def conclude(
         apart = clock_finding(done.problem.vehicle, clock.late_s, clock.deviation_s)
         late = [run.name for bag, run in enumerate(done.problem.runs) if clock.bags is None or bag in clock.bags]
         findings = [*findings, *map(apart.in_bag, late)]
+    findings = [*findings, *_late(done, model)]
     progress("next experiment")
     return _told(done, stands, model, effects, vehicle, causal, form, findings)
 
@@ -66,7 +67,8 @@ def conclude(
 @dataclass(frozen=True)
 class _Modelled:
     """What stands, fitted: ``final`` to the samples that may fit, ``whole`` to all, ``bent`` beside all freedoms; ``done`` has places for
-    its laws, which ``laws`` describes and ``law`` says in a sentence, with what is ``left`` beside them."""
+    its laws, which ``laws`` describes and ``law`` says in a sentence, with what is ``left`` beside them; how ``late`` the torque of each
+    bag of a joint is."""
 
     done: Finished
     final: Fit
@@ -75,6 +77,7 @@ class _Modelled:
     laws: tuple[FoundLaw, ...]
     law: str
     left: LeftOver
+    late: tuple[Offset, ...] = ()
 
 
 class _WithFile(NamedTuple):
@@ -84,6 +87,13 @@ class _WithFile(NamedTuple):
     effects: list[NamedEffect]
     vehicle: Vehicle
     causal: float
+
+
+def _late(done: Finished, model: _Modelled) -> Iterator[BagFinding]:
+    """That the torque of a joint is stamped late or early, where that is sure."""
+    for run, offset in zip(done.problem.runs, model.late, strict=False):
+        if offset.believed and abs(offset.late_s) > WORTH_SAYING_S:
+            yield clock_finding(done.problem.vehicle, offset.late_s, offset.deviation_s).in_bag(run.name)
 
 
 def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float, seed: int) -> _WithFile:
@@ -103,13 +113,13 @@ def _modelled(done: Finished, stands: Stands, seed: int) -> _Modelled:
         return _Modelled(replace(done, problem=form.problem), form.fitted, form.whole, bent, (), "", stands.left)
     if lawful is None:
         if stands.named and (joint := in_parallel(done, final, seed)) is not None:
-            done, whole, bent = joint.done, joint.whole, joint.bent
+            return _Modelled(joint.done, final, joint.whole, joint.bent, (), "", stands.left, joint.late)
         return _Modelled(done, final, whole, bent, (), "", stands.left)
     beside, whole, laws = replace(done, problem=lawful.problem), lawful.fit, described(lawful, stands.nearest)
     law = sentence(laws, done.torque)
     left = beside_laws(beside, stands.left, lawful.fitted, lawful.names, law, formula(laws, done.problem.vehicle))
     if (joint := stands.parallel) is not None:
-        beside, whole, bent = joint.done, joint.whole, joint.bent
+        return _Modelled(joint.done, lawful.fitted, joint.whole, joint.bent, laws, law, left, joint.late)
     return _Modelled(beside, lawful.fitted, whole, bent, laws, law, left)
 
 

@@ -15,9 +15,10 @@ from lugre_steering.diagnosis.investigate import NULL_DRAWS
 from lugre_steering.diagnosis.laws.find import FoundLaws, with_freedoms
 from lugre_steering.diagnosis.search.compare import SURE
 from lugre_steering.diagnosis.search.search import Found
-from lugre_steering.diagnosis.search.surely import in_deviations, least_sure_name, least_sure_part
+from lugre_steering.diagnosis.search.surely import deviations, in_deviations, least_sure_name, least_sure_part
 from lugre_steering.diagnosis.verify import Judged, verify
 from lugre_steering.fitting import rig
+from lugre_steering.fitting.clocks import Offset, beside_clocks, offsets_beside, slows
 from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
@@ -33,12 +34,13 @@ ROUNDS = 2
 
 class Parallel(NamedTuple):
     """The search with all samples in parallel to compare in, what was found there fitted to all as recorded with the values that names have
-    in parallel, the same with these ``held``, and what was fitted in parallel."""
+    in parallel, the same with these ``held``, what was fitted in parallel, and how ``late`` the torque of each bag is there."""
 
     done: Finished
     whole: Fit
     held: Fit
     bent: Fit
+    late: tuple[Offset, ...]
 
 
 def in_parallel(done: Finished, final: Fit, seed: int) -> Parallel | None:
@@ -55,16 +57,21 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> Parallel | None:
         noise = noise_model(problem, there.x, there.effects, repeated, seed=seed)
         weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
         there = rig.fitted(problem, weight, there.effects, there)
-    there = fit(problem, weight, there.effects, there, linearisations=20)
+    if not any(slows(candidate.effect) for candidate, _ in there.effects):
+        problem = beside_clocks(problem, there.prediction)
+    x = np.append(there.x, np.zeros(problem.nuisances - there.x.size))
+    there = fit(problem, weight, there.effects, x, linearisations=20)
     problem = in_doubt(problem, weight, there)
     kept, there = _surely(problem, weight, done.roles, there, done.found.found)
     done = replace(done, found=replace(done.found, found=kept))
     seen = replace(done, problem=problem, noise=noise, found=replace(done.found, final=there), beside_form=None)
     names, laws = there.effects[: len(kept)], there.effects[len(kept) :]
     known = [(replace(candidate, free=()), values) for candidate, values in names]
-    held = fit(done.problem, done.weight, [*known, *laws], there.x, linearisations=20)
+    held = fit(done.problem, done.weight, [*known, *laws], there.x[: done.problem.nuisances], linearisations=20)
     whole = replace(held, effects=(*names, *held.effects[len(kept) :]))
-    return Parallel(replace(done, beside_form=seen, around=False), whole, held, there)
+    clocks = slice(problem.nuisances - problem.shapes, problem.nuisances)
+    late = offsets_beside(problem, there.x[clocks], deviations(problem, weight, done.roles, there)[clocks]) if problem.shapes else ()
+    return Parallel(replace(done, beside_form=seen, around=False), whole, held, there, late)
 
 
 def with_terms(done: Finished, laws: FoundLaws) -> Finished | None:

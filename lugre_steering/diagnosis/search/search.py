@@ -33,7 +33,7 @@ from lugre_steering.diagnosis.search.compare import (
 )
 from lugre_steering.diagnosis.search.locate import contribution
 from lugre_steering.diagnosis.search.propose import Proposal, closer, in_its_place, proposed
-from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviations, least_sure_part
+from lugre_steering.diagnosis.search.surely import SURE_OF_SIZE, idle, in_deviations, least_sure_part, maybe_idle
 from lugre_steering.effects.entry import Effect
 from lugre_steering.fitting import rig
 from lugre_steering.fitting.clocks import still_apart
@@ -396,7 +396,7 @@ def _in_place(
 def _acts_before_it_shows(problem: Problem, weight: Array, split: Split, current: Fit, index: int) -> bool:
     """Whether the law of a name may have acted before any recording shows it: beside others it is a part of the friction's own form."""
     candidate, _ = current.effects[index]
-    return any(not candidate.parameter(key).optional for key in idle(problem, weight, split, current, index))
+    return any(not candidate.parameter(key).optional for key in maybe_idle(problem, weight, split, current, index))
 
 
 def _settled_in(problem: Problem, weight: Array, effects: Effects, x: Array) -> Fit:

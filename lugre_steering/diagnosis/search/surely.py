@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -78,17 +78,25 @@ def least_sure_name(problem: Problem, weight: Array, roles: Split, fitted: Fit, 
 
 
 def idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> list[str]:
-    """Shapes of one effect that stand at their bound and may as well be zero: at so short a slip or time a law has acted before any
-    recording shows it, and is another level of what is there."""
+    """Shapes of one effect that may as well be zero and stand at their bound."""
+    return [key for key, at_bound in _maybe_zero(problem, weight, roles, fitted, index) if at_bound]
+
+
+def maybe_idle(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> list[str]:
+    """Shapes of one effect that may as well be zero, wherever they stand."""
+    return [key for key, _ in _maybe_zero(problem, weight, roles, fitted, index)]
+
+
+def _maybe_zero(problem: Problem, weight: Array, roles: Split, fitted: Fit, index: int) -> Iterator[tuple[str, bool]]:
+    """Shapes of one effect that may as well be zero, and whether they stand at their bound: at so short a slip or time a law has acted
+    before any recording shows it, and is another level of what is there."""
     candidate, values = fitted.effects[index]
-    form, found = moved_by_form(problem, weight, fitted, index), list[str]()
+    form = moved_by_form(problem, weight, fitted, index)
     for key, known in zip(candidate.free, deviations(problem, weight, roles, fitted)[_columns(problem, fitted, index)], strict=True):
         parameter = candidate.parameter(key)
         if key in candidate.effect.amplitudes or parameter.low < 0.0 < parameter.high:
             continue
         at = parameter.scaled(values[key])
         low, high = sorted((parameter.scaled(parameter.low), parameter.scaled(parameter.high)))
-        at_bound = not low + END * (high - low) < at < high - END * (high - low)
-        if at_bound and abs(values[key]) < float(np.hypot(NORMAL * known, form[key])):
-            found.append(key)
-    return found
+        if abs(values[key]) < float(np.hypot(NORMAL * known, form[key])):
+            yield key, not low + END * (high - low) < at < high - END * (high - low)
