@@ -575,6 +575,29 @@ def test_a_pendulum_whose_sheet_lacks_its_gravity_is_no_wiring_fault(tmp_path: P
     assert bool(inspect(seen, heavy.replace(gravity=None)).blocking) == refused
 
 
+@pytest.mark.parametrize(("exchanged", "refused"), [(False, False), (True, True)])
+def test_a_boom_on_a_cylinder_whose_sheet_lacks_its_gravity_is_no_wiring_fault(tmp_path: Path, exchanged: bool, refused: bool) -> None:
+    """Gravity ten times the friction hides it in pressures too; lines in each other's place still show."""
+    joint = yaml.safe_load((CONFIG / "single_joint_example.yaml").read_text())
+    del joint["torque_sensor"]
+    joint["gravity"] = {"cos_Nm": 0.0, "sin_Nm": 400.0}
+    joint["hydraulics"] = {
+        "lines": ["head", "back"],
+        "cylinders": {"lift": {
+            "side": "left", "chassis_m": [-0.3, -0.3], "knuckle_m": [-0.1, 0.05], "bore_m": 0.03, "rod_m": 0.015,
+            "cap": "head", "rod": "back",
+        }},
+    }  # fmt: skip
+    joint["sensors"] |= {"pressure_reference": "gauge", "pressure_range_Pa": 2.5e7, "pressure_noise_Pa": 1e4}
+    (tmp_path / "boom.yaml").write_text(yaml.safe_dump(joint))
+    heavy = vehicle_file.load(tmp_path / "boom.yaml")
+    write_recorded(heavy, tmp_path / "bag")
+    recording = read_recording(tmp_path / "bag", heavy.channels)
+    lines = dict(zip(recording.pressure, reversed(recording.pressure.values()), strict=True)) if exchanged else recording.pressure
+    seen = dataclasses.replace(recording, pressure=lines)
+    assert bool(inspect(seen, heavy.replace(gravity=None)).blocking) == refused
+
+
 def test_calibration_of_a_joint_fits_what_it_has_beside_friction(tmp_path: Path) -> None:
     """Viscous friction and gravity that the sheet lacks, and friction of the sheet a fifth too high: each comes out as put in."""
     true = vehicle_file.load(CONFIG / "single_joint_example.yaml").replace(gravity=None)

@@ -220,16 +220,28 @@ def still_unknown(problem: Problem, torque: Array) -> Array:
     return np.asarray(_per_second(problem, torque) * np.array([run.clock_s / TYPICAL for run in problem.runs]))
 
 
-def beside_clocks(problem: Problem, torque: Array) -> Problem:
-    """The problem with the ``torque`` (n,) [N m] of each bag up to one sample late or early as bends: within a sample stamps do not tell
-    when a value was measured."""
-    return problem.bent([_per_second(problem, torque) * _steps(problem)])
+def beside_clocks(problem: Problem, fitted: Fit) -> Problem:
+    """The problem of a joint or axis with the torque of each bag, as ``fitted``, up to one sample late or early as bends: within a sample
+    stamps do not tell when a value was measured. As it is of a vehicle, or where something is known to make the torque late."""
+    if not is_rig(problem.vehicle) or any(slows(candidate.effect) for candidate, _ in (*problem.standing, *fitted.effects)):
+        return problem
+    return problem.bent([_per_second(problem, fitted.prediction) * _steps(problem)])
 
 
-def offsets_beside(problem: Problem, sizes: Array, deviations: Array) -> tuple[Offset, ...]:
-    """What the ``sizes`` of these bends (bags,) say, with their standard deviations."""
-    steps = _steps(problem)
-    return tuple(Offset(-float(late), float(deviation)) for late, deviation in zip(sizes * steps, deviations * steps, strict=True))
+def offsets_beside(problem: Problem, x: Array, deviations: Array) -> tuple[Offset, ...]:
+    """What the nuisances ``x`` of such a problem say of the clock of each bag, with the standard deviations of all values."""
+    if not problem.shapes:
+        return ()
+    clocks, steps = slice(problem.nuisances - problem.shapes, problem.nuisances), _steps(problem)
+    return tuple(Offset(-float(late), float(known)) for late, known in zip(x[clocks] * steps, deviations[clocks] * steps, strict=True))
+
+
+def offset_findings(problem: Problem, offsets: Sequence[Offset]) -> dict[str, Finding]:
+    """Those that are sure and worth saying, by recording."""
+    return {
+        run.name: clock_finding(problem.vehicle, offset.late_s, offset.deviation_s)
+        for run, offset in zip(problem.runs, offsets, strict=False) if offset.believed and abs(offset.late_s) > WORTH_SAYING_S
+    }  # fmt: skip
 
 
 def _steps(problem: Problem) -> Array:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,7 +36,7 @@ from lugre_steering.diagnosis.result import (
 )
 from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.causal import causal_rmse, filtered
-from lugre_steering.fitting.clocks import WORTH_SAYING_S, Offset, clock_finding
+from lugre_steering.fitting.clocks import Offset, clock_finding, offset_findings
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.recording import BagFinding, Recording
 from lugre_steering.vehicle import Vehicle
@@ -59,7 +59,7 @@ def conclude(
         apart = clock_finding(done.problem.vehicle, clock.late_s, clock.deviation_s)
         late = [run.name for bag, run in enumerate(done.problem.runs) if clock.bags is None or bag in clock.bags]
         findings = [*findings, *map(apart.in_bag, late)]
-    findings = [*findings, *_late(done, model)]
+    findings = [*findings, *(apart.in_bag(bag) for bag, apart in offset_findings(done.problem, model.late).items())]
     progress("next experiment")
     return _told(done, stands, model, effects, vehicle, causal, form, findings)
 
@@ -87,13 +87,6 @@ class _WithFile(NamedTuple):
     effects: list[NamedEffect]
     vehicle: Vehicle
     causal: float
-
-
-def _late(done: Finished, model: _Modelled) -> Iterator[BagFinding]:
-    """That the torque of a joint is stamped late or early, where that is sure."""
-    for run, offset in zip(done.problem.runs, model.late, strict=False):
-        if offset.believed and abs(offset.late_s) > WORTH_SAYING_S:
-            yield clock_finding(done.problem.vehicle, offset.late_s, offset.deviation_s).in_bag(run.name)
 
 
 def _with_file(done: Finished, stands: Stands, recordings: Sequence[Recording], material: float, seed: int) -> _WithFile:

@@ -18,7 +18,7 @@ from lugre_steering.diagnosis.search.search import Found
 from lugre_steering.diagnosis.search.surely import deviations, in_deviations, least_sure_name, least_sure_part
 from lugre_steering.diagnosis.verify import Judged, verify
 from lugre_steering.fitting import rig
-from lugre_steering.fitting.clocks import Offset, beside_clocks, offsets_beside, slows
+from lugre_steering.fitting.clocks import Offset, beside_clocks, offsets_beside
 from lugre_steering.fitting.doubt import in_doubt
 from lugre_steering.fitting.fit import Fit, fit
 from lugre_steering.fitting.noise import noise_model, repeated_motion
@@ -57,20 +57,19 @@ def in_parallel(done: Finished, final: Fit, seed: int) -> Parallel | None:
         noise = noise_model(problem, there.x, there.effects, repeated, seed=seed)
         weight = np.where(problem.valid, 1.0 / noise.sigma, 0.0)
         there = rig.fitted(problem, weight, there.effects, there)
-    if not any(slows(candidate.effect) for candidate, _ in there.effects):
-        problem = beside_clocks(problem, there.prediction)
-    x = np.append(there.x, np.zeros(problem.nuisances - there.x.size))
-    there = fit(problem, weight, there.effects, x, linearisations=20)
+    there = fit(problem, weight, there.effects, there, linearisations=20)
     problem = in_doubt(problem, weight, there)
     kept, there = _surely(problem, weight, done.roles, there, done.found.found)
+    if (apart := beside_clocks(problem, there)) is not problem:
+        there = fit(apart, weight, there.effects, np.append(there.x, np.zeros(apart.shapes)), linearisations=20)
+        problem = in_doubt(apart, weight, there)
     done = replace(done, found=replace(done.found, found=kept))
     seen = replace(done, problem=problem, noise=noise, found=replace(done.found, final=there), beside_form=None)
     names, laws = there.effects[: len(kept)], there.effects[len(kept) :]
     known = [(replace(candidate, free=()), values) for candidate, values in names]
     held = fit(done.problem, done.weight, [*known, *laws], there.x[: done.problem.nuisances], linearisations=20)
     whole = replace(held, effects=(*names, *held.effects[len(kept) :]))
-    clocks = slice(problem.nuisances - problem.shapes, problem.nuisances)
-    late = offsets_beside(problem, there.x[clocks], deviations(problem, weight, done.roles, there)[clocks]) if problem.shapes else ()
+    late = offsets_beside(problem, there.x, deviations(problem, weight, done.roles, there))
     return Parallel(replace(done, beside_form=seen, around=False), whole, held, there, late)
 
 
