@@ -18,11 +18,9 @@ from lugre_steering.diagnosis.freedom import Freedom
 from lugre_steering.diagnosis.laws.cells import Axis, Cell
 from lugre_steering.diagnosis.laws.refine import given_law
 from lugre_steering.effects import laws
-from lugre_steering.effects.entry import Effect
-from lugre_steering.effects.registry import CATALOGUE
 from lugre_steering.fitting.clocks import still_apart, still_unknown
 from lugre_steering.fitting.fit import Fit
-from lugre_steering.fitting.problem import Candidate, Problem, in_threads
+from lugre_steering.fitting.problem import Problem, in_threads
 from lugre_steering.recording import Array
 
 STRENGTHENING, STRIBECK = 0.04, 0.06
@@ -37,7 +35,7 @@ WARMTH, WARMTH_K = 0.05, 20.0
 """Level per so many kelvin, in which batches of one rubber differ."""
 RELAXING, RELAXING_S = 0.15, (0.1, 1.0)
 """Share of the torque that follows so many seconds late: the loss factor of treads."""
-PRESLIDING, RELAXATION = "its presliding", "its relaxation"
+RELAXATION = "its relaxation"
 LATE = "the clocks of its sensors"
 """What these freedoms are called in reports."""
 SMALL = 0.2
@@ -66,23 +64,13 @@ def bent(problem: Problem, fitted: Fit) -> Bent:
     freedoms = _freedoms(problem, fitted)
     shapes = [(freedom, f) for freedom in freedoms for f in freedom.shapes]
     columns = in_threads(lambda shape: column(*shape), shapes)
-    virgin = [_as_form(problem, x, effect) for effect in CATALOGUE.values() if effect.as_form]
-    columns += virgin
     parts = zip(problem.runs, np.split(base, problem.edges[1:-1]), strict=True)
     late = [[lagged(torque, run.time[1] - run.time[0], tau) - torque for tau in RELAXING_S] for run, torque in parts]
     columns += [RELAXING * np.concatenate(rows) for rows in zip(*late, strict=True)]
     columns.append(still_apart(problem, base))
-    relaxing = [RELAXATION] * len(RELAXING_S)
-    words = (*(freedom.words for freedom, _ in shapes), *[PRESLIDING] * len(virgin), *relaxing, *(LATE for _ in (*bags, *bags)))
+    words = (*(freedom.words for freedom, _ in shapes), *(RELAXATION for _ in RELAXING_S), *(LATE for _ in (*bags, *bags)))
     freer = Problem(problem.vehicle, problem.runs, problem.calibrations, bends=np.column_stack(columns))
     return Bent(freer.bent([still_unknown(problem, base)]), words, tuple(freedoms))
-
-
-def _as_form(problem: Problem, x: Array, effect: Effect) -> Array:
-    """What an effect does to the torque (n,) [N m] at the values at which it is a form of any friction."""
-    small = {name: SMALL * value if name in effect.amplitudes else value for name, value in effect.as_form.items()}
-    bare = Problem(problem.vehicle, problem.runs, problem.calibrations)
-    return np.asarray((bare.predict_all(x, [(Candidate(effect), small)]) - bare.predict_all(x)) / SMALL)
 
 
 def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
@@ -103,10 +91,10 @@ def _freedoms(problem: Problem, fitted: Fit) -> list[Freedom]:
     ]
     most, loads = max(own["static_torque"], own["coulomb_torque"]), np.linspace(-1.0, 1.0, 7)
     hats = np.array([np.interp(np.linspace(-1.0, 1.0, laws.KNOTS), loads, hat) for hat in np.eye(7)])
-    found.append(Freedom(PRESLIDING, "presliding_stiffness", "opposing_torque", -most, most, SHARPER * hats))
+    found.append(Freedom("its presliding", "presliding_stiffness", "opposing_torque", -most, most, SHARPER * hats))
     for way_of in ("since_reversal", "slip"):  # and on the first sweep, which no reversal has prepared
-        found.append(Freedom(PRESLIDING, "presliding_stiffness", way_of, 0.0, far, SHARPER * near[:4]))
-        found.append(Freedom(PRESLIDING, "friction_level", way_of, 0.0, far, ROUNDER * near[:5]))
+        found.append(Freedom("its presliding", "presliding_stiffness", way_of, 0.0, far, SHARPER * near[:4]))
+        found.append(Freedom("its presliding", "friction_level", way_of, 0.0, far, ROUNDER * near[:5]))
     if problem.vehicle.rubber is not None:
         cold, hot = -60.0, 140.0
         warmer = (np.linspace(cold, hot, laws.KNOTS) - problem.temperatures(0, fitted.x)[0]) / WARMTH_K

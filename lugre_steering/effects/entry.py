@@ -138,8 +138,6 @@ class Effect:
     """Left and right turns differ by it; else the torque of mirrored motion is the mirrored torque."""
     of_angle: bool = False
     """Its law is one of an angle and means nothing along a line."""
-    as_form: Mapping[str, float] = field(default_factory=dict)
-    """Values at the most of which its law is how a contact rubs whose parts slip one after another: a freedom of any friction law."""
     of_line: bool = False
     """Sought along a line only: what turns has another law for it."""
     joint_title: str = ""

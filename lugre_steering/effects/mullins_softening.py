@@ -32,6 +32,4 @@ EFFECT = Effect(
     hooks={"tangent": tangent},
     rivals=("wear_polishing",),
     never_late=True,
-    # Where parts slip one after another, virgin loading is as stiff as a reversal stretched to half its way (G. Masing, 1926).
-    as_form={"amplitude": 1.0, "width": 0.001},
 )

@@ -89,22 +89,6 @@ def test_presliding_that_yields_by_another_power_is_explained_in_part_strokes_to
     assert left_beside_freedoms(strokes, strokes.predict_all(strokes.start()) + other) < 0.2 * FORM_LEFT
 
 
-def test_virgin_loading_stiffer_than_a_reversal_is_a_form_of_friction() -> None:
-    """As of contacts whose parts slip one after another (G. Masing, 1926): twice as stiff at most. One that takes a while is none."""
-    start = NOTHING.start()
-    freer, words, _ = bent(NOTHING, fit(NOTHING, weight(NOTHING)))
-
-    def unlike(width: float) -> float:
-        """What no single freedom of the presliding has of it, as a share."""
-        other = NOTHING.predict_all(start, [effect("mullins_softening", amplitude=0.1, width=width)]) - KNOWN
-        columns = freer.bends[:, np.array(words) == "its presliding"]
-        alike = columns.T @ other / (np.linalg.norm(columns, axis=0) * np.linalg.norm(other))
-        return float(1.0 - np.max(alike**2))
-
-    assert unlike(0.001) < 0.01
-    assert unlike(0.05) > 0.1
-
-
 def test_no_name_is_given_to_friction_of_another_form() -> None:
     done = rubbed()
     assert done.needs_form  # it is seen
