@@ -39,6 +39,7 @@ from lugre_steering.diagnosis.report.page import write_report
 from lugre_steering.effects.registry import CATALOGUE, leaving_out
 from lugre_steering.errors import DataError, VehicleFileError
 from lugre_steering.estimator import Estimator
+from lugre_steering.fitting import clocks
 from lugre_steering.fitting import problem as problem_module
 from lugre_steering.fitting.fingerprint import candidates
 from lugre_steering.fitting.fit import fit
@@ -661,7 +662,7 @@ def test_an_axis_without_friction_is_told_its_mass_and_its_losses_whatever_its_s
 
 
 def test_a_force_stamped_late_within_a_sample_moves_no_value_of_an_axis() -> None:
-    """12 of 40 ms: they had passed for 7 % less mass and 2 % more loss."""
+    """12 of 40 ms, which had passed for 7 % less mass and 2 % more loss."""
     vehicle, mass, loss, late_s = vehicle_file.load(CONFIG / "linear_axis_example.yaml"), 40.0, 250.0, 0.012
     result = diagnose_recordings([driven_axis(vehicle, mass, loss, np.zeros_like, late_s=late_s)], vehicle)
     found = {effect.id: effect.parameters for effect in result.effects}
@@ -671,6 +672,17 @@ def test_a_force_stamped_late_within_a_sample_moves_no_value_of_an_axis() -> Non
     (told,) = (finding.statement for finding in result.data_quality if finding.finding == "clock_offset")
     assert float(told.split("stamped ")[1].split(" ms")[0]) == pytest.approx(1e3 * late_s, rel=0.25)
     assert "too late" in told
+
+
+def test_a_force_late_by_a_sample_or_more_is_told_as_that() -> None:
+    vehicle = vehicle_file.load(CONFIG / "linear_axis_example.yaml")
+    problem = Problem(vehicle, [prepare(driven_axis(vehicle, 40.0, 250.0, np.zeros_like), vehicle)])
+    apart = clocks.beside_clocks(problem, fit(problem, problem.sensor_weight))
+    for size, told in ((-1.0, "stamped at least 40.0 ms too late"), (0.3, "stamped 12.0 ms (+-0.8) too early")):
+        x, deviations = np.append(problem.start(), size), np.append(problem.start(), 0.01)
+        (finding,) = clocks.offset_findings(apart, clocks.offsets_beside(apart, x, deviations)).values()
+        assert told in finding.statement
+    assert not clocks.offsets_beside(problem, problem.start(), problem.start())
 
 
 def test_the_spring_of_an_axis_is_told_with_its_mass_and_losses() -> None:

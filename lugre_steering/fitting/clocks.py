@@ -40,6 +40,8 @@ WORTH_SAYING_S = 2e-3
 APART_S = 0.015
 """How far torque and angles may still be apart once their clocks are set, as that is done beside a friction law of another form; nothing
 where the law is the recording's own."""
+AT_BOUND = 0.99
+"""Share of a sample from which the torque of a joint may as well be later still."""
 ROUNDS = 6
 """Most rounds of setting the clocks and fitting."""
 NO_CLOCK = 0.6
@@ -50,10 +52,11 @@ LIKE_LATENESS = {"lag", "wind_up"}
 
 @dataclass(frozen=True)
 class Offset:
-    """How late [s] the torque of one bag is stamped against its angles, and its standard deviation."""
+    """How late [s] the torque of one bag is stamped against its angles, or ``at_least``, and its standard deviation."""
 
     late_s: float
     deviation_s: float
+    at_least: bool = False
 
     @property
     def believed(self) -> bool:
@@ -200,12 +203,13 @@ def earlier(recording: Recording, shift: float) -> Recording:
     )  # fmt: skip
 
 
-def clock_finding(vehicle: Vehicle, late: float, deviation: float) -> Finding:
-    """That the torque of a recording is stamped ``late`` [s] against its angles, give or take ``deviation``."""
+def clock_finding(vehicle: Vehicle, late: float, deviation: float, *, at_least: bool = False) -> Finding:
+    """That the torque of a recording is stamped ``late`` [s] against its angles, give or take ``deviation``, or by ``at_least`` as much."""
+    size = f"{'at least ' if at_least else ''}{1e3 * abs(late):.1f} ms{'' if at_least else f' (+-{2e3 * deviation:.1f})'}"
     topics = ", ".join(dict.fromkeys(c.topic for c in vehicle.channels if c.kind in (Kind.PRESSURE, Kind.TORQUE)))
     return Finding(
         "clock_offset", topics,
-        f"{topics}: stamped {1e3 * abs(late):.1f} ms (+-{2e3 * deviation:.1f}) too {'late' if late > 0.0 else 'early'} against the angles; "
+        f"{topics}: stamped {size} too {'late' if late > 0.0 else 'early'} against the angles; "
         "taken out here; synchronise the clocks of the devices, or stamp where the sensor is read",
     )  # fmt: skip
 
@@ -233,13 +237,14 @@ def offsets_beside(problem: Problem, x: Array, deviations: Array) -> tuple[Offse
     if not problem.shapes:
         return ()
     clocks, steps = slice(problem.nuisances - problem.shapes, problem.nuisances), _steps(problem)
-    return tuple(Offset(-float(late), float(known)) for late, known in zip(x[clocks] * steps, deviations[clocks] * steps, strict=True))
+    found = zip(x[clocks], deviations[clocks], steps, strict=True)
+    return tuple(Offset(-float(size * step), float(known * step), bool(abs(size) > AT_BOUND)) for size, known, step in found)
 
 
 def offset_findings(problem: Problem, offsets: Sequence[Offset]) -> dict[str, Finding]:
     """Those that are sure and worth saying, by recording."""
     return {
-        run.name: clock_finding(problem.vehicle, offset.late_s, offset.deviation_s)
+        run.name: clock_finding(problem.vehicle, offset.late_s, offset.deviation_s, at_least=offset.at_least)
         for run, offset in zip(problem.runs, offsets, strict=False) if offset.believed and abs(offset.late_s) > WORTH_SAYING_S
     }  # fmt: skip
 
